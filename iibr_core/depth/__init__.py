@@ -1,0 +1,1 @@
+"""Where a photo's disparity comes from."""

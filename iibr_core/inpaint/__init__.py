@@ -1,0 +1,1 @@
+"""Content for what the photo never saw."""

@@ -1,0 +1,100 @@
+"""The values that travel between modules, and the conventions all of them share. Everything else refers to this page.
+
+Light field     L[v, u, y, x, c]: v down, u right. The centre view is (V // 2, U // 2).
+View offset     (t, s) = (v - v_centre, u - u_centre) in view steps: t down, s right; real-valued for virtual views.
+Disparity d     pixels per view step, of the view it is given for. A point seen at (x, y) in the centre view is seen at
+                (x - d * s, y - d * t) in view (t, s). Larger is closer; 0 is the plane that does not move.
+Pixel centres   integers in arrays (the picture spans -0.5 .. width - 0.5); + 0.5 only in GL texture coordinates.
+Rows            row 0 is the top everywhere on the CPU.
+Colour          sRGB-encoded, 1 = white, as photos are; HDR values exceed 1 on the same curve, continued. Sums of light are
+                taken in linear light (`iibr_core.color`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatImage = NDArray[np.float32]
+"""(H, W, 3) or (H, W) float32."""
+
+StoredColors = NDArray[np.uint8] | NDArray[np.float16]
+"""(H, W, 3), sRGB-encoded: uint8 for ordinary photos (255 = white), float16 for HDR ones (1 = white)."""
+
+
+class ViewOffset(NamedTuple):
+    """Where a view stands relative to the centre view, in view steps: t down, s right."""
+
+    t: float
+    s: float
+
+
+class GridShape(NamedTuple):
+    """Numbers of view rows (V) and view columns (U)."""
+
+    rows: int
+    columns: int
+
+    @property
+    def centre(self) -> tuple[int, int]:
+        """Index (v, u) of the centre view."""
+        return self.rows // 2, self.columns // 2
+
+    def offset(self, row: int, column: int) -> ViewOffset:
+        """View offset of the view at index (row, column)."""
+        v, u = self.centre
+        return ViewOffset(float(row - v), float(column - u))
+
+
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """A photo as the core sees it.
+
+    pixels: (H, W, 3) float32, sRGB-encoded, finite, >= 0; `is_hdr` photos exceed 1.
+    focal_px: focal length in pixels of this size. notes: what reading it changed, one sentence each, for people.
+    """
+
+    pixels: FloatImage
+    focal_px: float
+    name: str
+    is_hdr: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self.pixels.shape[0], self.pixels.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Disparity:
+    """Disparity of a photo, at the photo's size.
+
+    values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people ("scene.pfm", "none").
+    """
+
+    values: FloatImage
+    source: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ViewUpdate:
+    """One finished view of a light field.
+
+    row, column: its index (v, u). colors: (H, W, 3), see StoredColors. disparity: (H, W) float32 of this view, or None where a
+    light field read from disk has none. inpainted: (H, W) bool, True where the photo saw nothing, or None where not known.
+    """
+
+    row: int
+    column: int
+    colors: StoredColors
+    disparity: FloatImage | None
+    inpainted: NDArray[np.bool_] | None = None
+
+
+class InputError(ValueError):
+    """Bad input from outside: a file, a value, an option. The message is one line that names it and says what to do."""

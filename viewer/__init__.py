@@ -1,0 +1,1 @@
+"""The program: command line, window, panels, worker and GPU renderer around iibr_core."""
