@@ -1,11 +1,19 @@
-"""Photo + disparity -> the views of a light field, one after the other. The paper's loop (section 3), closed-form weights."""
+"""Photo + disparity -> the views of a light field, one after the other: the loop of the paper's section 3.
+
+The farthest views come first. What they disocclude is inpainted once and joins the ray set, so all later views show the same
+content there. Then the ray set is final, and the remaining views may come in any order.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+import numpy as np
+
+from iibr_core.color import stored_from_encoded
 from iibr_core.plan import ScenePlan
-from iibr_core.types import Disparity, Photo, ViewOffset, ViewUpdate
+from iibr_core.synthesis import Cancelled, RenderedView, ViewSynthesis, rays_of_photo
+from iibr_core.types import Disparity, GridShape, Photo, ViewOffset, ViewUpdate
 
 
 def generate(
@@ -19,5 +27,57 @@ def generate(
 
     disparity is the field's (`plan.field_disparity(given)`). should_stop is asked between row bands of a view; once it is true the
     generator returns. Pixels do not depend on the order of the views.
+    Raises ValueError if photo and disparity differ in size.
     """
-    raise NotImplementedError
+    if disparity.values.shape != photo.size:
+        raise ValueError(f"disparity is {disparity.values.shape}, the photo {photo.size} (height, width)")
+    grid = plan.grid
+    yield ViewUpdate(
+        *grid.centre,
+        stored_from_encoded(photo.pixels, photo.is_hdr),
+        disparity.values,
+        np.zeros(photo.size, np.bool_),
+    )
+    remaining = [(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
+    if not remaining:
+        return
+    farthest = max(max(map(abs, grid.offset(v, u))) for v, u in remaining)
+    try:
+        with ViewSynthesis(should_stop) as synthesis:
+            first = _farthest_views(grid) if plan.has_disocclusion else []
+            rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(first))
+            for index in first:
+                offset = grid.offset(*index)
+                view = synthesis.render(rays, offset)
+                if view.inpainted.any():
+                    rays.add(offset, view.colors, view.disparity, view.inpainted.astype(np.float32))
+                remaining.remove(index)
+                yield _update(index, view, photo.is_hdr)
+            while remaining:
+                index = _nearest(grid, remaining, nearest_to())
+                remaining.remove(index)
+                yield _update(index, synthesis.render(rays, grid.offset(*index)), photo.is_hdr)
+    except Cancelled:
+        return
+
+
+def _farthest_views(grid: GridShape) -> list[tuple[int, int]]:
+    """Corners, then the middles of the sides: together they see all but slivers of what any view disoccludes."""
+    bottom, right = grid.rows - 1, grid.columns - 1
+    v, u = grid.centre
+    indices = [(0, 0), (bottom, right), (0, right), (bottom, 0), (v, 0), (v, right), (0, u), (bottom, u)]
+    return [index for index in dict.fromkeys(indices) if index != grid.centre]
+
+
+def _nearest(grid: GridShape, indices: list[tuple[int, int]], eye: ViewOffset) -> tuple[int, int]:
+    """The index whose view is nearest to the eye; the first of equals."""
+
+    def distance(index: tuple[int, int]) -> float:
+        offset = grid.offset(*index)
+        return (offset.t - eye.t) ** 2 + (offset.s - eye.s) ** 2
+
+    return min(indices, key=distance)
+
+
+def _update(index: tuple[int, int], view: RenderedView, is_hdr: bool) -> ViewUpdate:
+    return ViewUpdate(*index, stored_from_encoded(view.colors, is_hdr), view.disparity, view.inpainted)

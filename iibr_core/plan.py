@@ -3,8 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
-from iibr_core.types import Disparity, GridShape, Photo
+import numpy as np
+import psutil
+
+from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
+
+TOTAL_PARALLAX = 0.04
+"""For viewing: how far the nearest moves against the farthest across the whole grid, as a share of the photo's width."""
+STEP_PX = 4.0
+"""For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity in between."""
+MOST_VIEWS_A_SIDE = 9
+STILL_PX = 0.5
+"""Less parallax than this across the whole grid cannot be seen: the scene is flat."""
+GAP_PX = 1.0
+"""A depth edge disoccludes something if it opens a gap wider than this in the outermost view."""
+NEAR_EDGE_PX = 3
+ROBUST_PERCENTILES = (1.0, 99.0)
+"""A few wild disparities must not set the baseline."""
+DISPARITY_BYTES = 4
+RAY_BYTES = 26
+"""Of one pixel of one source image: colours, disparity, coverage, flags (see rays.RaySource)."""
+FARTHEST_VIEWS = 8
 
 
 @dataclass(frozen=True)
@@ -42,15 +63,125 @@ class ScenePlan:
 
     def field_disparity(self, given: Disparity) -> Disparity:
         """The disparity the light field is generated from (px per view step of this plan's grid)."""
-        values = (given.values - self.disparity_zero) * self.disparity_scale
-        return Disparity(values.astype(given.values.dtype), given.source, given.notes)
+        values = (given.values - np.float32(self.disparity_zero)) * np.float32(self.disparity_scale)
+        return Disparity(values, given.source, given.notes)
 
 
-def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverrides = PlanOverrides()) -> ScenePlan:  # noqa: B008
-    """Plan for the viewer: picks baseline, focus plane and grid."""
-    raise NotImplementedError
+def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverrides | None = None) -> ScenePlan:
+    """Plan for the viewer: picks the focus plane that stays still, the baseline and the grid.
+
+    Raises InputError if an override is out of range, or if a grid the user asked for does not fit into memory.
+    """
+    wanted = overrides or PlanOverrides()
+    if not np.isfinite(wanted.depth_strength):
+        raise InputError(f"--depth-strength {wanted.depth_strength}: give a finite number")
+    budget = _memory_budget(wanted.memory_bytes)
+    low, high = (float(p) for p in np.percentile(disparity.values, ROBUST_PERCENTILES))
+    zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
+    width = photo.size[1]
+    parallax_px = TOTAL_PARALLAX * width * abs(wanted.depth_strength) if high - low > 1e-6 * max(abs(low), abs(high), 1) else 0.0
+    reasons = []
+    if wanted.grid is not None:
+        grid = wanted.grid
+        reasons.append(f"{grid.columns} x {grid.rows} views, as asked.")
+    else:
+        grid = _grid_for(parallax_px, _view_bytes(photo), budget)
+        reasons.append(_grid_reason(grid, parallax_px))
+    steps = max(grid.rows, grid.columns) - 1
+    scale = parallax_px / steps / (high - low) * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
+    if parallax_px:
+        reasons.append(f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width.")
+    return _finished(photo, disparity, grid, float(scale), zero, budget, reasons)
 
 
 def plan_literal(photo: Photo, disparity: Disparity, grid: GridShape, memory_bytes: int | None = None) -> ScenePlan:
-    """Plan for `iibr generate --grid`: the given disparity is taken as it is, views at integer steps."""
-    raise NotImplementedError
+    """Plan for `iibr generate --grid`: the given disparity is taken as it is, views at integer steps.
+
+    Raises InputError if the grid has no view or generating it does not fit into memory.
+    """
+    reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
+    return _finished(photo, disparity, grid, 1.0, 0.0, _memory_budget(memory_bytes), reasons)
+
+
+def _memory_budget(memory_bytes: int | None) -> int:
+    budget = psutil.virtual_memory().total // 4 if memory_bytes is None else memory_bytes
+    if budget <= 0:
+        raise InputError(f"--memory {memory_bytes}: give a positive number of bytes")
+    return budget
+
+
+def _view_bytes(photo: Photo) -> int:
+    height, width = photo.size
+    return height * width * (3 * (2 if photo.is_hdr else 1) + DISPARITY_BYTES)
+
+
+def _grid_for(parallax_px: float, view_bytes: int, budget: int) -> GridShape:
+    """The smallest odd grid whose neighbouring views differ by at most STEP_PX, as far as memory allows."""
+    if parallax_px < STILL_PX:
+        return GridShape(1, 1)
+    side = min(max(ceil(parallax_px / STEP_PX) // 2 * 2 + 1, 3), MOST_VIEWS_A_SIDE)
+    while side > 3 and side * side * view_bytes > budget:
+        side -= 2
+    return GridShape(side, side)
+
+
+def _grid_reason(grid: GridShape, parallax_px: float) -> str:
+    if grid == (1, 1):
+        return "One view: the disparity is the same everywhere, so every viewpoint shows the photo."
+    step = parallax_px / (grid.columns - 1)
+    return f"{grid.columns} x {grid.rows} views: neighbours differ by {step:.1f} px, the renderer fills in between."
+
+
+def _finished(
+    photo: Photo, disparity: Disparity, grid: GridShape, scale: float, zero: float, budget: int, reasons: list[str]
+) -> ScenePlan:
+    """The plan with what follows from grid and scale."""
+    if grid.rows < 1 or grid.columns < 1:
+        raise InputError(f"--grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
+    field = (disparity.values - np.float32(zero)) * np.float32(scale)
+    outermost = max(max(map(abs, grid.offset(v, u))) for v in (0, grid.rows - 1) for u in (0, grid.columns - 1))
+    edges = _depth_edges(field, outermost)
+    leaves_frame = float(np.abs(field).max()) * outermost > STILL_PX
+    has_disocclusion = bool(leaves_frame or edges.any())
+    edge_fraction = float(_grown(edges, NEAR_EDGE_PX).mean())
+    pixels = photo.size[0] * photo.size[1]
+    field_bytes = grid.rows * grid.columns * _view_bytes(photo)
+    sources = 2 + (FARTHEST_VIEWS if has_disocclusion else 0)
+    peak_bytes = pixels * RAY_BYTES * sources + 4 * _view_bytes(photo)
+    if peak_bytes > budget:
+        raise InputError(
+            f"generating from {photo.name} takes {peak_bytes / 2**20:.0f} MiB, the budget is {budget / 2**20:.0f} MiB:"
+            " raise --memory or lower --max-pixels"
+        )
+    reasons.append(
+        f"{edge_fraction:.1%} of the pixels lie near a depth edge; "
+        + ("holes behind them are inpainted." if has_disocclusion else "nothing is disoccluded, so nothing is inpainted.")
+    )
+    reasons.append(f"Memory: {field_bytes / 2**20:.0f} MiB for the views, {peak_bytes / 2**20:.0f} MiB to make them.")
+    extent = (float(field.min()), float(field.max()))
+    return ScenePlan(grid, scale, zero, extent, edge_fraction, has_disocclusion, field_bytes, peak_bytes, tuple(reasons))
+
+
+def _depth_edges(field: FloatImage, outermost: float) -> np.ndarray:
+    """(H, W) bool: True on both sides of a step that opens a gap in the outermost view."""
+    edges = np.zeros(field.shape, np.bool_)
+    for axis in (0, 1):
+        gap = np.abs(np.diff(field, axis=axis)) * outermost > GAP_PX
+        before, after = [slice(None)] * 2, [slice(None)] * 2
+        before[axis], after[axis] = slice(None, -1), slice(1, None)
+        edges[tuple(before)] |= gap
+        edges[tuple(after)] |= gap
+    return edges
+
+
+def _grown(mask: np.ndarray, pixels: int) -> np.ndarray:
+    """The mask grown by a square of this many pixels each way."""
+    grown = mask.copy()
+    for axis in (0, 1):
+        base = grown.copy()
+        for shift in range(1, pixels + 1):
+            before, after = [slice(None)] * 2, [slice(None)] * 2
+            before[axis], after[axis] = slice(None, -shift), slice(shift, None)
+            grown[tuple(before)] |= base[tuple(after)]
+            grown[tuple(after)] |= base[tuple(before)]
+    return grown

@@ -1,0 +1,156 @@
+"""Which source rays land near each target ray.
+
+A source ray at (x, y) with disparity d lands at (x - d*s, y - d*t). Its footprint, one pixel wide where the disparity is constant,
+stretches to meet its neighbours on the same surface. Rays of one source and one surface that land on the same pixel look up
+the same colour, so they are kept as one candidate: K candidates are K surfaces, and K = 5 is plenty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.kernels import kernel, nearest_pixel
+from iibr_core.rays import RaySet
+from iibr_core.types import FloatImage, ViewOffset
+
+SAME_SURFACE_PX = 0.5
+"""Rays of one source whose colour look-ups lie closer than this are one candidate."""
+SEALED_GAP_PX = 0.75
+"""A gap between landing neighbours up to this wide is no disocclusion: their footprints stretch to meet."""
+LEAST_OVERLAP = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The candidates of the target rays in rows [first_row, first_row + N) of one view.
+
+    count: (N, W), how many of the K slots are used. coverage: (K, N, W), the area of the target pixel their footprints cover
+    (may exceed 1). disparity: (K, N, W), coverage-weighted mean. source: (K, N, W), index into the ray set. Slots beyond count are
+    undefined.
+    """
+
+    offset: ViewOffset
+    first_row: int
+    count: NDArray[np.uint8]
+    coverage: FloatImage
+    disparity: FloatImage
+    source: NDArray[np.uint8]
+
+
+def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], most: int = 5) -> Candidates:
+    """Candidates of the target rays in rows [first, last) of the view at `offset`; at most `most` each, the front-most kept."""
+    first_row, last_row = rows
+    shape = (most, last_row - first_row, rays.size[1])
+    found = Candidates(
+        offset,
+        first_row,
+        np.zeros(shape[1:], np.uint8),
+        np.empty(shape, np.float32),
+        np.empty(shape, np.float32),
+        np.empty(shape, np.uint8),
+    )
+    offsets, _, disparity, coverage, _, row_disparity, row_columns = rays.arrays
+    for k in range(len(rays)):
+        t, s = offset.t - offsets[k, 0], offset.s - offsets[k, 1]
+        _land(
+            disparity[k], coverage[k], row_disparity[k], row_columns[k], k, s, t, first_row,
+            found.count, found.coverage, found.disparity, found.source,
+        )  # fmt: skip
+    _mean_disparity(found.count, found.coverage, found.disparity)
+    return found
+
+
+@kernel
+def _half_extent(gap):  # type: ignore[no-untyped-def]
+    """How far a footprint reaches towards a neighbour that lands 1 + gap pixels away."""
+    return 0.5 + 0.5 * gap if abs(gap) <= SEALED_GAP_PX else 0.5
+
+
+@kernel
+def _footprints(disparity, y, first, last, s, t, footprints):  # type: ignore[no-untyped-def]
+    """Where the rays of row y, columns [first, last), land: (left, right, top, bottom) edges in target pixels."""
+    height, width = disparity.shape
+    for x in range(first, last):
+        d = disparity[y, x]
+        left = right = top = bottom = 0.5
+        if x > 0:
+            left = _half_extent((disparity[y, x - 1] - d) * s)
+        if x + 1 < width:
+            right = _half_extent((d - disparity[y, x + 1]) * s)
+        if y > 0:
+            top = _half_extent((disparity[y - 1, x] - d) * t)
+        if y + 1 < height:
+            bottom = _half_extent((d - disparity[y + 1, x]) * t)
+        footprints[x, 0], footprints[x, 1] = x - d * s - left, x - d * s + right
+        footprints[x, 2], footprints[x, 3] = y - d * t - top, y - d * t + bottom
+
+
+@kernel
+def _land(  # type: ignore[no-untyped-def]
+    ray_disparity, ray_coverage, row_disparity, row_columns, index, s, t, first_row,
+    count, coverage, disparity, source,
+):  # fmt: skip
+    """Let all rays of one source land on the target rows. Until `_mean_disparity`, `disparity` holds sums weighted by coverage.
+
+    A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives way.
+    """
+    slots, rows, width = coverage.shape
+    footprints = np.empty((width, 4))
+    tolerance = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
+    for y in range(ray_disparity.shape[0]):
+        low, high = y - row_disparity[y, 1] * t - first_row, y - row_disparity[y, 0] * t - first_row
+        if not (max(low, high) > -1.0 and min(low, high) < rows):
+            continue
+        first, last = row_columns[y]
+        _footprints(ray_disparity, y, first, last, s, t, footprints)
+        for x in range(first, last):
+            filled = ray_coverage[y, x]
+            left, right = footprints[x, 0], footprints[x, 1]
+            top, bottom = footprints[x, 2] - first_row, footprints[x, 3] - first_row
+            if not (filled > 0 and right > -0.5 and left < width and bottom > -0.5 and top < rows):
+                continue
+            d = ray_disparity[y, x]
+            for row in range(max(nearest_pixel(top), 0), min(ceil(bottom - 0.5) + 1, rows)):
+                overlap_y = filled * (min(bottom, row + 0.5) - max(top, row - 0.5))
+                for column in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
+                    overlap = np.float32(overlap_y * (min(right, column + 0.5) - max(left, column - 0.5)))
+                    if not overlap > LEAST_OVERLAP:
+                        continue
+                    used = np.int64(count[row, column])
+                    slot = 0
+                    while slot < used:
+                        c = coverage[slot, row, column]
+                        if source[slot, row, column] == index and abs(disparity[slot, row, column] - d * c) <= tolerance * c:
+                            break
+                        slot += 1
+                    if slot < used:
+                        coverage[slot, row, column] += overlap
+                        disparity[slot, row, column] += overlap * d
+                        continue
+                    if used < slots:
+                        count[row, column] = used + 1
+                    else:
+                        slot = 0
+                        for k in range(1, slots):
+                            ahead = disparity[slot, row, column] * coverage[k, row, column]
+                            if disparity[k, row, column] * coverage[slot, row, column] < ahead:
+                                slot = k
+                        if disparity[slot, row, column] >= d * coverage[slot, row, column]:
+                            continue
+                    coverage[slot, row, column] = overlap
+                    disparity[slot, row, column] = overlap * d
+                    source[slot, row, column] = index
+
+
+@kernel
+def _mean_disparity(count, coverage, disparity):  # type: ignore[no-untyped-def]
+    """Turn the weighted sums of disparity into means."""
+    rows, width = count.shape
+    for row in range(rows):
+        for x in range(width):
+            for k in range(np.int64(count[row, x])):
+                disparity[k, row, x] /= coverage[k, row, x]

@@ -1,0 +1,62 @@
+"""PFM files: one float per pixel, rows bottom-up in the file, top-down here. The scale's sign gives the byte order."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.formats.files import require_file, written_whole
+from iibr_core.types import FloatImage, InputError
+
+MAX_FILE_PIXELS = 400_000_000
+"""No file may claim more pixels than this: a hostile header must not cost memory."""
+
+# The header ends with exactly one white-space character (or CR LF); the next byte is data.
+HEADER = re.compile(rb"P([fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.0-9eE]{1,32})(?:\r\n|\s)")
+HEADER_BYTES = 256
+
+
+def read_pfm(path: Path) -> FloatImage:
+    """The map as (H, W) float32, row 0 at the top, values as stored (NaN and inf too).
+
+    The magnitude of the scale is ignored, as Middlebury and HCI mean it. Raises InputError for colour PFMs, a header
+    that makes no sense, and files that are missing or cut off.
+    """
+    path = Path(path)
+    require_file(path)
+    with path.open("rb") as file:
+        match = HEADER.match(file.read(HEADER_BYTES))
+        if match is None:
+            raise InputError(f"{path}: is not a PFM file (no header 'Pf width height scale')")
+        if match[1] == b"F":
+            raise InputError(f"{path}: is a colour PFM; a disparity map has one value per pixel ('Pf')")
+        width, height = int(match[2]), int(match[3])
+        if not 0 < width * height <= MAX_FILE_PIXELS:
+            raise InputError(f"{path}: {width}x{height} pixels; a map has 1 to {MAX_FILE_PIXELS:,}")
+        dtype = np.dtype("<f4") if _scale(path, match[4]) < 0 else np.dtype(">f4")
+        missing = match.end() + 4 * width * height - path.stat().st_size
+        if missing > 0:
+            raise InputError(f"{path}: cut off, {missing} bytes are missing for {width}x{height} values")
+        file.seek(match.end())
+        values = np.frombuffer(file.read(4 * width * height), dtype)
+    return np.ascontiguousarray(values.reshape(height, width)[::-1], np.float32)
+
+
+def write_pfm(path: Path, values: FloatImage) -> None:
+    """Write an (H, W) map, little-endian float32, whole or not at all. Raises InputError where it cannot be written."""
+    height, width = values.shape
+    with written_whole(Path(path)) as temporary:
+        header = f"Pf\n{width} {height}\n-1.0\n".encode()
+        temporary.write_bytes(header + values[::-1].astype("<f4").tobytes())
+
+
+def _scale(path: Path, text: bytes) -> float:
+    try:
+        scale = float(text)
+    except ValueError:
+        scale = 0.0
+    if scale == 0 or not np.isfinite(scale):
+        raise InputError(f"{path}: scale '{text.decode()}' in the header is no number other than 0")
+    return scale

@@ -1,0 +1,101 @@
+"""One view from the ray set: candidates, weights, colours and occlusion mask, then the fill. Row bands run side by side."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.candidates import find_candidates
+from iibr_core.inpaint.background import fill_background
+from iibr_core.lookup import OWN_SURFACE_PX, look_up_colors
+from iibr_core.mixed_pixels import split_mixed_pixels
+from iibr_core.occlusion import occlusion_mask
+from iibr_core.rays import RaySet
+from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.weights import closed_form_weights
+
+MOST_BAND_PIXELS = 1 << 18
+"""Of a row band: a cancelled view stops after one, within some 30 ms."""
+EDGE_PX = 2.0
+"""A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
+
+THREADS = os.cpu_count() or 1
+
+Result = TypeVar("Result")
+
+
+class Cancelled(Exception):
+    """The caller's should_stop became true within a view."""
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedView:
+    """A view without holes. colors: (H, W, 3) sRGB-encoded; disparity: (H, W); inpainted: (H, W), True where nothing was seen."""
+
+    colors: FloatImage
+    disparity: FloatImage
+    inpainted: NDArray[np.bool_]
+
+
+def rays_of_photo(colors: FloatImage, disparity: FloatImage, farthest_views: float, more: int) -> RaySet:
+    """The ray set of a photo: its own rays, and the fringe of its mixed pixels, with room for `more` images.
+
+    farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
+    """
+    centre = ViewOffset(0.0, 0.0)
+    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, EDGE_PX / farthest_views)
+    rays = RaySet(2 + more, disparity.shape, OWN_SURFACE_PX / farthest_views)
+    rays.add(centre, own, disparity, np.ones_like(disparity))
+    if coverage.any():
+        rays.add(centre, fringe, fringe_disparity, coverage)
+    return rays
+
+
+class ViewSynthesis:
+    """Renders views on all cores; a context manager. Results do not depend on the number of threads or bands."""
+
+    def __init__(self, should_stop: Callable[[], bool] = lambda: False, slots: int = 5) -> None:
+        self._should_stop = should_stop
+        self._slots = slots
+        self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rows")
+
+    def __enter__(self) -> ViewSynthesis:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._threads.shutdown(cancel_futures=True)
+
+    def render(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
+        """The view at an offset, its holes filled.
+
+        Raises Cancelled once should_stop is true.
+        """
+        height, width = rays.size
+
+        def seen(rows: tuple[int, int]) -> tuple[FloatImage, FloatImage, NDArray[np.bool_]]:
+            candidates = find_candidates(rays, offset, rows, self._slots)
+            weights = closed_form_weights(candidates)
+            return *look_up_colors(rays, candidates, weights), occlusion_mask(weights)
+
+        colors, disparity, hole = (np.concatenate(part) for part in zip(*self._bands(seen, height, width)))
+        if hole.any():
+            fill_background(colors, disparity, hole, rays.photo_disparity, offset)
+        return RenderedView(colors, disparity, hole)
+
+    def _bands(self, work: Callable[[tuple[int, int]], Result], height: int, width: int) -> list[Result]:
+        """The results of `work` on row bands from top to bottom."""
+        rows = max(min(MOST_BAND_PIXELS // width, -(-height // THREADS)), 1)
+
+        def unless_stopped(first: int) -> Result:
+            if self._should_stop():
+                raise Cancelled
+            return work((first, min(first + rows, height)))
+
+        return list(self._threads.map(unless_stopped, range(0, height, rows)))
