@@ -1,8 +1,9 @@
 """Which source rays land near each target ray.
 
-A source ray at (x, y) with disparity d lands at (x - d*s, y - d*t). Its footprint, one pixel wide where the disparity is constant,
-stretches to meet its neighbours on the same surface. Rays of one source and one surface that land on the same pixel look up
-the same colour, so they are kept as one candidate: K candidates are K surfaces, and K = 5 is plenty.
+A source ray at (x, y) with disparity d lands at (x - d*s, y - d*t). Its footprint, one pixel wide where the disparity
+is constant, stretches to meet its neighbours on the same surface. Rays of one source and one surface that land on the
+same pixel look up the same colour, so they are kept as one candidate: K candidates are K surfaces, and K = 5 is
+plenty.
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ LEAST_OVERLAP = 1e-4
 class Candidates:
     """The candidates of the target rays in rows [first_row, first_row + N) of one view.
 
-    count: (N, W), how many of the K slots are used. coverage: (K, N, W), the area of the target pixel their footprints cover
-    (may exceed 1). disparity: (K, N, W), coverage-weighted mean. source: (K, N, W), index into the ray set. Slots beyond count are
-    undefined.
+    count: (N, W), how many of the K slots are used. coverage: (K, N, W), the area of the target pixel their
+    footprints cover (may exceed 1). disparity: (K, N, W), coverage-weighted mean. source: (K, N, W), index into the
+    ray set. Slots beyond count are undefined.
     """
 
     offset: ViewOffset
@@ -42,7 +43,10 @@ class Candidates:
 
 
 def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], most: int = 5) -> Candidates:
-    """Candidates of the target rays in rows [first, last) of the view at `offset`; at most `most` each, the front-most kept."""
+    """Candidates of the target rays in rows [first, last) of the view at `offset`.
+
+    At most `most` for each ray, the front-most kept.
+    """
     first_row, last_row = rows
     shape = (most, last_row - first_row, rays.size[1])
     found = Candidates(
@@ -94,9 +98,11 @@ def _land(  # type: ignore[no-untyped-def]
     ray_disparity, ray_coverage, row_disparity, row_columns, index, s, t, first_row,
     count, coverage, disparity, source,
 ):  # fmt: skip
-    """Let all rays of one source land on the target rows. Until `_mean_disparity`, `disparity` holds sums weighted by coverage.
+    """Let all rays of one source land on the target rows. Until `_mean_disparity`, `disparity` holds sums weighted by
+    coverage.
 
-    A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives way.
+    A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives
+    way.
     """
     slots, rows, width = coverage.shape
     footprints = np.empty((width, 4))
@@ -124,7 +130,10 @@ def _land(  # type: ignore[no-untyped-def]
                     slot = 0
                     while slot < used:
                         c = coverage[slot, row, column]
-                        if source[slot, row, column] == index and abs(disparity[slot, row, column] - d * c) <= tolerance * c:
+                        if (
+                            source[slot, row, column] == index
+                            and abs(disparity[slot, row, column] - d * c) <= tolerance * c
+                        ):
                             break
                         slot += 1
                     if slot < used:

@@ -31,4 +31,5 @@ def stored_from_encoded(encoded: FloatImage, is_hdr: bool) -> StoredColors:
 
 def encoded_from_stored(stored: StoredColors) -> FloatImage:
     """Encoded float colours (1 = white) of stored ones."""
-    return stored.astype(np.float32) / 255 if stored.dtype == np.uint8 else stored.astype(np.float32)
+    encoded: FloatImage = stored.astype(np.float32)
+    return encoded / np.float32(255) if stored.dtype == np.uint8 else encoded

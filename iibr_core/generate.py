@@ -1,7 +1,7 @@
 """Photo + disparity -> the views of a light field, one after the other: the loop of the paper's section 3.
 
-The farthest views come first. What they disocclude is inpainted once and joins the ray set, so all later views show the same
-content there. Then the ray set is final, and the remaining views may come in any order.
+The farthest views come first. What they disocclude is inpainted once and joins the ray set, so all later views show
+the same content there. Then the ray set is final, and the remaining views may come in any order.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ def generate(
     should_stop: Callable[[], bool] = lambda: False,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
 ) -> Iterator[ViewUpdate]:
-    """Yield every view of `plan.grid` once: the photo's own first, then the farthest, then those nearest to `nearest_to()`.
+    """Yield every view of `plan.grid` once: the photo's own first, then the farthest, then those nearest to
+    `nearest_to()`.
 
-    disparity is the field's (`plan.field_disparity(given)`). should_stop is asked between row bands of a view; once it is true the
-    generator returns. Pixels do not depend on the order of the views.
-    Raises ValueError if photo and disparity differ in size.
+    disparity is the field's (`plan.field_disparity(given)`). should_stop is asked between row bands of a view; once
+    it is true the generator returns. Pixels do not depend on the order of the views. Raises ValueError if photo and
+    disparity differ in size.
     """
     if disparity.values.shape != photo.size:
         raise ValueError(f"disparity is {disparity.values.shape}, the photo {photo.size} (height, width)")
@@ -49,8 +50,8 @@ def generate(
             for index in first:
                 offset = grid.offset(*index)
                 view = synthesis.render(rays, offset)
-                if view.inpainted.any():
-                    rays.add(offset, view.colors, view.disparity, view.inpainted.astype(np.float32))
+                if view.occluded.any():
+                    rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
                 remaining.remove(index)
                 yield _update(index, view, photo.is_hdr)
             while remaining:

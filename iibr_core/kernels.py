@@ -1,6 +1,7 @@
 """How the core's hot loops are compiled, and the scalar pieces several of them share.
 
-A kernel that calls another with arrays pays for counting references, per call: inner loops pass scalars only, or are written out.
+A kernel that calls another with arrays pays for counting references, per call: inner loops pass scalars only, or are
+written out.
 """
 
 from __future__ import annotations
@@ -10,9 +11,7 @@ from math import floor
 import numba
 
 # Reassociation and contraction only: NaN and infinity keep their meaning.
-kernel = numba.njit(
-    cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"}
-)
+kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
 """Threads run these at the same time, and each is compiled once per machine."""
 
 

@@ -1,8 +1,9 @@
 """The colour of target rays: every candidate looks it up in its own source, continuously along its own slope.
 
-Looking up with the surface's exact disparity, instead of moving colours about, keeps sub-pixel accuracy: candidates of one
-surface agree, and the weights only have to pick the surface. Keys' cubic convolution, on encoded values (less ringing at
-highlights); surfaces that share a pixel are summed in linear light. Near depth edges only pixels of the candidate's own surface count.
+Looking up with the surface's exact disparity, instead of moving colours about, keeps sub-pixel accuracy: candidates
+of one surface agree, and the weights only have to pick the surface. Keys' cubic convolution, on encoded values (less
+ringing at highlights); surfaces that share a pixel are summed in linear light. Near depth edges only pixels of the
+candidate's own surface count.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from math import floor
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.candidates import Candidates
 from iibr_core.kernels import kernel, linear_scalar, srgb_scalar
@@ -26,19 +28,22 @@ LEAST_TAP_WEIGHT = 0.3
 """Less cubic weight than this on the own surface: take its nearest pixel instead."""
 
 
-def look_up_colors(rays: RaySet, candidates: Candidates, weights: FloatImage) -> tuple[FloatImage, FloatImage]:
-    """Colours (N, W, 3), sRGB-encoded, and disparity (N, W) of target rays; the disparity is the heaviest candidate's.
+def look_up_colors(
+    rays: RaySet, candidates: Candidates, weights: FloatImage
+) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
+    """Colours (N, W, 3), sRGB-encoded, of target rays; disparity (N, W) and source (N, W) of the heaviest candidates.
 
-    Rays without candidates are black at disparity 0.
+    Rays without candidates are black at disparity 0 of source 0.
     """
-    colors = np.zeros((*candidates.count.shape, 3), np.float32)
-    disparity = np.zeros(candidates.count.shape, np.float32)
+    shape = candidates.count.shape
+    colors, disparity = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
+    source = np.zeros(shape, np.uint8)
     offsets, images, surfaces, _, near_edge, _, _ = rays.arrays
     _gather(
         images, surfaces, near_edge, np.array(candidates.offset) - offsets, candidates.first_row,
-        candidates.count, candidates.disparity, candidates.source, weights, colors, disparity,
+        candidates.count, candidates.disparity, candidates.source, weights, colors, disparity, source,
     )  # fmt: skip
-    return colors, disparity
+    return colors, disparity, source
 
 
 @kernel
@@ -82,7 +87,7 @@ def _cubic(images, index, x, y):  # type: ignore[no-untyped-def]
 
 @kernel
 def _cubic_on_surface(images, surfaces, index, x, y, d, tolerance):  # type: ignore[no-untyped-def]
-    """Colour at a position from the pixels of the surface with disparity d, kept within their range where some are missing."""
+    """Colour at a position from the pixels of disparity d, kept within their range where some are missing."""
     _, height, width, _ = images.shape
     column, row = floor(x), floor(y)
     weight_x, weight_y = _keys(x - column), _keys(y - row)
@@ -125,9 +130,10 @@ def _cubic_on_surface(images, surfaces, index, x, y, d, tolerance):  # type: ign
 
 @kernel
 def _gather(  # type: ignore[no-untyped-def]
-    images, surfaces, near_edge, offsets, first_row, count, candidate_disparity, source, weights, colors, disparity
-):
-    """offsets (S, 2): from each source to the target view."""
+    images, surfaces, near_edge, offsets, first_row,
+    count, candidate_disparity, candidate_source, weights, colors, disparity, source,
+):  # fmt: skip
+    """What `look_up_colors` returns. offsets (S, 2): from each source to the target view."""
     _, height, width, _ = images.shape
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
@@ -140,6 +146,7 @@ def _gather(  # type: ignore[no-untyped-def]
                 if weights[k, row, x] > weights[heaviest, row, x]:
                     heaviest = k
             disparity[row, x] = candidate_disparity[heaviest, row, x]
+            source[row, x] = candidate_source[heaviest, row, x]
             sole = weights[heaviest, row, x] >= SOLE * total
             sum_r = sum_g = sum_b = 0.0
             for k in range(used):
@@ -147,7 +154,7 @@ def _gather(  # type: ignore[no-untyped-def]
                 if not w > 1.0 - SOLE:
                     continue
                 d = candidate_disparity[k, row, x]
-                index = np.int64(source[k, row, x])
+                index = np.int64(candidate_source[k, row, x])
                 t, s = offsets[index, 0], offsets[index, 1]
                 source_x = min(max(x + d * s, -0.5), width - 0.5)
                 source_y = min(max(first_row + row + d * t, -0.5), height - 0.5)

@@ -1,7 +1,9 @@
-"""Pixels at depth edges show two surfaces at once. Left whole, they trail a rim of foreground colour into the background.
+"""Pixels at depth edges show two surfaces at once. Left whole, they trail a rim of foreground colour into the
+background.
 
-A pixel on the far side of a depth edge whose colour lies between both surfaces is split: the background keeps its own colour,
-and the foreground gets a fringe ray there that covers the pixel's share alpha. Both together are the pixel again.
+A pixel on the far side of a depth edge whose colour lies between both surfaces is split: the background keeps its own
+colour, and the foreground gets a fringe ray there that covers the pixel's share alpha. Both together are the pixel
+again.
 """
 
 from __future__ import annotations
@@ -24,10 +26,11 @@ DIAGONAL = 0.99
 def split_mixed_pixels(
     colors: FloatImage, disparity: FloatImage, edge_step: float
 ) -> tuple[FloatImage, FloatImage, FloatImage, FloatImage]:
-    """The photo's own rays and its fringe, for a photo (H, W, 3), its disparity (H, W) and the step that counts as a depth edge.
+    """The photo's own rays and its fringe, for a photo (H, W, 3), its disparity (H, W) and the step that counts as a
+    depth edge.
 
-    Returns (own colours (H, W, 3), fringe colours (H, W, 3), fringe disparity (H, W), fringe coverage (H, W)); where there is no
-    fringe its coverage is 0 and its disparity NaN.
+    Returns (own colours (H, W, 3), fringe colours (H, W, 3), fringe disparity (H, W), fringe coverage (H, W)); where
+    there is no fringe its coverage is 0 and its disparity NaN.
     """
     own, fringe = colors.copy(), colors.copy()
     fringe_disparity = np.full_like(disparity, np.nan)
@@ -38,7 +41,7 @@ def split_mixed_pixels(
 
 @kernel
 def _towards_front(disparity, x, y, edge_step):  # type: ignore[no-untyped-def]
-    """Direction to the neighbour that is in front by the largest step above edge_step; (0, 0) if none, or if one is as far behind."""
+    """Direction to the neighbour most in front by more than edge_step; (0, 0) if none, or if one is as far behind."""
     here = disparity[y, x]
     best, step_x, step_y = edge_step, 0, 0
     for j in range(-1, 2):

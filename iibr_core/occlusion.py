@@ -1,7 +1,8 @@
 """Which target rays nothing in the photo shows: those whose weights have high entropy (paper, section 3.3).
 
-The share of a pixel that no candidate covers could come from anywhere, so it counts as spread evenly over all K slots: a ray
-with one covering candidate has entropy 0, an uncovered one has 1. (The paper's threshold k = 2.3 is 99 % of log2 5, its K = 5.)
+The share of a pixel that no candidate covers could come from anywhere, so it counts as spread evenly over all K
+slots: a ray with one covering candidate has entropy 0, an uncovered one has 1. (The paper's threshold k = 2.3 is 99 %
+of log2 5, its K = 5.)
 """
 
 from __future__ import annotations
@@ -13,13 +14,16 @@ from iibr_core.kernels import kernel
 from iibr_core.types import FloatImage
 
 LEAST_COVERED = 0.2
-"""A ray that its one candidate covers less than this counts as occluded; narrower slivers of surface would look torn."""
+"""A ray that its one candidate covers less than this counts as occluded: slivers of surface would look torn."""
 MOSTLY_COVERED = 0.5
 """A ray covered more than this is not occluded, however many surfaces share it."""
 
 
 def entropy(weights: FloatImage) -> FloatImage:
-    """Normalised entropy in [0, 1] of weights (K, N, W) that sum to the covered share of each ray; K = 1 gives the missing share."""
+    """Normalised entropy (N, W) in [0, 1] of weights (K, N, W) that sum to the covered share of each ray.
+
+    With K = 1 it is the missing share.
+    """
     return _entropy(weights)
 
 

@@ -7,13 +7,14 @@ from math import ceil
 
 import numpy as np
 import psutil
+from numpy.typing import NDArray
 
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
 TOTAL_PARALLAX = 0.04
-"""For viewing: how far the nearest moves against the farthest across the whole grid, as a share of the photo's width."""
+"""For viewing: how far the nearest moves against the farthest across the grid, as a share of the photo's width."""
 STEP_PX = 4.0
-"""For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity in between."""
+"""For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity."""
 MOST_VIEWS_A_SIDE = 9
 STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
@@ -23,8 +24,8 @@ NEAR_EDGE_PX = 3
 ROBUST_PERCENTILES = (1.0, 99.0)
 """A few wild disparities must not set the baseline."""
 DISPARITY_BYTES = 4
-RAY_BYTES = 26
-"""Of one pixel of one source image: colours, disparity, coverage, flags (see rays.RaySource)."""
+RAY_BYTES = 21
+"""Of one pixel of one source image: colours, disparity, coverage, flag (see rays.RaySet)."""
 FARTHEST_VIEWS = 8
 
 
@@ -32,7 +33,8 @@ FARTHEST_VIEWS = 8
 class PlanOverrides:
     """What the user decided; None leaves the choice to the plan.
 
-    depth_strength multiplies the parallax the plan chose; focus_disparity (px per view step, as given) is the plane that stays still.
+    depth_strength multiplies the parallax the plan chose; focus_disparity (px per view step, as given) is the plane
+    that stays still.
     """
 
     grid: GridShape | None = None
@@ -46,9 +48,9 @@ class ScenePlan:
     """The choices for one scene.
 
     grid: stored views. disparity_scale, disparity_zero: the field's disparity is (given - zero) * scale.
-    disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3 px of a
-    depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory of the light
-    field, and at most while generating. reasons: the same in sentences.
+    disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3
+    px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
+    of the light field, and at most while generating. reasons: the same in sentences.
     """
 
     grid: GridShape
@@ -79,18 +81,22 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
     low, high = (float(p) for p in np.percentile(disparity.values, ROBUST_PERCENTILES))
     zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
     width = photo.size[1]
-    parallax_px = TOTAL_PARALLAX * width * abs(wanted.depth_strength) if high - low > 1e-6 * max(abs(low), abs(high), 1) else 0.0
+    parallax_px = (
+        TOTAL_PARALLAX * width * abs(wanted.depth_strength) if high - low > 1e-6 * max(abs(low), abs(high), 1) else 0.0
+    )
     reasons = []
     if wanted.grid is not None:
         grid = wanted.grid
         reasons.append(f"{grid.columns} x {grid.rows} views, as asked.")
     else:
-        grid = _grid_for(parallax_px, _view_bytes(photo), budget)
+        grid = _grid_for(parallax_px, _view_bytes(photo), budget - _generating_bytes(photo, FARTHEST_VIEWS))
         reasons.append(_grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
     scale = parallax_px / steps / (high - low) * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
     if parallax_px:
-        reasons.append(f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width.")
+        reasons.append(
+            f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
+        )
     return _finished(photo, disparity, grid, float(scale), zero, budget, reasons)
 
 
@@ -113,6 +119,11 @@ def _memory_budget(memory_bytes: int | None) -> int:
 def _view_bytes(photo: Photo) -> int:
     height, width = photo.size
     return height * width * (3 * (2 if photo.is_hdr else 1) + DISPARITY_BYTES)
+
+
+def _generating_bytes(photo: Photo, inpainted_views: int) -> int:
+    """Memory for the ray set (the photo, its fringe, inpainted views) and the views in flight."""
+    return photo.size[0] * photo.size[1] * RAY_BYTES * (2 + inpainted_views) + 4 * _view_bytes(photo)
 
 
 def _grid_for(parallax_px: float, view_bytes: int, budget: int) -> GridShape:
@@ -144,10 +155,8 @@ def _finished(
     leaves_frame = float(np.abs(field).max()) * outermost > STILL_PX
     has_disocclusion = bool(leaves_frame or edges.any())
     edge_fraction = float(_grown(edges, NEAR_EDGE_PX).mean())
-    pixels = photo.size[0] * photo.size[1]
     field_bytes = grid.rows * grid.columns * _view_bytes(photo)
-    sources = 2 + (FARTHEST_VIEWS if has_disocclusion else 0)
-    peak_bytes = pixels * RAY_BYTES * sources + 4 * _view_bytes(photo)
+    peak_bytes = _generating_bytes(photo, FARTHEST_VIEWS if has_disocclusion else 0)
     if peak_bytes > budget:
         raise InputError(
             f"generating from {photo.name} takes {peak_bytes / 2**20:.0f} MiB, the budget is {budget / 2**20:.0f} MiB:"
@@ -155,14 +164,20 @@ def _finished(
         )
     reasons.append(
         f"{edge_fraction:.1%} of the pixels lie near a depth edge; "
-        + ("holes behind them are inpainted." if has_disocclusion else "nothing is disoccluded, so nothing is inpainted.")
+        + (
+            "holes behind them are inpainted."
+            if has_disocclusion
+            else "nothing is disoccluded, so nothing is inpainted."
+        )
     )
     reasons.append(f"Memory: {field_bytes / 2**20:.0f} MiB for the views, {peak_bytes / 2**20:.0f} MiB to make them.")
     extent = (float(field.min()), float(field.max()))
-    return ScenePlan(grid, scale, zero, extent, edge_fraction, has_disocclusion, field_bytes, peak_bytes, tuple(reasons))
+    return ScenePlan(
+        grid, scale, zero, extent, edge_fraction, has_disocclusion, field_bytes, peak_bytes, tuple(reasons)
+    )
 
 
-def _depth_edges(field: FloatImage, outermost: float) -> np.ndarray:
+def _depth_edges(field: FloatImage, outermost: float) -> NDArray[np.bool_]:
     """(H, W) bool: True on both sides of a step that opens a gap in the outermost view."""
     edges = np.zeros(field.shape, np.bool_)
     for axis in (0, 1):
@@ -174,7 +189,7 @@ def _depth_edges(field: FloatImage, outermost: float) -> np.ndarray:
     return edges
 
 
-def _grown(mask: np.ndarray, pixels: int) -> np.ndarray:
+def _grown(mask: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
     """The mask grown by a square of this many pixels each way."""
     grown = mask.copy()
     for axis in (0, 1):

@@ -14,10 +14,11 @@ from iibr_core.types import FloatImage, ViewOffset
 class RaySet:
     """Source images of one size (height, width), at most `capacity` of them.
 
-    All arrays are (S, ...) for the S images added so far. offsets (S, 2): the view (t, s) each is seen from. colors (S, H, W, 3):
-    sRGB-encoded. disparity (S, H, W): NaN where there is no surface. coverage (S, H, W): how much of its pixel a ray fills,
-    0 = no ray. near_edge (S, H, W) bool: True where a 4x4 look-up may meet another surface. row_disparity (S, H, 2): least and
-    greatest of each row's rays. row_columns (S, H, 2): first and behind-last column of each row's rays.
+    All arrays are (S, ...) for the S images added so far. offsets (S, 2): the view (t, s) each is seen from. colors
+    (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN where there is no surface. coverage (S, H, W): how much of
+    its pixel a ray fills, 0 = no ray. near_edge (S, H, W) bool: True where a 4x4 look-up may meet another surface.
+    row_disparity (S, H, 2): least and greatest of each row's rays. row_columns (S, H, 2): first and behind-last
+    column of each row's rays.
     """
 
     def __init__(self, capacity: int, size: tuple[int, int], surface_step: float) -> None:
@@ -57,6 +58,11 @@ class RaySet:
             self._near_edge, self._row_disparity, self._row_columns,
         )  # fmt: skip
         return tuple(array[: self._count] for array in everything)
+
+    @property
+    def photo_images(self) -> int:
+        """How many images, from the first on, hold what the photo shows; the others are inpainted."""
+        return int((self._offsets[: self._count] == 0).all(axis=1).sum())
 
     @property
     def photo_disparity(self) -> FloatImage:

@@ -1,4 +1,4 @@
-"""One view from the ray set: candidates, weights, colours and occlusion mask, then the fill. Row bands run side by side."""
+"""One view from the ray set: candidates, weights, colours, occlusion mask, fill. Row bands run side by side."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +37,15 @@ class Cancelled(Exception):
 
 @dataclass(frozen=True, eq=False)
 class RenderedView:
-    """A view without holes. colors: (H, W, 3) sRGB-encoded; disparity: (H, W); inpainted: (H, W), True where nothing was seen."""
+    """A view without holes.
+
+    colors: (H, W, 3) sRGB-encoded. disparity: (H, W). occluded: (H, W), True where no source showed anything, so that
+    it was filled here. inpainted: (H, W), True where the photo showed nothing: filled here or in an earlier view.
+    """
 
     colors: FloatImage
     disparity: FloatImage
+    occluded: NDArray[np.bool_]
     inpainted: NDArray[np.bool_]
 
 
@@ -69,7 +74,9 @@ class ViewSynthesis:
     def __enter__(self) -> ViewSynthesis:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._threads.shutdown(cancel_futures=True)
 
     def render(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
@@ -79,15 +86,16 @@ class ViewSynthesis:
         """
         height, width = rays.size
 
-        def seen(rows: tuple[int, int]) -> tuple[FloatImage, FloatImage, NDArray[np.bool_]]:
+        def seen(rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
             candidates = find_candidates(rays, offset, rows, self._slots)
             weights = closed_form_weights(candidates)
             return *look_up_colors(rays, candidates, weights), occlusion_mask(weights)
 
-        colors, disparity, hole = (np.concatenate(part) for part in zip(*self._bands(seen, height, width)))
-        if hole.any():
-            fill_background(colors, disparity, hole, rays.photo_disparity, offset)
-        return RenderedView(colors, disparity, hole)
+        parts = zip(*self._bands(seen, height, width))
+        colors, disparity, source, occluded = (np.concatenate(part) for part in parts)
+        if occluded.any():
+            fill_background(colors, disparity, occluded, rays.photo_disparity, offset)
+        return RenderedView(colors, disparity, occluded, occluded | (source >= rays.photo_images))
 
     def _bands(self, work: Callable[[tuple[int, int]], Result], height: int, width: int) -> list[Result]:
         """The results of `work` on row bands from top to bottom."""

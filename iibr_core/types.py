@@ -6,7 +6,8 @@ Disparity d     pixels per view step, of the view it is given for. A point seen 
                 (x - d * s, y - d * t) in view (t, s). Larger is closer; 0 is the plane that does not move.
 Pixel centres   integers in arrays (the picture spans -0.5 .. width - 0.5); + 0.5 only in GL texture coordinates.
 Rows            row 0 is the top everywhere on the CPU.
-Colour          sRGB-encoded, 1 = white, as photos are; HDR values exceed 1 on the same curve, continued. Sums of light are
+Colour          sRGB-encoded, 1 = white, as photos are; HDR values exceed 1 on the same curve, continued. Sums of
+light are
                 taken in linear light (`iibr_core.color`).
 """
 
@@ -73,7 +74,8 @@ class Photo:
 class Disparity:
     """Disparity of a photo, at the photo's size.
 
-    values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people ("scene.pfm", "none").
+    values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
+    ("scene.pfm", "none").
     """
 
     values: FloatImage
@@ -85,8 +87,9 @@ class Disparity:
 class ViewUpdate:
     """One finished view of a light field.
 
-    row, column: its index (v, u). colors: (H, W, 3), see StoredColors. disparity: (H, W) float32 of this view, or None where a
-    light field read from disk has none. inpainted: (H, W) bool, True where the photo saw nothing, or None where not known.
+    row, column: its index (v, u). colors: (H, W, 3), see StoredColors. disparity: (H, W) float32 of this view, or
+    None where a light field read from disk has none. inpainted: (H, W) bool, True where the photo saw nothing, or
+    None where not known.
     """
 
     row: int

@@ -1,7 +1,7 @@
 """How much each candidate contributes to its target ray: the closed form, the limit that a trained T approaches.
 
-Surfaces are taken front to back, each gets what those before it leave of the pixel's area. Weights of a ray sum to the covered
-share of its pixel, at most 1; what is missing is disoccluded.
+Surfaces are taken front to back, each gets what those before it leave of the pixel's area. Weights of a ray sum to
+the covered share of its pixel, at most 1; what is missing is disoccluded.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Fills occluded rays with what may lie behind: continued surfaces that the photo could not see there.
 
-A surface continued into a hole is possible only where something nearer hid it from the photo, or where it left the frame; else
-the photo would have shown it. That one test rules out the foreground beside a disocclusion, and at the frame's border it picks
-the surface that really leaves the frame, without any threshold on depth.
+A surface continued into a hole is possible only where something nearer hid it from the photo, or where it left the
+frame; else the photo would have shown it. That one test rules out the foreground beside a disocclusion, and at the
+frame's border it picks the surface that really leaves the frame, without any threshold on depth.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def fill_background(
 ) -> None:
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
-    photo_disparity: the centre view's. Every hole pixel is a mean of the nearest known pixels in sixteen directions that are possible
-    there, weighted by 1 / distance. A view that is all hole stays as it is.
+    photo_disparity: the centre view's. Every hole pixel is a mean of the nearest known pixels in sixteen directions
+    that are possible there, weighted by 1 / distance. A view that is all hole stays as it is.
     """
     known = _known_around(hole, np.cumsum(hole).reshape(hole.shape) - 1, int(hole.sum()))
     _fill(colors, disparity, hole, known, photo_disparity, offset.s, offset.t)
@@ -43,8 +43,8 @@ def fill_background(
 def _known_around(hole, number, total):  # type: ignore[no-untyped-def]
     """For each hole pixel, by its number: flat index of the known pixel in every direction, -1 if there is none.
 
-    The second known pixel where there are two (the first may be mixed with what hides the hole). Holes pass on what the next pixel
-    in that direction found, so the cost does not depend on the holes' size.
+    The second known pixel where there are two (the first may be mixed with what hides the hole). Holes pass on what
+    the next pixel in that direction found, so the cost does not depend on the holes' size.
     """
     height, width = hole.shape
     known = np.empty((total, len(DIRECTIONS)), np.int64)

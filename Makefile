@@ -1,0 +1,37 @@
+# Two commands for people: `make run` opens the viewer on the demo photo, `make test` checks everything.
+# Both set up what they need: the environment in .venv, and system GL libraries where that is allowed.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: run test bench install clean
+
+run: install
+	@.ci/system-libraries run
+	$(BIN)/iibr demo
+
+test: install
+	@.ci/system-libraries test
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest
+
+bench: install
+	@.ci/system-libraries test
+	$(BIN)/python -m benchmarks.report
+
+install: $(READY)
+
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "iibr needs Python 3.11 or later; name one with: make PYTHON=python3.11 ..."; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $(READY)
+
+clean:
+	rm -rf $(VENV) out
