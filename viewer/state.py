@@ -1,4 +1,7 @@
-"""The viewer's whole state, frozen. Everything the screen shows is a function of it; comparing two records decides a redraw."""
+"""The viewer's whole state, frozen. Everything the screen shows is a function of it.
+
+Comparing two records decides what an edit costs: a new `generation` restarts the worker, a new `Picture` draws anew.
+"""
 
 from __future__ import annotations
 
@@ -7,32 +10,56 @@ from dataclasses import dataclass, field
 from iibr_core.plan import ScenePlan
 from iibr_core.types import GridShape, ViewOffset
 
+CENTRE = ViewOffset(0.0, 0.0)
+
 
 @dataclass(frozen=True)
 class Optics:
     """What the virtual camera does.
 
-    eye: viewpoint in view steps (t down, s right). focus_disparity: the field disparity that is sharp (px per view step).
-    aperture_diameter: in view steps, 0 = pinhole. exposure_stops: brightness as a power of two.
+    eye: viewpoint in view steps (t down, s right). focus_disparity: the field disparity that is sharp (px per
+    view step). aperture_diameter: in view steps, 0 = pinhole. exposure_stops: brightness as a power of two.
     """
 
-    eye: ViewOffset = ViewOffset(0.0, 0.0)
+    eye: ViewOffset = CENTRE
     focus_disparity: float = 0.0
     aperture_diameter: float = 0.0
     exposure_stops: float = 0.0
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What is open: a photo with its plan, or a light field from disk (plan None)."""
+class Source:
+    """What to open and what the user decided about it; None leaves the choice to the program.
+
+    path: a photo or a light-field folder. disparity_path, disparity_scale: see `iibr_core.depth.sidecar.disparity_for`.
+    focus_disparity: in the units of the given disparity.
+    """
 
     path: str
+    disparity_path: str | None = None
+    disparity_scale: float = 1.0
+    grid: GridShape | None = None
+    focus_disparity: float | None = None
+    max_pixels: int | None = None
+    memory_bytes: int | None = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is open: a photo with its plan, or a light field from disk (plan None).
+
+    has_view_disparity: whether every view comes with its own disparity.
+    """
+
+    source: Source
     name: str
     width: int
     height: int
     grid: GridShape
     disparity_range_px: tuple[float, float]
     depth_source: str
+    is_hdr: bool = False
+    has_view_disparity: bool = True
     plan: ScenePlan | None = None
     notes: tuple[str, ...] = ()
 
@@ -57,12 +84,23 @@ class Notice:
 
 @dataclass(frozen=True)
 class AppState:
-    """Everything."""
+    """Everything. source is what was asked for last, scene what is open; generation numbers the worker's jobs."""
 
     optics: Optics = field(default_factory=Optics)
+    source: Source | None = None
     scene: Scene | None = None
     progress: Progress = field(default_factory=Progress)
     notices: tuple[Notice, ...] = ()
     depth_strength: float = 1.0
     generation: int = 0
     should_quit: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Everything the picture depends on: the scene's generation, the views present, the optics, its size in pixels."""
+
+    generation: int
+    views_present: int
+    optics: Optics
+    size_px: tuple[int, int]

@@ -35,80 +35,79 @@ def fill_background(
     photo_disparity: the centre view's. Every hole pixel is a mean of the nearest known pixels in sixteen directions
     that are possible there, weighted by 1 / distance. A view that is all hole stays as it is.
     """
-    known = _known_around(hole, np.cumsum(hole).reshape(hole.shape) - 1, int(hole.sum()))
-    _fill(colors, disparity, hole, known, photo_disparity, offset.s, offset.t)
+    pixels = np.flatnonzero(hole)
+    _fill(colors, disparity, pixels, _known_around(hole, pixels), photo_disparity, offset.s, offset.t)
 
 
 @kernel
-def _known_around(hole, number, total):  # type: ignore[no-untyped-def]
-    """For each hole pixel, by its number: flat index of the known pixel in every direction, -1 if there is none.
+def _known_around(hole, pixels):  # type: ignore[no-untyped-def]
+    """Flat indices of the known pixels around each hole pixel, one a direction, -1 if there is none.
+
+    pixels: flat indices of the hole pixels, ascending.
 
     The second known pixel where there are two (the first may be mixed with what hides the hole). Holes pass on what
     the next pixel in that direction found, so the cost does not depend on the holes' size.
     """
     height, width = hole.shape
+    total = len(pixels)
+    number = np.empty((height, width), np.int32)
+    for i in range(total):
+        number[pixels[i] // width, pixels[i] % width] = i
     known = np.empty((total, len(DIRECTIONS)), np.int64)
     for k in range(len(DIRECTIONS)):
         step_x, step_y = DIRECTIONS[k]
         downwards = step_y < 0 or (step_y == 0 and step_x < 0)
-        for i in range(height * width):
-            pixel = i if downwards else height * width - 1 - i
-            y, x = pixel // width, pixel % width
-            if not hole[y, x]:
+        for n in range(total):
+            i = n if downwards else total - 1 - n
+            y, x = pixels[i] // width + step_y, pixels[i] % width + step_x
+            known[i, k] = -1
+            if not (0 <= x < width and 0 <= y < height):
                 continue
-            found = -1
-            next_x, next_y = x + step_x, y + step_y
-            if 0 <= next_x < width and 0 <= next_y < height:
-                if hole[next_y, next_x]:
-                    found = known[number[next_y, next_x], k]
-                else:
-                    found = next_y * width + next_x
-                    beyond_x, beyond_y = next_x + step_x, next_y + step_y
-                    if 0 <= beyond_x < width and 0 <= beyond_y < height and not hole[beyond_y, beyond_x]:
-                        found = beyond_y * width + beyond_x
-            known[number[y, x], k] = found
+            if hole[y, x]:
+                known[i, k] = known[number[y, x], k]
+                continue
+            beyond_x, beyond_y = x + step_x, y + step_y
+            if 0 <= beyond_x < width and 0 <= beyond_y < height and not hole[beyond_y, beyond_x]:
+                x, y = beyond_x, beyond_y
+            known[i, k] = y * width + x
     return known
 
 
 @kernel
-def _fill(colors, disparity, hole, known, photo_disparity, s, t):  # type: ignore[no-untyped-def]
-    height, width = hole.shape
+def _fill(colors, disparity, pixels, known, photo_disparity, s, t):  # type: ignore[no-untyped-def]
+    height, width = disparity.shape
     directions = known.shape[1]
     possible = np.empty(directions, np.bool_)
     parallax = max(abs(s), abs(t))
-    i = -1
-    for y in range(height):
-        for x in range(width):
-            if not hole[y, x]:
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        farthest = np.inf
+        any_possible = False
+        for k in range(directions):
+            possible[k] = False
+            if known[i, k] < 0:
                 continue
-            i += 1
-            farthest = np.inf
-            any_possible = False
-            for k in range(directions):
-                possible[k] = False
-                if known[i, k] < 0:
-                    continue
-                d = disparity[known[i, k] // width, known[i, k] % width]
-                farthest = min(farthest, d)
-                column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
-                inside = 0 <= column < width and 0 <= row < height
-                possible[k] = not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX
-                any_possible = any_possible or possible[k]
-            total = r = g = b = sum_d = 0.0
-            for k in range(directions):
-                if known[i, k] < 0:
-                    continue
-                known_y, known_x = known[i, k] // width, known[i, k] % width
-                d = disparity[known_y, known_x]
-                # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
-                if not (possible[k] or (not any_possible and d <= farthest)):
-                    continue
-                w = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
-                total += w
-                r += w * colors[known_y, known_x, 0]
-                g += w * colors[known_y, known_x, 1]
-                b += w * colors[known_y, known_x, 2]
-                sum_d += w * d
-            if total > 0:
-                colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
-                disparity[y, x] = sum_d / total
+            d = disparity[known[i, k] // width, known[i, k] % width]
+            farthest = min(farthest, d)
+            column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
+            inside = 0 <= column < width and 0 <= row < height
+            possible[k] = not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX
+            any_possible = any_possible or possible[k]
+        total = r = g = b = sum_d = 0.0
+        for k in range(directions):
+            if known[i, k] < 0:
+                continue
+            known_y, known_x = known[i, k] // width, known[i, k] % width
+            d = disparity[known_y, known_x]
+            # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
+            if not (possible[k] or (not any_possible and d <= farthest)):
+                continue
+            w = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
+            total += w
+            r += w * colors[known_y, known_x, 0]
+            g += w * colors[known_y, known_x, 1]
+            b += w * colors[known_y, known_x, 2]
+            sum_d += w * d
+        if total > 0:
+            colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
+            disparity[y, x] = sum_d / total
