@@ -22,6 +22,8 @@ SAME_SURFACE_PX = 0.5
 """Rays of one source whose colour look-ups lie closer than this are one candidate."""
 SEALED_GAP_PX = 0.75
 """A gap between landing neighbours up to this wide is no disocclusion: their footprints stretch to meet."""
+REACH_PX = 0.5 + 0.5 * (1 + SEALED_GAP_PX)
+"""A ray that lands farther than this from a pixel's centre does not touch the pixel."""
 LEAST_OVERLAP = 1e-4
 
 
@@ -109,7 +111,7 @@ def _land(  # type: ignore[no-untyped-def]
     tolerance = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     for y in range(ray_disparity.shape[0]):
         low, high = y - row_disparity[y, 1] * t - first_row, y - row_disparity[y, 0] * t - first_row
-        if not (max(low, high) > -1.0 and min(low, high) < rows):
+        if not (max(low, high) > -REACH_PX and min(low, high) < rows - 1 + REACH_PX):
             continue
         first, last = row_columns[y]
         _footprints(ray_disparity, y, first, last, s, t, footprints)
