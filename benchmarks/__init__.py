@@ -1,0 +1,1 @@
+"""Figures, not tests: `python -m benchmarks.report` prints all of them."""

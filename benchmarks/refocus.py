@@ -1,0 +1,175 @@
+"""Time of a refocused picture, in alternation with the plainest shift-and-sum shader on the same views.
+
+    python benchmarks/refocus.py --data FOLDER [--radius 2] [--size 768x512] [--rounds 4] [--yardstick SCRIPT]
+
+FOLDER/views holds vVV_uUU.* and FOLDER may hold the centre view's disparity as *.npy. --yardstick: a script of its own
+that takes --data, --radius and --size and prints "min <milliseconds> ms"; it is run once a round.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from iibr_core.types import GridShape, ViewOffset
+from viewer.gpu.context import create_headless
+from viewer.gpu.renderer import Renderer
+from viewer.state import Optics
+
+FRAMES = 12
+
+PLAIN_VERTEX = """#version 330 core
+out vec2 uv;
+void main() { uv = vec2(gl_VertexID % 2, gl_VertexID / 2) * 2.0; gl_Position = vec4(uv * 2.0 - 1.0, 0.0, 1.0); }
+"""
+PLAIN_FRAGMENT = """#version 330 core
+uniform sampler2DArray views;
+uniform int columns, first, last;
+uniform float shear, radius;
+uniform vec2 eye;
+in vec2 uv;
+out vec4 color;
+void main() {
+    vec4 sum = vec4(0.0);
+    for (int v = first; v <= last; v++)
+        for (int u = first; u <= last; u++) {
+            vec2 offset = vec2(u, v) - eye;
+            vec3 root = textureLod(views, vec3(uv + shear * offset, v * columns + u), 0.0).rgb;
+            sum += clamp(radius + 0.5 - length(offset), 0.0, 1.0) * vec4(root * root, 1.0);
+        }
+    color = vec4(sqrt(sum.rgb / sum.a), 1.0);
+}
+"""
+
+
+def read_views(data: Path) -> tuple[GridShape, NDArray[np.uint8]]:
+    """The grid, and the views as (V * U, H, W, 3)."""
+    files = sorted((data / "views").iterdir())
+    indices = [tuple(map(int, re.findall(r"\d+", file.stem)[:2])) for file in files]
+    grid = GridShape(*(max(axis) + 1 for axis in zip(*indices)))
+    return grid, np.stack([oiio.ImageBuf(str(file)).get_pixels(oiio.UINT8)[..., :3] for file in files])
+
+
+def open_views(
+    renderer: Renderer, grid: GridShape, views: NDArray[np.uint8], centre: NDArray[np.float32] | None
+) -> None:
+    """Upload the views, with disparity where the centre view's is given."""
+    height, width = views.shape[1:3]
+    renderer.open_field(grid, width, height, hdr=False, with_disparity=centre is not None)
+    for row, column in np.ndindex(*grid):
+        disparity = None if centre is None else roughly_moved(centre, grid.offset(row, column))
+        renderer.upload_view(row, column, views[row * grid.columns + column], disparity)
+
+
+def roughly_moved(disparity: NDArray[np.float32], offset: ViewOffset) -> NDArray[np.float32]:
+    """Disparity of another view, (H, W), near enough to time with: moved by its own value, looked up backwards."""
+    y, x = np.indices(disparity.shape)
+    moved = disparity
+    for _ in range(2):
+        rows = np.clip(np.rint(y + moved * offset.t).astype(int), 0, disparity.shape[0] - 1)
+        columns = np.clip(np.rint(x + moved * offset.s).astype(int), 0, disparity.shape[1] - 1)
+        moved = disparity[rows, columns]
+    return moved
+
+
+def plain_pass(
+    ctx: moderngl.Context,
+    grid: GridShape,
+    views: NDArray[np.uint8],
+    size_px: tuple[int, int],
+    radius: float,
+    focus: float,
+) -> Callable[[float], None]:
+    """The plain shader, ready to draw for an eye that many view steps right of the centre."""
+    _, height, width, _ = views.shape
+    texture = ctx.texture_array((width, height, len(views)), 3, views.tobytes(), alignment=1)
+    texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.LINEAR, moderngl.LINEAR), False, False
+    program = ctx.program(PLAIN_VERTEX, PLAIN_FRAGMENT)
+    centre, reach = grid.columns // 2, math.floor(radius + 0.5)
+    bounds = {"first": max(centre - reach, 0), "last": min(centre + reach, grid.columns - 1)}
+    for name, value in {"columns": grid.columns, "shear": -focus / width, "radius": radius, **bounds}.items():
+        program[name] = value
+    target = ctx.simple_framebuffer(size_px, components=4)
+    quad = ctx.vertex_array(program, [])
+
+    def draw(eye_s: float) -> None:
+        texture.use(0)
+        target.use()
+        program["eye"] = (centre + eye_s, float(centre))
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+    return draw
+
+
+def milliseconds(ctx: moderngl.Context, draw: Callable[[float], None]) -> list[float]:
+    """Times of FRAMES pictures, each finished, the eye moving a little; the first two, which warm up, left out."""
+    times = []
+    for k in range(FRAMES + 2):
+        start = time.perf_counter()
+        draw(0.002 * k)
+        ctx.finish()
+        times.append((time.perf_counter() - start) * 1e3)
+    return times[2:]
+
+
+def yardstick_ms(script: Path, args: argparse.Namespace) -> float:
+    """Least time the yardstick script reports."""
+    command = [sys.executable, str(script), "--radius", str(args.radius), "--size", args.size, "--data", str(args.data)]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return float(re.findall(r"min ([\d.]+) ms", output)[0])
+
+
+def parsed() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--radius", type=float, default=2.0, help="of the aperture, in view steps")
+    parser.add_argument("--size", default="768x512")
+    parser.add_argument("--rounds", type=int, default=4)
+    parser.add_argument("--yardstick", type=Path)
+    return parser.parse_args()
+
+
+def main() -> None:
+    args = parsed()
+    size_px = tuple(map(int, args.size.split("x")))
+    grid, views = read_views(args.data)
+    disparity_file = next(iter(sorted(args.data.glob("*.npy"))), None)
+    centre = None if disparity_file is None else np.nan_to_num(np.load(disparity_file)).astype(np.float32)
+    focus = 0.0 if centre is None else float(np.quantile(centre, 0.25))
+
+    gl = create_headless()
+    renderer = Renderer(gl)
+    open_views(renderer, grid, views, centre)
+
+    def ours(eye_s: float) -> None:
+        renderer.render(Optics(ViewOffset(0.0, eye_s), focus, 2 * args.radius), size_px)
+
+    plain = plain_pass(gl.ctx, grid, views, size_px, args.radius, focus)
+    times: dict[str, list[float]] = {}
+    for _ in range(args.rounds):
+        times.setdefault("plain shader", []).extend(milliseconds(gl.ctx, plain))
+        for renderer.prefilter, name in ((True, "picture, smoothing on"), (False, "picture, smoothing off")):
+            times.setdefault(name, []).extend(milliseconds(gl.ctx, ours))
+        if args.yardstick:
+            times.setdefault("yardstick script", []).append(yardstick_ms(args.yardstick, args))
+
+    print(f"{gl.renderer}, {args.size}, aperture radius {args.radius:g} views, focus at {focus:.1f} px per view step")
+    least = min(times["plain shader"])
+    for name, values in times.items():
+        middle = np.median(values)
+        print(f"{name:24} min {min(values):6.1f} ms, median {middle:6.1f} ms, {min(values) / least:.2f} x plain")
+
+
+if __name__ == "__main__":
+    main()

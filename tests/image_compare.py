@@ -1,0 +1,73 @@
+"""Comparing pictures with named tolerances. A failure writes the two pictures and their difference beside each other.
+
+A tolerance has three parts, as image test suites of renderers do it: how far a channel may be off, how many pixels may
+be farther off than that, and how far at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """per_channel and hard_limit in steps of 1/255; share_beyond is the share of pixels that may exceed per_channel."""
+
+    per_channel: int
+    share_beyond: float
+    hard_limit: int
+
+
+EXACT = Tolerance(0, 0.0, 0)
+ROUNDING = Tolerance(1, 0.0, 1)
+"""Two ways to compute the same number."""
+FILTERING = Tolerance(2, 0.0, 3)
+"""The same with texture filtering of 8-bit values in between."""
+SAME_RASTERISER = Tolerance(2, 0.002, 24)
+"""Golden images: another version of the software rasteriser may decide a depth edge differently here and there."""
+
+
+def problem_with(image: NDArray[np.uint8], expected: NDArray[np.uint8], tolerance: Tolerance) -> str | None:
+    """What is wrong with an (H, W, 3) image, or None."""
+    if image.shape != expected.shape:
+        return f"shape {image.shape}, expected {expected.shape}"
+    difference = np.abs(image.astype(int) - expected).max(axis=-1)
+    share = float(np.mean(difference > tolerance.per_channel))
+    if share > tolerance.share_beyond or difference.max() > tolerance.hard_limit:
+        return f"off by up to {difference.max()}/255, {share:.2%} of pixels beyond {tolerance.per_channel}/255"
+    return None
+
+
+def assert_close(
+    image: NDArray[np.uint8], expected: NDArray[np.uint8], tolerance: Tolerance, folder: Path, name: str = "image"
+) -> None:
+    """Fail where the images differ; `folder/name-diff.png` then shows image, expected and 8 times their difference."""
+    problem = problem_with(image, expected, tolerance)
+    if problem is None:
+        return
+    place = folder / f"{name}-diff.png"
+    if image.shape == expected.shape:
+        difference = np.clip(np.abs(image.astype(int) - expected) * 8, 0, 255).astype(np.uint8)
+        write_png(place, np.concatenate([image, expected, difference], axis=1))
+    else:
+        write_png(place, image)
+    raise AssertionError(f"{name}: {problem}; see {place}")
+
+
+def write_png(path: Path, image: NDArray[np.uint8]) -> None:
+    """Write an (H, W, 3) uint8 picture."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    height, width, channels = image.shape
+    buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, channels, oiio.UINT8))
+    buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(image))
+    assert buffer.write(str(path)), buffer.geterror()
+
+
+def read_png(path: Path) -> NDArray[np.uint8]:
+    """Read a picture as (H, W, 3) uint8."""
+    return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8))[..., :3]

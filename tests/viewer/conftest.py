@@ -1,0 +1,137 @@
+"""Small scenes on disk, a private X server, and the viewer driven step by step until something is true."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from viewer.app import App
+
+WIDTH, HEIGHT = 96, 64
+NEAR, FAR = 2.0, -1.0
+EGL_DRAW, EGL_READ = 0x3059, 0x305A
+DEADLINE_S = 120.0
+"""For a condition that always comes true; generous, because the first run compiles the core."""
+
+
+def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
+    """A photo with its sidecar: a near red square, in the middle, before a far grey wall. Returns the photo's path."""
+    from iibr_core.formats.photo import write_image
+
+    rng = np.random.default_rng(seed)
+    pixels = rng.integers(60, 200, (HEIGHT // 8, WIDTH // 8, 1)).repeat(8, 0).repeat(8, 1).repeat(3, 2).astype(np.uint8)
+    disparity = np.full((HEIGHT, WIDTH), FAR, np.float32)
+    near = np.s_[HEIGHT // 4 : 3 * HEIGHT // 4, WIDTH // 3 : 2 * WIDTH // 3]
+    pixels[near] = pixels[near] // 3 + np.array([150, 0, 0], np.uint8)
+    disparity[near] = NEAR
+    write_image(folder / f"{name}.png", pixels)
+    np.save(folder / f"{name}_disparity.npy", disparity)
+    return folder / f"{name}.png"
+
+
+@pytest.fixture
+def photo_path(tmp_path: Path) -> Path:
+    return write_scene(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def display() -> Iterator[str]:
+    """A private X server; DISPLAY names it while the session runs."""
+    if shutil.which("Xvfb") is None or shutil.which("xdotool") is None:
+        pytest.skip("needs Xvfb and xdotool")
+    readable, writable = os.pipe()
+    command = ["Xvfb", "-displayfd", str(writable), "-screen", "0", "1400x900x24", "-noreset", "-nolisten", "tcp"]
+    server = subprocess.Popen(command, pass_fds=[writable], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(writable)
+    with os.fdopen(readable) as pipe:
+        number = pipe.readline().strip()  # comes when the server is ready, or is empty when it died
+    assert number, f"Xvfb ended with {server.wait()}"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DISPLAY", f":{number}")
+        patch.delenv("WAYLAND_DISPLAY", raising=False)
+        yield f":{number}"
+    server.terminate()
+    server.wait()
+
+
+@dataclass
+class Driver:
+    """A viewer in a window, its loop turned by the test, its mouse and keys moved by the X server."""
+
+    app: App
+
+    def until(self, condition: Callable[[App], bool]) -> None:
+        """Turn the loop until the condition holds."""
+        end = time.monotonic() + DEADLINE_S
+        while not condition(self.app):
+            assert time.monotonic() < end, f"never came true; state: {self.app.state}"
+            self.app.step()
+
+    def until_idle(self) -> None:
+        """Turn the loop until every view is there and nothing is left to do; what was sent before is heard first."""
+        self.app.step()
+        self.until(lambda app: 0 < app.state.progress.total == app.state.progress.done and app.wait_s == 1.0)
+
+    def send(self, *words: object) -> None:
+        """Let xdotool do something."""
+        subprocess.run(["xdotool", *map(str, words)], check=True)
+
+    def position(self, x_share: float, y_share: float) -> tuple[int, int]:
+        """Screen position of a place in the picture, as shares of its width and height."""
+        picture = self.app.layout().picture
+        assert picture is not None
+        return round(picture.x + x_share * picture.width), round(picture.y + y_share * picture.height)
+
+    def image(self) -> np.ndarray:
+        """The picture as it was drawn last."""
+        return self.app.stage.renderer.read_image()
+
+
+@pytest.fixture
+def no_egl_context() -> Iterator[None]:
+    """Puts an EGL context of other tests aside: a window's GLX context cannot be current beside it."""
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        yield
+        return
+    for name in ("eglGetCurrentContext", "eglGetCurrentDisplay", "eglGetCurrentSurface"):
+        getattr(egl, name).restype = ctypes.c_void_p
+    egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
+    context, display = egl.eglGetCurrentContext(), egl.eglGetCurrentDisplay()
+    draw, read = (egl.eglGetCurrentSurface(which) for which in (EGL_DRAW, EGL_READ))
+    if context:
+        egl.eglMakeCurrent(display, None, None, None)
+    yield
+    if context:
+        egl.eglMakeCurrent(display, draw, read, context)
+
+
+@pytest.fixture
+def open_window(display: str, no_egl_context: None) -> Iterator[Callable[..., Driver]]:
+    """Opens the viewer on a photo; closes it after the test."""
+    from viewer.actions import OpenPath
+    from viewer.app import App, opening
+    from viewer.state import Source
+
+    apps = []
+
+    def start(path: Path | None, **changes: object) -> Driver:
+        state = opening(OpenPath(Source(str(path), **changes))) if path else None  # type: ignore[arg-type]
+        apps.append(App(state) if state else App())
+        return Driver(apps[-1])
+
+    yield start
+    for app in apps:
+        app.close()

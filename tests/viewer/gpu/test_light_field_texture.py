@@ -1,0 +1,80 @@
+"""The texture arrays: what is stored, and plain words where they do not fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iibr_core.color import linear_from_srgb
+from iibr_core.types import GridShape, InputError
+from viewer.gpu.context import GLContext
+from viewer.gpu.light_field_texture import LightFieldTexture
+
+GRID = GridShape(2, 3)
+
+
+def test_stores_root_of_linear_light_in_the_views_own_layer(gl: GLContext) -> None:
+    field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
+    colors = np.arange(4 * 8 * 3, dtype=np.uint8).reshape(4, 8, 3) * 2
+    disparity = np.linspace(-2, 3, 32, dtype=np.float32).reshape(4, 8)
+    field.upload(1, 2, colors, disparity)
+    texels = np.frombuffer(field.colors.read(), np.uint8).reshape(6, 4, 8, 4)
+    root = np.sqrt(linear_from_srgb(colors / 255)) * 255
+    assert np.abs(texels[5, ..., :3] - root).max() <= 0.5 + 1e-3
+    far, near = field.range_px
+    assert far <= -2
+    assert near >= 3
+    assert texels[5, ..., 3] / 255 * (near - far) + far == pytest.approx(disparity, abs=(near - far) / 500)
+    stored = np.frombuffer(field.disparities.read(), np.float16).reshape(6, 4, 8)
+    assert stored[5] == pytest.approx(disparity, abs=2e-3)
+    assert field.present.sum() == field.has_disparity.sum() == 1
+    assert field.present[1, 2]
+    field.release()
+
+
+def test_stray_disparities_do_not_stretch_the_range(gl: GLContext) -> None:
+    field = LightFieldTexture(gl.ctx, GRID, 100, 100, hdr=False, with_disparity=True)
+    disparity = np.linspace(0, 1, 10_000, dtype=np.float32).reshape(100, 100)
+    disparity[50, 50] = 1e6
+    field.upload(0, 0, np.zeros((100, 100, 3), np.uint8), disparity)
+    assert field.range_px[1] < 2
+    field.release()
+
+
+def test_hdr_keeps_light_beyond_white(gl: GLContext) -> None:
+    field = LightFieldTexture(gl.ctx, GRID, 2, 1, hdr=True, with_disparity=False)
+    colors = np.array([[[0.5, 1.0, 3.0], [0.0, 20.0, 65504.0]]], np.float16)
+    field.upload(0, 0, colors, None)
+    texels = np.frombuffer(field.colors.read(), np.float16).reshape(6, 1, 2, 4)[0, ..., :3].astype(np.float32)
+    assert np.isfinite(texels).all()
+    expected = np.sqrt(linear_from_srgb(colors.astype(np.float32)))
+    fits = expected < 65504
+    assert texels[fits] == pytest.approx(expected[fits], rel=2e-3)
+    field.release()
+
+
+def test_too_many_views_say_what_fits(gl: GLContext) -> None:
+    side = int(gl.max_layers**0.5) + 1
+    with pytest.raises(InputError, match=rf"{side}x{side} needs {side * side} texture layers.*at most {side - 1}x"):
+        LightFieldTexture(gl.ctx, GridShape(side, side), 4, 4, hdr=False, with_disparity=False)
+
+
+def test_too_large_views_say_the_limit(gl: GLContext) -> None:
+    wide = gl.max_texture_size + 1
+    with pytest.raises(InputError, match=rf"{wide}x4 px exceed.*{gl.max_texture_size} px"):
+        LightFieldTexture(gl.ctx, GRID, wide, 4, hdr=False, with_disparity=False)
+
+
+def test_no_memory_is_an_error_in_words(gl: GLContext) -> None:
+    """GL itself only sets a flag; this field is far larger than software GL accepts."""
+    with pytest.raises(InputError, match=r"no room for 1936 views of 16384x16384 .*smaller --grid"):
+        LightFieldTexture(gl.ctx, GridShape(44, 44), 16384, 16384, hdr=True, with_disparity=False)
+    assert gl.ctx.error == "GL_NO_ERROR"
+
+
+@pytest.mark.parametrize(("row", "shape"), [(2, (4, 8, 3)), (-1, (4, 8, 3)), (0, (8, 4, 3))])
+def test_foreign_views_are_refused(gl: GLContext, row: int, shape: tuple[int, ...]) -> None:
+    field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=False)
+    with pytest.raises(ValueError, match=r"view \("):
+        field.upload(row, 0, np.zeros(shape, np.uint8), None)
+    field.release()

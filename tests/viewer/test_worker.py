@@ -1,0 +1,254 @@
+"""The worker thread: newest request wins, late results are dropped, the queue is bounded, errors do not end it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.types import GridShape, InputError, ViewUpdate
+from viewer.state import CENTRE, Progress, Source
+from viewer.worker import (
+    QUEUED_RESULTS,
+    Failed,
+    Request,
+    Result,
+    SceneReady,
+    ViewReady,
+    Work,
+    Worker,
+    results_of,
+)
+
+DEADLINE_S = 120.0
+VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)
+
+
+class Desk:
+    """A worker, and the window's end of it: waits for wake-ups instead of polling."""
+
+    def __init__(self, work: Work | None = None) -> None:
+        self._woken = threading.Semaphore(0)
+        self.worker = Worker(self._woken.release, work)
+
+    def next(self) -> Result:
+        """The next result that is not late, waiting for it."""
+        while True:
+            if (result := self.worker.next_result()) is not None:
+                return result
+            assert self._woken.acquire(timeout=DEADLINE_S), "the worker went silent"
+
+
+@pytest.fixture
+def desk_for() -> Iterator[Callable[..., Desk]]:
+    desks: list[Desk] = []
+
+    def make(work: Work | None = None) -> Desk:
+        desks.append(Desk(work))
+        return desks[-1]
+
+    yield make
+    for desk in desks:
+        desk.worker.close()
+
+
+def request(generation: int, path: str = "p") -> Request:
+    return Request(generation, Source(path))
+
+
+def view(generation: int, done: int = 1) -> ViewReady:
+    return ViewReady(generation, VIEW, Progress(done, 99, 0.0))
+
+
+def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_path: Path) -> None:
+    desk = Desk()
+    desk.worker.submit(Request(7, Source(str(photo_path), grid=GridShape(3, 3))))
+    ready = desk.next()
+    assert isinstance(ready, SceneReady)
+    assert (ready.generation, ready.scene.grid, ready.scene.name) == (7, (3, 3), "scene")
+    assert ready.loaded is not None
+    np.testing.assert_array_equal(ready.centre.colors, np.round(ready.loaded.photo.pixels * 255))
+    views = [desk.next() for _ in range(9)]
+    desk.worker.close()
+    indices = {(v.view.row, v.view.column) for v in views if isinstance(v, ViewReady)}
+    assert indices == {(row, column) for row in range(3) for column in range(3)}
+    assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
+
+
+def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
+    source = Source(str(photo_path), grid=GridShape(1, 1))
+    first = next(results_of(Request(1, source), lambda: False, lambda: CENTRE))
+    assert isinstance(first, SceneReady)
+    photo_path.unlink()
+    again = next(results_of(Request(2, source, 2.0, first.loaded), lambda: False, lambda: CENTRE))
+    assert isinstance(again, SceneReady)
+    assert again.loaded is first.loaded
+    assert again.scene.plan is not None
+    assert first.scene.plan is not None
+    assert again.scene.plan.disparity_scale == pytest.approx(2 * first.scene.plan.disparity_scale)
+
+
+@pytest.mark.parametrize("with_disparity", [True, False])
+def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
+    from iibr_core.formats.hci import HciWriter
+
+    made = list(results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), lambda: False, lambda: CENTRE))
+    folder = tmp_path / "field"
+    with HciWriter(folder, GridShape(3, 3), 100.0, "field", with_disparity) as writer:
+        for result in made:
+            if isinstance(result, ViewReady):
+                writer.add(result.view)
+    ready, *views = results_of(Request(2, Source(str(folder))), lambda: False, lambda: CENTRE)
+    assert isinstance(ready, SceneReady)
+    assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
+    assert ready.scene.has_view_disparity == with_disparity
+    assert ready.scene.disparity_range_px[0] < ready.scene.disparity_range_px[1]
+    assert len(views) == 9
+
+
+def test_generating_stops_between_row_bands(photo_path: Path) -> None:
+    """Asked to stop within the first view, it ends without another result."""
+    asked = []
+
+    def should_stop() -> bool:
+        asked.append(None)
+        return True
+
+    results = results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE)
+    kinds = [type(result) for result in results]
+    assert asked
+    assert kinds[0] is SceneReady
+    assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
+
+
+def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> None:
+    cancelled = threading.Event()
+    started = threading.Event()
+
+    def work(job: Request, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+        if job.generation == 1:
+            started.set()
+            while not should_stop():
+                threading.Event().wait(0.001)
+            cancelled.set()
+        yield view(job.generation)
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert started.wait(DEADLINE_S)
+    desk.worker.submit(request(2))
+    assert desk.next().generation == 2
+    assert cancelled.is_set()
+    assert desk.worker.next_result() is None
+
+
+def test_results_already_queued_for_an_earlier_request_are_dropped(desk_for: Callable[..., Desk]) -> None:
+    posted = threading.Event()
+
+    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+        yield view(job.generation)
+        yield view(job.generation)
+        if job.generation == 1:
+            posted.set()
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert posted.wait(DEADLINE_S)
+    desk.worker.submit(request(2))
+    assert [desk.next().generation for _ in range(2)] == [2, 2]
+    assert desk.worker.next_result() is None
+
+
+def test_the_queue_is_bounded_and_a_full_one_can_be_cancelled(desk_for: Callable[..., Desk]) -> None:
+    made: list[int] = []
+    is_full = threading.Event()
+
+    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+        if job.generation == 2:
+            yield view(2)
+            return
+        for done in range(1000):
+            made.append(done)
+            if done == QUEUED_RESULTS:
+                is_full.set()
+            yield view(1, done)
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert is_full.wait(DEADLINE_S)
+    desk.worker.submit(request(2))
+    assert desk.next().generation == 2
+    assert len(made) <= QUEUED_RESULTS + 2  # one at the queue's door, and one that took the place just read
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (InputError("x.png: no such file"), "x.png: no such file"),
+        (ZeroDivisionError("division\nby zero"), "ZeroDivisionError: division by zero"),
+        (RuntimeError(), "RuntimeError: no message"),
+    ],
+)
+def test_an_exception_is_posted_and_the_worker_lives_on(
+    desk_for: Callable[..., Desk], error: Exception, message: str
+) -> None:
+    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+        yield view(job.generation)
+        if job.generation == 1:
+            raise error
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert isinstance(desk.next(), ViewReady)
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    assert failure.message == message
+    desk.worker.submit(request(2))
+    assert isinstance(desk.next(), ViewReady)
+
+
+def test_after_cancel_nothing_is_heard_and_the_next_request_works(desk_for: Callable[..., Desk]) -> None:
+    ended = threading.Event()
+
+    def work(job: Request, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+        yield view(job.generation)
+        if job.generation == 1:
+            while not should_stop():
+                threading.Event().wait(0.001)
+            ended.set()
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    desk.next()
+    desk.worker.cancel()
+    assert ended.wait(DEADLINE_S)
+    assert desk.worker.next_result() is None
+    desk.worker.submit(request(2))
+    assert desk.next().generation == 2
+
+
+def test_a_missing_file_is_a_failure_with_its_name(desk_for: Callable[..., Desk]) -> None:
+    desk = desk_for()
+    desk.worker.submit(request(1, "gone.png"))
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    assert "gone.png" in failure.message
+
+
+def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> None:
+    from iibr_core.types import ViewOffset
+
+    seen = []
+
+    def work(job: Request, should_stop: object, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+        seen.append(nearest_to())
+        yield view(job.generation)
+
+    desk = desk_for(work)
+    desk.worker.eye = ViewOffset(1, 2)
+    desk.worker.submit(request(1))
+    desk.next()
+    assert seen == [ViewOffset(1, 2)]

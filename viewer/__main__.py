@@ -1,0 +1,6 @@
+"""`python -m viewer` is `iibr`."""
+
+from viewer.cli import main
+
+if __name__ == "__main__":
+    main()

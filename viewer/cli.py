@@ -1,0 +1,327 @@
+"""The `iibr` command. Thin: options to records, one call, a line about the result. Heavy imports wait."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from iibr_core.types import GridShape, InputError, ViewOffset
+from viewer.options import Size, finite_from_text, grid_from_text, memory_from_text, size_from_text, view_from_text
+
+if TYPE_CHECKING:
+    from viewer.state import Source
+
+UsageError: Any = typer.BadParameter.__base__
+"""Click's, wherever this typer keeps it."""
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+DEMO_FOLDER = Path("out")
+DEMO_SIZE = (1280, 800)
+
+app = typer.Typer(
+    name="iibr", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich"
+)
+
+
+class Backend(StrEnum):
+    """Where OpenGL comes from without a window."""
+
+    auto = "auto"
+    egl = "egl"
+    osmesa = "osmesa"
+
+
+class Format(StrEnum):
+    """Layouts of a light field on disk."""
+
+    hci = "hci"
+
+
+def _number(help_text: str) -> Any:
+    return typer.Option(parser=finite_from_text, metavar="X", help=help_text)
+
+
+Photo = Annotated[Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP).", show_default=False)]
+Scene = Annotated[Path, typer.Argument(help="A photo or a light-field folder.", show_default=False)]
+DisparityFile = Annotated[
+    Path | None,
+    typer.Option("--disparity", metavar="FILE", help="Disparity map: PFM, EXR, NPY or 16-bit PNG.", show_default=False),
+]
+DisparityScale = Annotated[float, _number("Multiply the disparity file's values by this (a 16-bit PNG needs it).")]
+DepthStrength = Annotated[float, _number("Multiply the parallax the plan chose.")]
+FocusDisparity = Annotated[float | None, _number("The disparity (as given) of the plane that stays still.")]
+Grid = Annotated[
+    GridShape | None,
+    typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.", show_default="the plan's"),
+]
+MaxPixels = Annotated[int | None, typer.Option(min=1, help="Larger photos are made smaller.", show_default="2000000")]
+Memory = Annotated[
+    int | None,
+    typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
+]
+
+
+def main() -> None:
+    """Run the command line. Bad input ends in one line on stderr and exit code 2."""
+    try:
+        sys.exit(app(standalone_mode=False) or 0)
+    except UsageError as error:
+        _end(str(error.format_message()) + " (--help tells more)", EXIT_BAD_INPUT)
+    except InputError as error:
+        _end(str(error), EXIT_BAD_INPUT)
+    except (KeyboardInterrupt, typer.Abort):
+        _end("interrupted", EXIT_INTERRUPTED)
+
+
+def _end(message: str, code: int) -> None:
+    print(f"iibr: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(code)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"iibr {version('iibr')}")
+        raise typer.Exit
+
+
+@app.callback()
+def iibr(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show it.")
+    ] = False,
+) -> None:
+    """One photo becomes a light field you can hold: drag the viewpoint, click to refocus, open the aperture."""
+
+
+@app.command()
+def view(
+    path: Annotated[Path | None, typer.Argument(help="A photo or a light-field folder.", show_default="a demo")] = None,
+    disparity: DisparityFile = None,
+    disparity_scale: DisparityScale = 1.0,
+    depth_strength: DepthStrength = 1.0,
+    focus_disparity: FocusDisparity = None,
+    grid: Grid = None,
+    max_pixels: MaxPixels = None,
+    memory: Memory = None,
+) -> None:
+    """Open the viewer.
+
+    Example: iibr view holiday.jpg --disparity holiday.pfm
+    """
+    source = _source(path or _demo_photo(), disparity, disparity_scale, grid, focus_disparity, max_pixels, memory)
+    _require_existing(source)
+    from viewer.actions import OpenPath
+    from viewer.app import opening, run
+
+    run(opening(OpenPath(source), depth_strength))
+
+
+@app.command()
+def generate(
+    photo: Photo,
+    grid: Annotated[GridShape, typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.")],
+    disparity: DisparityFile = None,
+    disparity_scale: DisparityScale = 1.0,
+    format: Annotated[Format, typer.Option(help="Layout of the folder.")] = Format.hci,
+    with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
+    max_pixels: MaxPixels = None,
+    memory: Memory = None,
+) -> None:
+    """Write the light field of a photo; its disparity counts literally, in pixels per view.
+
+    Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
+    """
+    from iibr_core.formats.hci import HciWriter
+    from iibr_core.generate import generate as generated
+    from iibr_core.plan import plan_literal
+    from viewer.worker import load
+
+    loaded = load(_source(photo, disparity, disparity_scale, grid, None, max_pixels, memory))
+    _print_notes(loaded.photo.notes + loaded.disparity.notes)
+    plan = plan_literal(loaded.photo, loaded.disparity, grid, memory)
+    total = grid.rows * grid.columns
+    with (
+        HciWriter(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
+        _progress_shown("making views") as show,
+    ):
+        views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan)
+        seconds = 0.0
+        for done in range(1, total + 1):
+            start = time.perf_counter()
+            update = next(views)
+            seconds += time.perf_counter() - start
+            writer.add(update)
+            show(done, total)
+    height, width = loaded.photo.size
+    print(f"{total} views of {width}x{height} in {seconds:.2f} s ({1000 * seconds / total:.1f} ms per view): {out}")
+
+
+@app.command()
+def screenshot(
+    path: Scene,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Image to write (.png, .exr).")],
+    view: Annotated[
+        ViewOffset,
+        typer.Option(parser=view_from_text, metavar="S,T", help="Viewpoint in view steps, right and down."),
+    ] = "0,0",  # type: ignore[assignment]
+    focus: Annotated[float, _number("Disparity that is sharp, px per view step (the panel's Focus).")] = 0.0,
+    aperture: Annotated[float, _number("Aperture diameter in view steps.")] = 0.0,
+    size: Annotated[
+        Size | None,
+        typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
+    ] = None,
+    ui: Annotated[bool, typer.Option("--ui", help="With the panels, as in the window.")] = False,
+    backend: Annotated[Backend, typer.Option(help="Where OpenGL comes from.")] = Backend.auto,
+    disparity: DisparityFile = None,
+    disparity_scale: DisparityScale = 1.0,
+    depth_strength: DepthStrength = 1.0,
+    focus_disparity: FocusDisparity = None,
+    grid: Grid = None,
+    max_pixels: MaxPixels = None,
+    memory: Memory = None,
+) -> None:
+    """Render one picture without a display.
+
+    Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
+    """
+    source = _source(path, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory)
+    _require_existing(source)
+    from iibr_core.formats.photo import write_image
+    from viewer.actions import MoveEye, SetAperture, SetFocus
+    from viewer.headless import HeadlessViewer
+
+    with HeadlessViewer(backend.value) as viewer:
+        if ui and not viewer.has_panels:
+            raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
+        with _progress_shown("reading") as show:
+            viewer.open(source, depth_strength, lambda progress: show(progress.done, progress.total))
+        _print_notes(viewer.state.scene.notes if viewer.state.scene else ())
+        viewer.do(MoveEye(view), SetFocus(focus), SetAperture(aperture))
+        pixels = viewer.screen(size or DEMO_SIZE) if ui else viewer.picture(size)
+    write_image(output, pixels)
+    print(output)
+
+
+@app.command()
+def plan(
+    photo: Photo,
+    disparity: DisparityFile = None,
+    disparity_scale: DisparityScale = 1.0,
+    depth_strength: DepthStrength = 1.0,
+    focus_disparity: FocusDisparity = None,
+    grid: Grid = None,
+    max_pixels: MaxPixels = None,
+    memory: Memory = None,
+) -> None:
+    """Say what this photo needs, and why, without making any view.
+
+    Example: iibr plan photo.png --disparity photo.pfm
+    """
+    from iibr_core.plan import PlanOverrides, plan_for_viewing
+    from viewer.worker import load
+
+    loaded = load(_source(photo, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory))
+    chosen = plan_for_viewing(
+        loaded.photo, loaded.disparity, PlanOverrides(grid, depth_strength, focus_disparity, memory)
+    )
+    height, width = loaded.photo.size
+    print(f"{loaded.photo.name}: {width}x{height} px, disparity from {loaded.disparity.source}")
+    for line in (*chosen.reasons, *loaded.photo.notes, *loaded.disparity.notes):
+        print(f"- {line}")
+
+
+@app.command()
+def demo() -> None:
+    """Open the viewer on the demo photo; without a display, render it to out/demo.png and out/demo-views.png.
+
+    Example: iibr demo
+    """
+    from viewer.actions import OpenPath
+    from viewer.app import App, opening
+    from viewer.state import Source
+
+    source = Source(str(_demo_photo()))
+    try:
+        window = App(opening(OpenPath(source)))
+    except InputError as error:
+        print(f"{error}. Rendering without one.")
+        _demo_pictures(source)
+        return
+    try:
+        window.run()
+    finally:
+        window.close()
+
+
+def _demo_pictures(source: Source) -> None:
+    from iibr_core.formats.photo import write_image
+    from viewer.contact_sheet import contact_sheet
+    from viewer.headless import HeadlessViewer
+
+    DEMO_FOLDER.mkdir(exist_ok=True)
+    with HeadlessViewer() as viewer:
+        with _progress_shown("reading") as show:
+            viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total))
+        write_image(DEMO_FOLDER / "demo.png", viewer.screen(DEMO_SIZE) if viewer.has_panels else viewer.picture())
+        write_image(DEMO_FOLDER / "demo-views.png", contact_sheet(viewer))
+    print(f"{DEMO_FOLDER / 'demo.png'}: the viewer's window")
+    print(f"{DEMO_FOLDER / 'demo-views.png'}: viewpoints above, focus from near to far below")
+
+
+def _source(
+    path: Path,
+    disparity: Path | None,
+    disparity_scale: float,
+    grid: GridShape | None,
+    focus_disparity: float | None,
+    max_pixels: int | None,
+    memory: int | None,
+) -> Source:
+    from viewer.state import Source
+
+    explicit = str(disparity) if disparity else None
+    return Source(str(path), explicit, disparity_scale, grid, focus_disparity, max_pixels, memory)
+
+
+def _require_existing(source: Source) -> None:
+    """Say so before a window opens, rather than in it."""
+    for path in (source.path, source.disparity_path):
+        if path is not None and not Path(path).exists():
+            raise InputError(f"{path}: no such file")
+
+
+def _demo_photo() -> Path:
+    from iibr_core.resources import resource_folder
+
+    return resource_folder("assets") / "motorcycle" / "motorcycle.png"
+
+
+def _print_notes(notes: tuple[str, ...]) -> None:
+    for note in notes:
+        print(f"note: {note}", file=sys.stderr)
+
+
+@contextmanager
+def _progress_shown(doing: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr while the block runs; call what is yielded with (done, total)."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(doing, total=None)
+
+        def show(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total or None, description="making views" if total else doing)
+
+        yield show

@@ -1,0 +1,146 @@
+"""The views of a light field on the graphics card, one array layer each, filled as they arrive.
+
+Colours are stored as the square root of linear light: summing light then costs one multiplication a fetch, not a power.
+"""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import encoded_from_stored, linear_from_srgb
+from iibr_core.types import FloatImage, GridShape, InputError, StoredColors
+
+_ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255).astype(np.uint8)
+
+HALF_MAX = float(np.finfo(np.float16).max)
+
+RANGE_MARGIN = 0.05
+"""Views generated later may reach a little beyond the first one's disparity range."""
+
+
+class LightFieldTexture:
+    """Texture arrays of the views present.
+
+    colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
+    view step. present, has_disparity: (V, U) bool. range_px: (farthest, nearest) disparity, known from the first view
+    that has any.
+    """
+
+    def __init__(
+        self, ctx: moderngl.Context, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool
+    ) -> None:
+        """Allocate. Raises InputError where this graphics driver cannot hold it, saying what to do."""
+        check_fits(ctx, grid, width, height)
+        self.grid, self.width, self.height, self.hdr = grid, width, height, hdr
+        self.present = np.zeros(grid, bool)
+        self.has_disparity = np.zeros(grid, bool)
+        self.range_px = (0.0, 0.0)
+        self._dtype = np.float16 if hdr else np.uint8
+        layers = grid.rows * grid.columns
+        self.colors = _allocate(ctx, (width, height, layers), 4, "f2" if hdr else "f1")
+        self.colors.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.disparities = _allocate(ctx, (width, height, layers) if with_disparity else (1, 1, 1), 1, "f2")
+        self.disparities.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._texels = np.zeros((height, width, 4), self._dtype)
+
+    def layer(self, row: int, column: int) -> int:
+        """Array layer of a view."""
+        return row * self.grid.columns + column
+
+    def upload(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
+        """Store the view at index (row, column).
+
+        colors: (H, W, 3), see StoredColors. disparity: (H, W) px per view step; ignored in a field opened without.
+        Raises ValueError for an index or a shape that does not belong to this field.
+        """
+        self._check(row, column, colors, disparity)
+        keeps_disparity = disparity is not None and self.disparities.size == self.colors.size
+        if disparity is not None and keeps_disparity:
+            if not self.has_disparity.any():
+                self.range_px = _range_of(disparity)
+            half = np.clip(disparity, -HALF_MAX, HALF_MAX).astype(np.float16)
+            self.disparities.write(half, self._viewport(row, column))
+        self._fill_texels(colors, disparity if keeps_disparity else None)
+        self.colors.write(self._texels, self._viewport(row, column))
+        self.present[row, column], self.has_disparity[row, column] = True, keeps_disparity
+
+    def release(self) -> None:
+        """Free the arrays."""
+        self.colors.release()
+        self.disparities.release()
+
+    def _viewport(self, row: int, column: int) -> tuple[int, int, int, int, int, int]:
+        return 0, 0, self.layer(row, column), self.width, self.height, 1
+
+    def _check(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
+        if not (0 <= row < self.grid.rows and 0 <= column < self.grid.columns):
+            raise ValueError(f"view ({row}, {column}) is outside the grid of {self.grid.rows}x{self.grid.columns}")
+        size = (self.height, self.width)
+        if colors.shape != (*size, 3) or (disparity is not None and disparity.shape != size):
+            given = colors.shape, None if disparity is None else disparity.shape
+            raise ValueError(f"view ({row}, {column}): colours and disparity are {given}, the field's size is {size}")
+
+    def _fill_texels(self, colors: StoredColors, disparity: FloatImage | None) -> None:
+        np.copyto(self._texels[..., :3], _root_of_linear(colors, self.hdr), casting="same_kind")
+        far, near = self.range_px
+        top = 1.0 if self.hdr else 255.0
+        depth: NDArray[np.float32] | float = 0.0
+        if disparity is not None and near > far:
+            depth = np.clip((disparity - far) * (top / (near - far)), 0, top)
+            depth = depth if self.hdr else np.rint(depth)
+        np.copyto(self._texels[..., 3], depth, casting="unsafe")
+
+
+def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) -> None:
+    """Raise InputError where the driver's limits do not allow such arrays: GL itself fails silently."""
+    max_layers, max_size = ctx.info["GL_MAX_ARRAY_TEXTURE_LAYERS"], ctx.info["GL_MAX_TEXTURE_SIZE"]
+    layers = grid.rows * grid.columns
+    if layers > max_layers:
+        fits = int(max_layers**0.5)
+        raise InputError(
+            f"a grid of {grid.rows}x{grid.columns} needs {layers} texture layers, this graphics driver has "
+            f"{max_layers}: use at most {fits}x{fits} views"
+        )
+    if max(width, height) > max_size:
+        raise InputError(
+            f"views of {width}x{height} px exceed this graphics driver's limit of {max_size} px: lower --max-pixels"
+        )
+
+
+def _allocate(ctx: moderngl.Context, size: tuple[int, int, int], components: int, dtype: str) -> moderngl.TextureArray:
+    ctx.error  # noqa: B018  (reading it clears what earlier calls left)
+    try:
+        texture = ctx.texture_array(size, components, dtype=dtype)
+        problem = ctx.error
+    except moderngl.Error as error:
+        raise InputError(_no_memory(size, components, dtype, str(error))) from error
+    if problem != "GL_NO_ERROR":
+        texture.release()
+        raise InputError(_no_memory(size, components, dtype, problem))
+    texture.repeat_x = texture.repeat_y = False
+    return texture
+
+
+def _no_memory(size: tuple[int, int, int], components: int, dtype: str, problem: str) -> str:
+    width, height, layers = size
+    mebibytes = width * height * layers * components * (2 if dtype == "f2" else 1) // 2**20
+    size_text = f"{layers} views of {width}x{height} ({mebibytes} MiB, {problem})"
+    return f"no room for {size_text}: use a smaller --grid or --max-pixels"
+
+
+def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:
+    if hdr:
+        root = np.sqrt(linear_from_srgb(encoded_from_stored(colors)))
+        return np.minimum(root, HALF_MAX).astype(np.float16)
+    if colors.dtype != np.uint8:
+        raise ValueError("float colours in a field opened without hdr")
+    return _ROOT_FROM_SRGB[colors.view(np.uint8)]
+
+
+def _range_of(disparity: FloatImage) -> tuple[float, float]:
+    """(farthest, nearest) with a margin; a few stray pixels (under 1 in 5000) do not stretch it."""
+    far, near = np.quantile(disparity, [0.0002, 0.9998])
+    margin = RANGE_MARGIN * (near - far) + 1e-3
+    return float(far - margin), float(near + margin)

@@ -1,0 +1,144 @@
+"""Shader programs from files: includes, defines, errors at the real file and line, uniforms checked by name.
+
+Drivers disagree about `#line`, so the flattened source keeps a table of its own: line n of it came from (file, line).
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import moderngl
+
+from iibr_core.resources import resource_folder
+
+_INCLUDE = re.compile(r'\s*#include\s+"([^"]+)"')
+_UNIFORM = re.compile(r"^\s*uniform\s+\w+\s+([^;]+);", re.MULTILINE)
+_MESSAGE_LINE = re.compile(r"^\s*(?:ERROR:\s*)?\d+[:(](\d+)(?:\(\d+\)|\))?\s*:", re.MULTILINE)
+
+
+class ShaderError(RuntimeError):
+    """A shader that does not compile or link; the message starts with its file and line."""
+
+
+@dataclass(frozen=True)
+class FlatSource:
+    """One shader stage as the driver gets it. origins[n] is the (file name, line) that line n (from 0) came from."""
+
+    text: str
+    origins: tuple[tuple[str, int], ...]
+
+    def locate(self, line: int) -> str:
+        """Where line (from 1) of the flattened text really is, as "file:line"."""
+        name, original = self.origins[min(max(line, 1), len(self.origins)) - 1]
+        return f"{name}:{original}"
+
+
+def flatten(path: Path, defines: Mapping[str, int] | None = None) -> FlatSource:
+    """Source of a shader with its includes (each once, from `include/` beside it) and `#define`s after line 1.
+
+    Raises ShaderError for an include that does not exist.
+    """
+    lines = _included_lines(path, seen=set())
+    injected = [
+        (f"#define {name} {value}", "defines", i + 1) for i, (name, value) in enumerate((defines or {}).items())
+    ]
+    lines[1:1] = injected  # #version must stay first
+    return FlatSource("\n".join(text for text, _, _ in lines) + "\n", tuple((name, n) for _, name, n in lines))
+
+
+def _included_lines(path: Path, seen: set[Path]) -> list[tuple[str, str, int]]:
+    lines: list[tuple[str, str, int]] = []
+    for number, text in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        include = _INCLUDE.match(text)
+        if include is None:
+            lines.append((text, path.name, number))
+            continue
+        base = path.parent if path.parent.name == "include" else path.parent / "include"
+        target = base / include[1]
+        if not target.is_file():
+            raise ShaderError(f"{path.name}:{number}: no such include: {include[1]}")
+        if target not in seen:
+            seen.add(target)
+            lines += _included_lines(target, seen)
+    return lines
+
+
+class Program:
+    """A linked program. `declared` are the uniforms its sources name, whether the compiler kept them or not."""
+
+    def __init__(self, program: moderngl.Program, declared: frozenset[str], name: str) -> None:
+        self.program = program
+        self.declared = declared
+        self.name = name
+
+    def set_uniform(self, name: str, value: Any) -> None:
+        """Set a uniform; one that the compiler optimised out is skipped.
+
+        Raises KeyError for a name the sources do not declare, with the nearest one that they do.
+        """
+        if name not in self.declared:
+            near = difflib.get_close_matches(name, self.declared, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise KeyError(f"{self.name} declares no uniform {name}{hint}")
+        member: Any = self.program.get(name, None)
+        if member is not None:
+            member.value = value
+
+    def set_uniforms(self, **values: Any) -> None:
+        """`set_uniform` for each keyword."""
+        for name, value in values.items():
+            self.set_uniform(name, value)
+
+    def bind_block(self, name: str, binding: int) -> None:
+        """Connect a uniform block to a binding point; one that the compiler optimised out is skipped."""
+        block: Any = self.program.get(name, None)
+        if block is not None:
+            block.binding = binding
+
+    def release(self) -> None:
+        """Free the program."""
+        self.program.release()
+
+
+def load_program(
+    ctx: moderngl.Context,
+    vertex: str,
+    fragment: str,
+    defines: Mapping[str, int] | None = None,
+    folder: Path | None = None,
+) -> Program:
+    """Compile `shaders/<vertex>` and `shaders/<fragment>`.
+
+    folder: where the shaders are, if not the program's own. Raises ShaderError naming file and line.
+    """
+    folder = folder or resource_folder("shaders")
+    stages = {"vertex": flatten(folder / vertex, defines), "fragment": flatten(folder / fragment, defines)}
+    try:
+        program = ctx.program(vertex_shader=stages["vertex"].text, fragment_shader=stages["fragment"].text)
+    except moderngl.Error as error:
+        raise ShaderError(_explain(str(error), stages, fragment)) from error
+    declared = frozenset(name for stage in stages.values() for name in declared_uniforms(stage.text))
+    return Program(program, declared, fragment)
+
+
+def declared_uniforms(source: str) -> set[str]:
+    """Names of the uniforms a source declares, array suffixes left off."""
+    code = re.sub(r"//[^\n]*|/\*.*?\*/", "", source, flags=re.DOTALL)
+    names = (name for group in _UNIFORM.findall(code) for name in group.split(","))
+    return {name.split("[")[0].strip() for name in names}
+
+
+def _explain(message: str, stages: Mapping[str, FlatSource], fragment: str) -> str:
+    """The driver's message with its line numbers turned into file:line; drivers write 0:12(3), 0(12) or ERROR: 0:12."""
+    stage = stages["vertex" if "vertex_shader" in message else "fragment"]
+    found = [(match, stage.locate(int(match[1]))) for match in _MESSAGE_LINE.finditer(message)]
+    if not found:
+        return f"{fragment}: {message.strip()}"
+    first = found[0][1]
+    body = _MESSAGE_LINE.sub(lambda match: f"{stage.locate(int(match[1]))}:", message[found[0][0].start() :])
+    return f"{first}: the shader does not compile\n{body.strip()}"

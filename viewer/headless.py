@@ -1,0 +1,103 @@
+"""The viewer without a window: the same worker's job, state, stage and panels, drawn into an image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.actions import Action, OpenPath, ProgressMade, SceneOpened, apply
+from viewer.gpu.context import Backend, create_headless
+from viewer.layout import Layout, Rect, layout_of, letterboxed
+from viewer.stage import Stage
+from viewer.state import CENTRE, AppState, Progress, Source
+from viewer.ui.host import UiHost
+from viewer.ui.screen import build_screen
+from viewer.ui.style import BACKGROUND
+from viewer.worker import Request, SceneReady, results_of
+
+LAYOUT_FRAMES = 3
+"""ImGui knows the size of a text only after it was built once."""
+
+
+class HeadlessViewer:
+    """Opens a scene to the end, then takes pictures of it. Use as a context manager."""
+
+    def __init__(self, backend: Backend = "auto") -> None:
+        """Make a GL context without a display. Raises InputError where that cannot be."""
+        self.state = AppState()
+        self._gl = create_headless(backend)
+        self._stage = Stage(self._gl)
+
+    def __enter__(self) -> HeadlessViewer:
+        """Nothing more to do."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Free everything."""
+        self._stage.release()
+        self._gl.release()
+
+    @property
+    def has_panels(self) -> bool:
+        """Whether `screen` works here: ImGui's own OpenGL loader finds no functions in OSMesa."""
+        return self._gl.backend != "osmesa"
+
+    def open(self, source: Source, depth_strength: float, on_progress: Callable[[Progress], None]) -> None:
+        """Read and plan the scene and make all its views, telling how far it is. Raises InputError."""
+        self.state = AppState(depth_strength=depth_strength)
+        self.do(OpenPath(source))
+        on_progress(self.state.progress)
+        for result in results_of(Request(self.state.generation, source, depth_strength), lambda: False, lambda: CENTRE):
+            if isinstance(result, SceneReady):
+                self._stage.open(result)
+                self.do(SceneOpened(result.generation, result.scene))
+            else:
+                self._stage.add(result.view)
+                self.do(ProgressMade(result.generation, result.progress))
+                on_progress(result.progress)
+            self._stage.upload_all()
+
+    def do(self, *actions: Action) -> None:
+        """Change the state."""
+        for action in actions:
+            self.state = apply(self.state, action)
+
+    def picture(self, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+        """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3)."""
+        scene = self.state.scene
+        assert scene is not None
+        width, height = size or (scene.width, scene.height)
+        box = letterboxed(Rect(0, 0, width, height), (scene.width, scene.height))
+        assert box is not None
+        layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
+        image = np.empty((height, width, 3), np.uint8)
+        image[:] = np.round(np.array(BACKGROUND[:3]) * 255)
+        assert layout.picture_px is not None
+        x, y, box_width, box_height = layout.picture_px
+        self._stage.draw(self.state, (box_width, box_height))
+        image[y : y + box_height, x : x + box_width] = self._stage.renderer.read_image()[..., :3]
+        return image
+
+    def screen(self, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
+        scene = self.state.scene
+        layout = layout_of(size, (scene.width, scene.height) if scene else None)
+        has_picture = layout.picture_px and self._stage.draw(self.state, layout.picture_px[2:])
+        texture = self._stage.texture if has_picture else None
+        target = self._gl.ctx.simple_framebuffer(size, 4)
+        ui = UiHost(ui_scale=1.0)
+        try:
+            for _ in range(LAYOUT_FRAMES):
+                ui.begin(layout)
+                build_screen(self.state, layout, texture)
+                ui.end()
+                target.use()
+                ui.draw()
+            rows = np.frombuffer(target.read(components=3), np.uint8)
+        finally:
+            ui.release()
+            target.release()
+        return rows.reshape(size[1], size[0], 3)[::-1]

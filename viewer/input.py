@@ -1,0 +1,160 @@
+"""Mouse, keys and dropped files -> actions. Reading ImGui's input is one function; judging it another, a pure one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+from iibr_core.types import ViewOffset
+from viewer.actions import Action, MoveEye, OpenPath, Quit, ResetOptics, SetFocus, focus_limits
+from viewer.layout import Layout, pixel_at
+from viewer.state import CENTRE, AppState, Scene, Source
+
+DRAG_THRESHOLD = 4.0
+"""A press that moved farther than this (window units) is a drag, not a click."""
+
+DRAG_ACROSS_GRID = 0.6
+"""The share of the picture's width that a drag takes from one side of the grid to the other, at least."""
+
+FOCUS_STEPS = 40
+"""Notches of the wheel from the nearest focus to the farthest."""
+
+ARROW_STEP_VIEWS = 0.5
+DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """The mouse as seen in one frame, in window units; steps are how far it moved since the frame before."""
+
+    x: float = 0.0
+    y: float = 0.0
+    step_x: float = 0.0
+    step_y: float = 0.0
+    drag_distance: float = 0.0
+    pressed_x: float = 0.0
+    pressed_y: float = 0.0
+    is_down: bool = False
+    is_released: bool = False
+    clicks: int = 0
+    wheel: float = 0.0
+    is_over_panel: bool = False
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The keys of this frame that mean something: arrows as a view offset, and the two commands."""
+
+    arrows: ViewOffset = CENTRE
+    is_reset: bool = False
+    is_quit: bool = False
+
+
+Pick = Callable[[float, float], float | None]
+"""Disparity at a pixel of the picture, or None."""
+
+
+def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
+    """What the mouse asks for. Drags and clicks count where they began in the picture; the panel's never arrive."""
+    scene, picture = state.scene, layout.picture
+    if scene is None or picture is None or pointer.is_over_panel:
+        return []
+    if pointer.wheel and picture.contains(pointer.x, pointer.y):
+        low, high = focus_limits(scene)
+        return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
+    if not picture.contains(pointer.pressed_x, pointer.pressed_y):
+        return []
+    if pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD:
+        return _drag(pointer, layout, scene, state.optics.eye)
+    if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
+        if pointer.clicks > 1:
+            return [ResetOptics()]
+        picked = pick(*pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y))
+        return [] if picked is None else [SetFocus(picked)]
+    return []
+
+
+def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
+    """What the keys ask for."""
+    actions: list[Action] = []
+    if keys.is_quit:
+        actions.append(Quit())
+    if keys.is_reset:
+        actions.append(ResetOptics())
+    if any(keys.arrows):
+        eye = state.optics.eye
+        step = ARROW_STEP_VIEWS
+        actions.append(MoveEye(ViewOffset(eye.t + step * keys.arrows.t, eye.s + step * keys.arrows.s)))
+    return actions
+
+
+def actions_from_drop(paths: Sequence[str], state: AppState) -> list[Action]:
+    """Open the dropped photo, with a disparity map dropped along; a map alone is for the photo that is open."""
+    maps = [path for path in paths if PurePath(path).suffix.lower() in DISPARITY_SUFFIXES]
+    others = [path for path in paths if path not in maps]
+    base = state.source or Source("")
+    disparity = maps[0] if maps else None
+    if others:
+        return [OpenPath(replace(base, path=others[0], disparity_path=disparity, focus_disparity=None))]
+    if maps and state.source:
+        return [OpenPath(replace(state.source, disparity_path=disparity, focus_disparity=None))]
+    return [OpenPath(Source(path)) for path in maps[:1]]
+
+
+def _drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -> list[Action]:
+    """Content follows the hand: a point of disparity d goes d px left for a step right, so the eye goes against it."""
+    if not (pointer.step_x or pointer.step_y):
+        return []
+    per_view = units_per_view(layout, scene)
+    return [MoveEye(ViewOffset(eye.t - pointer.step_y / per_view, eye.s - pointer.step_x / per_view))]
+
+
+def units_per_view(layout: Layout, scene: Scene) -> float:
+    """Window units of drag for one view step.
+
+    As far as the nearest surface moves on screen, so that it sticks to the pointer; but no finer than crosses the grid
+    in `DRAG_ACROSS_GRID` of the picture, or scenes of little parallax would be too touchy.
+    """
+    assert layout.picture is not None
+    nearest = scene.disparity_range_px[1] * layout.picture.width / scene.width
+    return max(nearest, DRAG_ACROSS_GRID * layout.picture.width / max(scene.grid.columns - 1, 1))
+
+
+def read_pointer() -> Pointer:
+    """The mouse of this ImGui frame."""
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    moved = imgui.get_mouse_drag_delta(imgui.MouseButton_.left, 0.0)
+    return Pointer(
+        x=io.mouse_pos.x,
+        y=io.mouse_pos.y,
+        step_x=io.mouse_delta.x,
+        step_y=io.mouse_delta.y,
+        drag_distance=float(io.mouse_drag_max_distance_sqr[0]) ** 0.5,
+        pressed_x=io.mouse_pos.x - moved.x,
+        pressed_y=io.mouse_pos.y - moved.y,
+        is_down=bool(io.mouse_down[0]),
+        is_released=bool(io.mouse_released[0]),
+        clicks=int(io.mouse_clicked_last_count[0]),
+        wheel=io.mouse_wheel,
+        is_over_panel=io.want_capture_mouse,
+    )
+
+
+def read_keys() -> Keys:
+    """The keys of this ImGui frame; none while a text field has them."""
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    if io.want_text_input:
+        return Keys()
+
+    def pressed(key: imgui.Key) -> bool:
+        return imgui.is_key_pressed(key)
+
+    down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
+    right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
+    is_quit = pressed(imgui.Key.escape) or (io.key_ctrl and pressed(imgui.Key.q))
+    return Keys(ViewOffset(float(down), float(right)), pressed(imgui.Key.r), is_quit)

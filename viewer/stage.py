@@ -1,0 +1,134 @@
+"""The light field as it is on the graphics card, and the last picture drawn from it, with a window or headless.
+
+Views wait here until there is time to upload them; everything is called from the one GL thread.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from dataclasses import replace
+
+from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
+from viewer.gpu.context import GLContext
+from viewer.gpu.renderer import Renderer
+from viewer.picking import is_kept_for_picking, pick_disparity
+from viewer.state import AppState, Picture, Scene
+from viewer.worker import Loaded, SceneReady
+
+VIEW_REFRESH_S = 0.25
+"""While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
+
+WAITING_VIEWS = 4
+PREVIEW_GRID = GridShape(1, 1)
+
+
+class Stage:
+    """Holds the renderer and the views of the scene that is shown.
+
+    generation: whose views these are. views_present: uploaded so far. pictures_drawn: how often the picture was drawn.
+    """
+
+    def __init__(self, gl: GLContext) -> None:
+        self.renderer = Renderer(gl)
+        self.generation = 0
+        self.loaded: Loaded | None = None
+        self.views_present = 0
+        self.pictures_drawn = 0
+        self._scene: Scene | None = None
+        self._preview: ViewUpdate | None = None
+        self._waiting: deque[ViewUpdate] = deque()
+        self._disparities: dict[ViewOffset, FloatImage] = {}
+        self._drawn: Picture | None = None
+        self._drawn_at = 0.0
+
+    def open(self, ready: SceneReady) -> None:
+        """Show this scene from now on. Raises InputError where it does not fit the graphics card; the old one stays.
+
+        Its first view is shown in a field of its own until the second comes: making room for all takes a while.
+        """
+        scene = ready.scene
+        self._open_field(scene, PREVIEW_GRID)
+        self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
+        self.generation, self.loaded, self._scene, self._preview = ready.generation, ready.loaded, scene, ready.centre
+        self.views_present = 1
+        self._waiting.clear()
+        self._disparities.clear()
+        self._keep_for_picking(scene, ready.centre)
+
+    def add(self, view: ViewUpdate) -> None:
+        """Take a view of the present scene; it is uploaded later. Raises InputError where they do not fit all."""
+        scene = self._scene
+        assert scene is not None
+        if (view.row, view.column) == scene.grid.centre:
+            return  # there since the scene was opened
+        if self._preview is not None:
+            self._open_field(scene, scene.grid)
+            self.renderer.upload_view(*scene.grid.centre, self._preview.colors, self._preview.disparity)
+            self._preview = None
+        self._waiting.append(view)
+        self._keep_for_picking(scene, view)
+
+    @property
+    def has_room(self) -> bool:
+        """Whether more views may come; else they wait at the worker, who then pauses."""
+        return len(self._waiting) < WAITING_VIEWS
+
+    @property
+    def texture(self) -> int:
+        """GL name of the texture that holds the picture, rows bottom-up."""
+        return self.renderer.image_texture
+
+    def upload(self, budget_s: float) -> bool:
+        """Upload waiting views until the time is spent, at least one. True where some still wait."""
+        end = time.perf_counter() + budget_s
+        while self._waiting:
+            view = self._waiting.popleft()
+            self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
+            self.views_present += 1
+            if time.perf_counter() >= end:
+                break
+        return bool(self._waiting)
+
+    def upload_all(self) -> None:
+        """Upload every waiting view."""
+        while self.upload(math.inf):
+            pass
+
+    def pick(self, eye: ViewOffset, x_px: float, y_px: float) -> float | None:
+        """Disparity seen at a pixel of the picture; None where the scene has none."""
+        return pick_disparity(self._disparities, eye, x_px, y_px)
+
+    def draw(self, state: AppState, size_px: tuple[int, int]) -> Picture | None:
+        """Draw the picture this state asks for, unless it is there already; return its record, None without views."""
+        if self.views_present == 0:
+            return None
+        wanted = Picture(self.generation, self.views_present, state.optics, size_px)
+        if wanted == self._drawn or self._can_wait(wanted):
+            return self._drawn
+        self.renderer.render(wanted.optics, wanted.size_px)
+        self._drawn, self._drawn_at = wanted, time.perf_counter()
+        self.pictures_drawn += 1
+        return wanted
+
+    def shows_all_views(self) -> bool:
+        """Whether the picture last drawn knows every view uploaded."""
+        return self._drawn is None or self._drawn.views_present == self.views_present
+
+    def _open_field(self, scene: Scene, grid: GridShape) -> None:
+        self.renderer.open_field(grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity)
+
+    def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
+        if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):
+            self._disparities[scene.grid.offset(view.row, view.column)] = view.disparity
+
+    def _can_wait(self, wanted: Picture) -> bool:
+        """Whether only views are new, and the picture is too."""
+        if self._drawn is None or time.perf_counter() - self._drawn_at >= VIEW_REFRESH_S:
+            return False
+        return replace(wanted, views_present=self._drawn.views_present) == self._drawn
+
+    def release(self) -> None:
+        """Free the GL objects."""
+        self.renderer.release()

@@ -1,0 +1,70 @@
+"""The ImGui context with its native OpenGL backend, in a window or without one.
+
+A frame is built (`begin`, the panels, `end`) and drawn (`draw`) in two steps: `end` says what the frame looks like, so
+that the loop draws it only when it looks different.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+from typing import Any
+
+from imgui_bundle import imgui
+
+from viewer.layout import Layout
+from viewer.ui.style import apply_style, load_fonts
+
+VERTEX_BYTES = 20
+INDEX_BYTES = 2
+
+
+class UiHost:
+    """Owns the ImGui context. The GL context must be current when it is made, drawn and released."""
+
+    def __init__(self, ui_scale: float, window: Any = None) -> None:
+        self._context = imgui.create_context()
+        imgui.get_io().set_ini_filename(None)
+        load_fonts()
+        apply_style(ui_scale)
+        self._has_window = window is not None
+        if window is not None:
+            imgui.backends.glfw_init_for_opengl(ctypes.cast(window, ctypes.c_void_p).value or 0, True)
+        imgui.backends.opengl3_init("#version 330")
+
+    def begin(self, layout: Layout) -> None:
+        """Start a frame. Without a window its size and time step come from here."""
+        imgui.backends.opengl3_new_frame()
+        if self._has_window:
+            imgui.backends.glfw_new_frame()
+        else:
+            io = imgui.get_io()
+            io.display_size = imgui.ImVec2(layout.window.width, layout.window.height)
+            io.display_framebuffer_scale = imgui.ImVec2(layout.pixel_ratio, layout.pixel_ratio)
+            io.delta_time = 1 / 60
+        imgui.new_frame()
+
+    def end(self) -> bytes:
+        """Finish the frame and return a digest of everything it would draw."""
+        imgui.render()
+        digest = hashlib.blake2b(digest_size=16)
+        for commands in imgui.get_draw_data().cmd_lists:
+            digest.update(_bytes_of(commands.vtx_buffer, VERTEX_BYTES))
+            digest.update(_bytes_of(commands.idx_buffer, INDEX_BYTES))
+        return digest.digest()
+
+    def draw(self) -> None:
+        """Draw the finished frame into the bound framebuffer."""
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+
+    def release(self) -> None:
+        """Give everything back."""
+        imgui.backends.opengl3_shutdown()
+        if self._has_window:
+            imgui.backends.glfw_shutdown()
+        imgui.destroy_context(self._context)
+
+
+def _bytes_of(vector: Any, element_bytes: int) -> bytes:
+    count = vector.size()
+    return ctypes.string_at(vector.data_address(), count * element_bytes) if count else b""

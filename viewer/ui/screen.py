@@ -1,0 +1,31 @@
+"""The whole screen: the picture behind, panel and notices over it. The same with a window and without."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.actions import Action
+from viewer.layout import Layout
+from viewer.state import AppState
+from viewer.ui.notices import notices
+from viewer.ui.panel import panel
+from viewer.ui.style import BACKGROUND
+
+
+def build_screen(state: AppState, layout: Layout, picture_texture: int | None) -> list[Action]:
+    """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up."""
+    window = layout.window
+    corner = imgui.ImVec2(window.width, window.height)
+    imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, imgui.get_color_u32(BACKGROUND))
+    if picture_texture is not None and layout.picture is not None:
+        _picture(layout, picture_texture)
+    return panel(state, layout) + notices(state, layout)
+
+
+def _picture(layout: Layout, texture: int) -> None:
+    """Pixel for pixel: the rectangle is the one whose pixels were drawn."""
+    assert layout.picture_px is not None
+    x, y, width, height = (value / layout.pixel_ratio for value in layout.picture_px)
+    imgui.get_background_draw_list().add_image(
+        imgui.ImTextureRef(texture), imgui.ImVec2(x, y), imgui.ImVec2(x + width, y + height), (0, 1), (1, 0)
+    )

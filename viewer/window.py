@@ -1,0 +1,118 @@
+"""The GLFW window: made, waited on, and asked for its size. The one module beside `viewer.gpu` that calls GLFW.
+
+The bundle is imported before glfw on purpose: it brings the GLFW library that both must share.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+# isort: off
+import imgui_bundle  # noqa: F401
+import glfw
+
+# isort: on
+from iibr_core.types import InputError
+
+WINDOW_SIZE = (1280, 800)
+
+
+def wake() -> None:
+    """Make a waiting window look around; may be called in any thread."""
+    glfw.post_empty_event()
+
+
+class Window:
+    """A window with an OpenGL 3.3 core context.
+
+    handle: GLFW's window. damages: how often the system asked for a redraw.
+    """
+
+    def __init__(self, title: str) -> None:
+        """Open it. Raises InputError without a display or without OpenGL 3.3."""
+        with warnings.catch_warnings(record=True) as reasons:
+            warnings.simplefilter("always")
+            self.handle: Any = _open(title)
+        if not self.handle:
+            reason = "; ".join(str(warning.message) for warning in reasons) or "GLFW gives no reason"
+            glfw.terminate()
+            raise InputError(f"no window can be opened ({reason}): `iibr screenshot` works without a display")
+        self.damages = 0
+        self._dropped: list[str] = []
+        glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
+        glfw.set_window_refresh_callback(self.handle, self._on_damage)
+        glfw.make_context_current(self.handle)
+        glfw.swap_interval(1)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in window units."""
+        width, height = glfw.get_window_size(self.handle)
+        return width, height
+
+    @property
+    def framebuffer_size(self) -> tuple[int, int]:
+        """(width, height) in pixels; (0, 0) while minimised."""
+        width, height = glfw.get_framebuffer_size(self.handle)
+        return width, height
+
+    @property
+    def pixel_ratio(self) -> float:
+        """Framebuffer pixels per window unit."""
+        return self.framebuffer_size[0] / max(self.size[0], 1) or 1.0
+
+    @property
+    def ui_scale(self) -> float:
+        """How much larger than usual text and widgets must be, in window units, to be readable on this display."""
+        scale: float = glfw.get_window_content_scale(self.handle)[0]
+        return max(scale / self.pixel_ratio, 1.0)
+
+    @property
+    def should_close(self) -> bool:
+        """Whether the user closed it."""
+        return bool(glfw.window_should_close(self.handle))
+
+    def set_title(self, title: str) -> None:
+        """Write this in the title bar."""
+        glfw.set_window_title(self.handle, title)
+
+    def poll(self, wait_s: float) -> None:
+        """Handle what has happened; with nothing to handle, sleep at most this long."""
+        if wait_s > 0:
+            glfw.wait_events_timeout(wait_s)
+        else:
+            glfw.poll_events()
+
+    def on_drop(self, _: Any, paths: Any) -> None:
+        """GLFW calls this when files are dropped."""
+        self._dropped.extend(paths)
+
+    def take_dropped(self) -> list[str]:
+        """Paths of the files dropped on the window since the last call."""
+        dropped, self._dropped = self._dropped, []
+        return dropped
+
+    def show_frame(self) -> None:
+        """Put what was drawn on the screen."""
+        glfw.swap_buffers(self.handle)
+
+    def close(self) -> None:
+        """Close the window and GLFW with it."""
+        glfw.destroy_window(self.handle)
+        glfw.terminate()
+
+    def _on_damage(self, _: Any) -> None:
+        self.damages += 1
+
+
+def _open(title: str) -> Any:
+    if not glfw.init():
+        return None
+    glfw.default_window_hints()
+    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+    glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
+    glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+    return glfw.create_window(*WINDOW_SIZE, title, None, None)
