@@ -3,8 +3,8 @@
     python -m benchmarks.report                                     # what the bundled demo photo can show
     python -m benchmarks.report --data DATA --yardsticks BENCH      # with evaluation scenes and the yardstick scripts
 
-DATA holds hci_antinous, blender_shop_9x9 and the Middlebury pairs; BENCH holds judge_views.py and plain_refocus.py. Machines
-differ and are shared: quote medians and ratios.
+DATA holds hci_antinous, blender_shop_9x9 and the Middlebury pairs; BENCH holds judge_views.py and plain_refocus.py.
+Machines differ and are shared: quote medians and ratios.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import map_coordinates
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, maximum_filter, minimum_filter
 
 from iibr_core import synthesis
 from iibr_core.depth.sidecar import disparity_for
@@ -28,6 +29,16 @@ from iibr_core.types import Disparity, GridShape, Photo, ViewOffset, ViewUpdate
 
 SCENES = ["antinous", "teddy", "moebius", "motorcycle"]
 REPEATS = 5
+CENTRE = ViewOffset(0.0, 0.0)
+SAME_SURFACE = 0.25
+VIEW_PAIRS = [
+    ((4, 8), (4, 6)),
+    ((4, 8), (0, 8)),
+    ((0, 4), (2, 4)),
+    ((0, 0), (1, 1)),
+    ((8, 8), (6, 6)),
+    ((3, 1), (3, 2)),
+]
 
 
 def main() -> None:
@@ -72,7 +83,7 @@ def demo_photo() -> tuple[Photo, Disparity]:
     return photo, plan_for_viewing(photo, given).field_disparity(given)
 
 
-def views(photo: Photo, disparity: Disparity, nearest_to: ViewOffset = ViewOffset(0.0, 0.0)) -> list[ViewUpdate]:  # noqa: B008
+def views(photo: Photo, disparity: Disparity, nearest_to: ViewOffset = CENTRE) -> list[ViewUpdate]:
     plan = plan_literal(photo, disparity, GridShape(9, 9))
     return list(generate(photo, disparity, plan, nearest_to=lambda: nearest_to))
 
@@ -98,47 +109,42 @@ def order(photo: Photo, disparity: Disparity) -> None:
     def pixels(nearest_to: ViewOffset) -> dict[tuple[int, int], bytes]:
         return {(v.row, v.column): v.colors.tobytes() for v in views(photo, disparity, nearest_to)}
 
-    reference = pixels(ViewOffset(0.0, 0.0))
+    reference = pixels(CENTRE)
     same_order = pixels(ViewOffset(3.0, -2.0)) == reference
-    synthesis.MOST_BAND_PIXELS, bands = 10_000, synthesis.MOST_BAND_PIXELS
-    same_bands = pixels(ViewOffset(0.0, 0.0)) == reference
+    bands, synthesis.MOST_BAND_PIXELS = synthesis.MOST_BAND_PIXELS, 10_000
+    same_bands = pixels(CENTRE) == reference
     synthesis.MOST_BAND_PIXELS = bands
-    print(
-        f"order of views: {'identical' if same_order else 'DIFFERENT'}, other bands: {'identical' if same_bands else 'DIFFERENT'}"
-    )
+    words = {True: "identical", False: "DIFFERENT"}
+    print(f"pixels in another order of views: {words[same_order]}; in other bands: {words[same_bands]}", flush=True)
 
 
 def holes(photo: Photo, disparity: Disparity) -> None:
     """Inpainted content of one view, warped along its disparity into another that shows it too, must agree."""
     by_index = {(v.row, v.column): v for v in views(photo, disparity)}
-    errors = []
-    for a, b in [
-        ((4, 8), (4, 6)),
-        ((4, 8), (0, 8)),
-        ((0, 4), (2, 4)),
-        ((0, 0), (1, 1)),
-        ((8, 8), (6, 6)),
-        ((3, 1), (3, 2)),
-    ]:
-        errors.append(disagreement(by_index[a], by_index[b]))
-    print(f"hole content between views: rms {np.sqrt(np.mean(np.concatenate(errors) ** 2)):.2f} / 255")
+    errors = np.concatenate([disagreement(by_index[a], by_index[b]) for a, b in VIEW_PAIRS])
+    print(f"hole content between views: rms {np.sqrt(np.mean(errors**2)):.2f} / 255, {len(errors)} pixels", flush=True)
 
 
-def disagreement(a: ViewUpdate, b: ViewUpdate) -> np.ndarray:
-    """Differences (in 1/255) at the pixels of a's holes that b shows too, away from other surfaces."""
-    assert a.disparity is not None and b.disparity is not None and a.inpainted is not None
-    y, x = np.nonzero(a.inpainted)
-    d = a.disparity[y, x]
+def disagreement(a: ViewUpdate, b: ViewUpdate) -> NDArray[np.float64]:
+    """Differences (N, 3) in 1/255 where a pixel and its neighbours show one inpainted surface in both views."""
+    (in_a, surface_a), (in_b, surface_b) = inpainted_surface(a), inpainted_surface(b)
+    y, x = np.nonzero(in_a)
+    d = surface_a[y, x]
     there = np.stack([y - d * (b.row - a.row), x - d * (b.column - a.column)])
-    height, width = d.shape[0], b.disparity.shape[1]
-    inside = ((there > 2) & (there < np.array([[b.disparity.shape[0] - 3], [width - 3]]))).all(axis=0)
-    block = np.rint(there[:, inside]).astype(int)
-    near = [np.abs(b.disparity[block[0] + j, block[1] + i] - d[inside]) < 0.25 for j in (-1, 0, 1) for i in (-1, 0, 1)]
-    shown = np.all(near, axis=0)
-    warped = np.stack(
-        [map_coordinates(b.colors[..., c].astype(float), there[:, inside][:, shown], order=3) for c in range(3)]
-    )
-    return warped.T - a.colors[y[inside][shown], x[inside][shown]].astype(float)
+    inside = ((there > 1) & (there < np.array(in_a.shape)[:, None] - 2)).all(axis=0)
+    y, x, d, there = y[inside], x[inside], d[inside], there[:, inside]
+    pixel = tuple(np.rint(there).astype(int))
+    same = in_b[pixel] & (np.abs(surface_b[pixel] - d) < SAME_SURFACE)
+    warped = [map_coordinates(b.colors[..., c].astype(float), there[:, same], order=1) for c in range(3)]
+    return np.stack(warped, axis=-1) - a.colors[y[same], x[same]]
+
+
+def inpainted_surface(view: ViewUpdate) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    """Where all 3x3 pixels are inpainted and on one surface, and the disparity."""
+    if view.disparity is None or view.inpainted is None:
+        raise ValueError("a generated view has both")
+    extent = maximum_filter(view.disparity, 3) - minimum_filter(view.disparity, 3)
+    return minimum_filter(view.inpainted, 3) & (extent < SAME_SURFACE), view.disparity
 
 
 if __name__ == "__main__":

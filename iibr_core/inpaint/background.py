@@ -19,6 +19,7 @@ DIRECTIONS = np.array(
         (2, 1), (-2, 1), (2, -1), (-2, -1), (1, 2), (-1, 2), (1, -2), (-1, -2),
     ]
 )  # fmt: skip
+SMOOTH_PX = 2
 HIDDEN_PX = 0.5
 """Something hides a surface if it lands at least this far from it."""
 
@@ -33,20 +34,21 @@ def fill_background(
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
     photo_disparity: the centre view's. Every hole pixel is a mean of the nearest known pixels in sixteen directions
-    that are possible there, weighted by 1 / distance. A view that is all hole stays as it is.
+    that are possible there, weighted by 1 / distance, then smoothed within its surface. A view that is all hole stays
+    as it is.
     """
     pixels = np.flatnonzero(hole)
     _fill(colors, disparity, pixels, _known_around(hole, pixels), photo_disparity, offset.s, offset.t)
+    _smooth(colors, disparity, hole, pixels, HIDDEN_PX / max(abs(offset.s), abs(offset.t)))
 
 
 @kernel
 def _known_around(hole, pixels):  # type: ignore[no-untyped-def]
     """Flat indices of the known pixels around each hole pixel, one a direction, -1 if there is none.
 
-    pixels: flat indices of the hole pixels, ascending.
-
-    The second known pixel where there are two (the first may be mixed with what hides the hole). Holes pass on what
-    the next pixel in that direction found, so the cost does not depend on the holes' size.
+    pixels: flat indices of the hole pixels, ascending. The second known pixel where there are two (the first may be
+    mixed with what hides the hole). Holes pass on what the next pixel in that direction found, so the cost does not
+    depend on the holes' size.
     """
     height, width = hole.shape
     total = len(pixels)
@@ -111,3 +113,24 @@ def _fill(colors, disparity, pixels, known, photo_disparity, s, t):  # type: ign
         if total > 0:
             colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
             disparity[y, x] = sum_d / total
+
+
+@kernel
+def _smooth(colors, disparity, hole, pixels, tolerance):  # type: ignore[no-untyped-def]
+    """Average what was filled over SMOOTH_PX each way on the same surface: neighbours took their colours from afar."""
+    height, width = disparity.shape
+    smoothed = np.empty((len(pixels), 3), np.float32)
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        count = r = g = b = 0.0
+        for v in range(max(y - SMOOTH_PX, 0), min(y + SMOOTH_PX + 1, height)):
+            for u in range(max(x - SMOOTH_PX, 0), min(x + SMOOTH_PX + 1, width)):
+                if hole[v, u] and abs(disparity[v, u] - disparity[y, x]) <= tolerance:
+                    count += 1.0
+                    r += colors[v, u, 0]
+                    g += colors[v, u, 1]
+                    b += colors[v, u, 2]
+        smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = r / count, g / count, b / count
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = smoothed[i, 0], smoothed[i, 1], smoothed[i, 2]

@@ -1,8 +1,17 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpaint.background import DIRECTIONS, HIDDEN_PX, fill_background
+from iibr_core.inpaint.background import DIRECTIONS, HIDDEN_PX, SMOOTH_PX, fill_background
 from iibr_core.types import ViewOffset
+
+
+def smooth_slowly(colors, disparity, hole, tolerance):
+    smoothed = colors.copy()
+    for y, x in np.argwhere(hole):
+        block = np.s_[max(y - SMOOTH_PX, 0) : y + SMOOTH_PX + 1, max(x - SMOOTH_PX, 0) : x + SMOOTH_PX + 1]
+        same = hole[block] & (np.abs(disparity[block] - disparity[y, x]) <= tolerance)
+        smoothed[y, x] = colors[block][same].mean(axis=0)
+    return smoothed
 
 
 def fill_slowly(colors, disparity, hole, photo_disparity, offset):
@@ -31,7 +40,7 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
             w = np.array([1 / np.hypot(u - x, v - y) for u, v in chosen])
             filled_colors[y, x] = sum(k * colors[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
             filled_disparity[y, x] = sum(k * disparity[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
-    return filled_colors, filled_disparity
+    return smooth_slowly(filled_colors, filled_disparity, hole, HIDDEN_PX / max(abs(s), abs(t))), filled_disparity
 
 
 def test_agrees_with_a_slow_twin():

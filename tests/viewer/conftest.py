@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+
+from tests.xvfb import private_display
 
 if TYPE_CHECKING:
     from viewer.app import App
@@ -48,21 +48,8 @@ def photo_path(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def display() -> Iterator[str]:
     """A private X server; DISPLAY names it while the session runs."""
-    if shutil.which("Xvfb") is None or shutil.which("xdotool") is None:
-        pytest.skip("needs Xvfb and xdotool")
-    readable, writable = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writable), "-screen", "0", "1400x900x24", "-noreset", "-nolisten", "tcp"]
-    server = subprocess.Popen(command, pass_fds=[writable], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    os.close(writable)
-    with os.fdopen(readable) as pipe:
-        number = pipe.readline().strip()  # comes when the server is ready, or is empty when it died
-    assert number, f"Xvfb ended with {server.wait()}"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("DISPLAY", f":{number}")
-        patch.delenv("WAYLAND_DISPLAY", raising=False)
-        yield f":{number}"
-    server.terminate()
-    server.wait()
+    with private_display() as name:
+        yield name
 
 
 @dataclass
