@@ -35,7 +35,7 @@ class Window:
             warnings.simplefilter("always")
             self.handle: Any = _open(title)
         if not self.handle:
-            reason = "; ".join(str(warning.message) for warning in reasons) or "GLFW gives no reason"
+            reason = "; ".join(_words_of(warning.message) for warning in reasons) or "GLFW gives no reason"
             glfw.terminate()
             raise InputError(f"no window can be opened ({reason}): `iibr screenshot` works without a display")
         self.damages = 0
@@ -104,6 +104,11 @@ class Window:
 
     def _on_damage(self, _: Any) -> None:
         self.damages += 1
+
+
+def _words_of(warning: Warning | str) -> str:
+    """GLFW's warnings read "(65550) b'X11: ...'"; people want what is between the quotes."""
+    return str(warning).partition(" b'")[2].rstrip("'") or str(warning)
 
 
 def _open(title: str) -> Any:
