@@ -11,9 +11,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.contested import Contested
 from iibr_core.plan import ScenePlan
+from iibr_core.resources import resource_folder
 from iibr_core.synthesis import Cancelled, RenderedView, ViewSynthesis, rays_of_photo
-from iibr_core.types import Disparity, GridShape, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo, Quality, ViewOffset, ViewUpdate
 
 
 def generate(
@@ -22,6 +24,7 @@ def generate(
     plan: ScenePlan,
     should_stop: Callable[[], bool] = lambda: False,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+    quality: Quality = "fast",
 ) -> Iterator[ViewUpdate]:
     """Yield every view of `plan.grid` once: the photo's own first, then the farthest, then those nearest to
     `nearest_to()`.
@@ -44,7 +47,7 @@ def generate(
         return
     farthest = max(max(map(abs, grid.offset(v, u))) for v, u in remaining)
     try:
-        with ViewSynthesis(should_stop) as synthesis:
+        with ViewSynthesis(should_stop, transformer_for(quality), quality == "exact") as synthesis:
             first = _farthest_views(grid) if plan.has_disocclusion else []
             rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(first))
             for index in first:
@@ -60,6 +63,21 @@ def generate(
                 yield _update(index, synthesis.render(rays, grid.offset(*index)), photo.is_hdr)
     except Cancelled:
         return
+
+
+def transformer_for(quality: Quality) -> Callable[[Contested], FloatImage] | None:
+    """What weighs contested rays: the shipped transformer, or None for the closed form. Imports torch where needed.
+
+    Raises InputError if the shipped weights cannot be read.
+    """
+    if quality == "fast":
+        return None
+    from iibr_core.ray_transformer import TrainedTransformer
+
+    try:
+        return TrainedTransformer(resource_folder("assets") / "weights" / "ray_transformer.safetensors")
+    except InputError as error:
+        raise InputError(f"{error}; use --quality fast, or train them anew with `iibr train`") from error
 
 
 def _farthest_views(grid: GridShape) -> list[tuple[int, int]]:

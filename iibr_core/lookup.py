@@ -86,9 +86,10 @@ def _cubic(images, index, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _cubic_on_surface(images, surfaces, index, x, y, d, tolerance):  # type: ignore[no-untyped-def]
+def look_up(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-untyped-def]
     """Colour at a position from the pixels of disparity d, kept within their range where some are missing."""
     _, height, width, _ = images.shape
+    tolerance = OWN_SURFACE_PX / parallax
     column, row = floor(x), floor(y)
     weight_x, weight_y = _keys(x - column), _keys(y - row)
     total = red = green = blue = 0.0
@@ -159,8 +160,8 @@ def _gather(  # type: ignore[no-untyped-def]
                 source_x = min(max(x + d * s, -0.5), width - 0.5)
                 source_y = min(max(first_row + row + d * t, -0.5), height - 0.5)
                 if near_edge[index, max(floor(source_y), 0), max(floor(source_x), 0)]:
-                    tolerance = OWN_SURFACE_PX / max(abs(s), abs(t), 1e-9)
-                    r, g, b = _cubic_on_surface(images, surfaces, index, source_x, source_y, d, tolerance)
+                    parallax = max(abs(s), abs(t), 1e-9)
+                    r, g, b = look_up(images, surfaces, index, source_x, source_y, d, parallax)
                 else:
                     r, g, b = _cubic(images, index, source_x, source_y)
                 if sole:

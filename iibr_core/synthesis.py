@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.candidates import find_candidates
+from iibr_core.contested import REACH_PX, Contested, decide, find_contested
 from iibr_core.inpaint.background import fill_background
 from iibr_core.lookup import OWN_SURFACE_PX, look_up_colors
 from iibr_core.mixed_pixels import split_mixed_pixels
@@ -66,8 +67,16 @@ def rays_of_photo(colors: FloatImage, disparity: FloatImage, farthest_views: flo
 class ViewSynthesis:
     """Renders views on all cores; a context manager. Results do not depend on the number of threads or bands."""
 
-    def __init__(self, should_stop: Callable[[], bool] = lambda: False, slots: int = 5) -> None:
+    def __init__(
+        self,
+        should_stop: Callable[[], bool] = lambda: False,
+        transformer: Callable[[Contested], FloatImage] | None = None,
+        every: bool = False,
+        slots: int = 5,
+    ) -> None:
+        """transformer: gives the weights (N, K) of contested rays; None: closed form. every: of all rays."""
         self._should_stop = should_stop
+        self._transformer, self._every = transformer, every
         self._slots = slots
         self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rows")
 
@@ -87,15 +96,28 @@ class ViewSynthesis:
         height, width = rays.size
 
         def seen(rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
-            candidates = find_candidates(rays, offset, rows, self._slots)
-            weights = closed_form_weights(candidates)
-            return *look_up_colors(rays, candidates, weights), occlusion_mask(weights)
+            return self._seen(rays, offset, rows)
 
         parts = zip(*self._bands(seen, height, width))
         colors, disparity, source, occluded = (np.concatenate(part) for part in parts)
         if occluded.any():
             fill_background(colors, disparity, occluded, rays.photo_disparity, offset)
         return RenderedView(colors, disparity, occluded, occluded | (source >= rays.photo_images))
+
+    def _seen(self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
+        """Colours, disparity, source and occlusion of rows [first, last) of the view, holes not filled yet."""
+        around = REACH_PX if self._transformer else 0
+        above = min(rows[0], around)
+        candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + around, rays.size[0])), self._slots)
+        weights = closed_form_weights(candidates)
+        colors, disparity, source = look_up_colors(rays, candidates, weights)
+        occluded = occlusion_mask(weights)
+        inner = slice(above, above + rows[1] - rows[0])
+        if self._transformer:
+            contested = find_contested(rays, candidates, weights, (inner.start, inner.stop), occluded, self._every)
+            at = tuple(contested.pixel.T)
+            colors[at], disparity[at], source[at] = decide(contested, self._transformer(contested))
+        return colors[inner], disparity[inner], source[inner], occluded[inner]
 
     def _bands(self, work: Callable[[tuple[int, int]], Result], height: int, width: int) -> list[Result]:
         """The results of `work` on row bands from top to bottom."""

@@ -14,7 +14,7 @@ light are
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,10 @@ FloatImage = NDArray[np.float32]
 
 StoredColors = NDArray[np.uint8] | NDArray[np.float16]
 """(H, W, 3), sRGB-encoded: uint8 for ordinary photos (255 = white), float16 for HDR ones (1 = white)."""
+
+
+Quality = Literal["fast", "balanced", "exact"]
+"""Where the ray transformer runs: nowhere, on contested rays, everywhere."""
 
 
 class ViewOffset(NamedTuple):

@@ -12,8 +12,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from iibr_core.types import GridShape, InputError, ViewOffset
-from viewer.options import Size, finite_from_text, grid_from_text, memory_from_text, size_from_text, view_from_text
+from iibr_core.types import GridShape, InputError, Quality, ViewOffset
+from viewer.options import (
+    Size,
+    finite_from_text,
+    grid_from_text,
+    memory_from_text,
+    quality_from_text,
+    size_from_text,
+    view_from_text,
+)
 
 if TYPE_CHECKING:
     from viewer.state import Source
@@ -68,6 +76,16 @@ Memory = Annotated[
     typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
 ]
 
+QualityChoice = Annotated[
+    Quality,
+    typer.Option(
+        "--quality",
+        parser=quality_from_text,
+        metavar="fast|balanced|exact",
+        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere.",
+    ),
+]
+
 
 def main() -> None:
     """Run the command line. Bad input ends in one line on stderr and exit code 2."""
@@ -113,12 +131,15 @@ def view(
     grid: Grid = None,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
+    quality: QualityChoice = "fast",
 ) -> None:
     """Open the viewer.
 
     Example: iibr view holiday.jpg --disparity holiday.pfm
     """
-    source = _source(path or _demo_photo(), disparity, disparity_scale, grid, focus_disparity, max_pixels, memory)
+    source = _source(
+        path or _demo_photo(), disparity, disparity_scale, grid, focus_disparity, max_pixels, memory, quality
+    )
     _require_existing(source)
     from viewer.actions import OpenPath
     from viewer.app import opening, run
@@ -137,6 +158,7 @@ def generate(
     with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
+    quality: QualityChoice = "fast",
 ) -> None:
     """Write the light field of a photo; its disparity counts literally, in pixels per view.
 
@@ -155,7 +177,7 @@ def generate(
         HciWriter(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         _progress_shown("making views") as show,
     ):
-        views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan)
+        views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality)
         seconds = 0.0
         for done in range(1, total + 1):
             start = time.perf_counter()
@@ -190,12 +212,13 @@ def screenshot(
     grid: Grid = None,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
+    quality: QualityChoice = "fast",
 ) -> None:
     """Render one picture without a display.
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
-    source = _source(path, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory)
+    source = _source(path, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory, quality)
     _require_existing(source)
     from iibr_core.formats.photo import write_image
     from viewer.actions import MoveEye, SetAperture, SetFocus
@@ -239,6 +262,25 @@ def plan(
     print(f"{loaded.photo.name}: {width}x{height} px, disparity from {loaded.disparity.source}")
     for line in (*chosen.reasons, *loaded.photo.notes, *loaded.disparity.notes):
         print(f"- {line}")
+
+
+@app.command()
+def train(
+    steps: Annotated[int, typer.Option(min=1, help="Batches of rays to learn from.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Weights to write (.safetensors).")],
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="The same seed gives the same weights.")] = 0,
+    learning_rate: Annotated[float, typer.Option(max=1.0, help="Of the first step; it falls to 0 over all.")] = 1e-4,
+    device: Annotated[str, typer.Option(metavar="NAME", help="auto, cpu, cuda, cuda:1 or mps.")] = "auto",
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint beside the weights.")] = False,
+    checkpoint_every: Annotated[int, typer.Option(min=1, help="Steps from one checkpoint to the next.")] = 500,
+) -> None:
+    """Train the ray transformer on made-up scenes. Ctrl-C saves, --resume goes on; a log lies beside the weights.
+
+    Example: iibr train --steps 3800 --learning-rate 2e-3 --out weights.safetensors
+    """
+    from viewer.train_command import train_weights
+
+    raise typer.Exit(train_weights(steps, out, seed, learning_rate, device, resume, checkpoint_every))
 
 
 @app.command()
@@ -287,11 +329,12 @@ def _source(
     focus_disparity: float | None,
     max_pixels: int | None,
     memory: int | None,
+    quality: Quality = "fast",
 ) -> Source:
     from viewer.state import Source
 
     explicit = str(disparity) if disparity else None
-    return Source(str(path), explicit, disparity_scale, grid, focus_disparity, max_pixels, memory)
+    return Source(str(path), explicit, disparity_scale, grid, focus_disparity, max_pixels, memory, quality)
 
 
 def _require_existing(source: Source) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import typer
 
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, Quality, ViewOffset
 
 MAX_GRID = 99
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
@@ -47,6 +47,15 @@ def view_from_text(text: str) -> ViewOffset:
     except (ValueError, typer.BadParameter):
         raise typer.BadParameter(f"{text!r} is no viewpoint: give S,T in view steps, as 2,-1.5") from None
     return ViewOffset(t, s)
+
+
+def quality_from_text(text: str) -> Quality:
+    """Where the ray transformer runs, by name. Raises BadParameter."""
+    qualities: tuple[Quality, ...] = get_args(Quality)
+    for quality in qualities:
+        if text == quality:
+            return quality
+    raise typer.BadParameter(f"{text!r} is no quality: give {', '.join(qualities[:-1])} or {qualities[-1]}")
 
 
 def finite_from_text(text: str) -> float:

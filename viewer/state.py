@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from iibr_core.plan import ScenePlan
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, Quality, ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)
 
@@ -32,7 +32,7 @@ class Source:
     """What to open and what the user decided about it; None leaves the choice to the program.
 
     path: a photo or a light-field folder. disparity_path, disparity_scale: see `iibr_core.depth.sidecar.disparity_for`.
-    focus_disparity: in the units of the given disparity.
+    focus_disparity: in the units of the given disparity. quality: where the ray transformer runs.
     """
 
     path: str
@@ -42,6 +42,7 @@ class Source:
     focus_disparity: float | None = None
     max_pixels: int | None = None
     memory_bytes: int | None = None
+    quality: Quality = "fast"
 
 
 @dataclass(frozen=True)

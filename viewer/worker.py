@@ -223,7 +223,7 @@ def _results_of_photo(
 
     from iibr_core.generate import generate
 
-    views = generate(loaded.photo, disparity, plan, should_stop, nearest_to)
+    views = generate(loaded.photo, disparity, plan, should_stop, nearest_to, source.quality)
     yield from _counted(request.generation, views, plan.grid.rows * plan.grid.columns)
 
 

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ def run_apart(code_or_module: str, *words: object, **environment: str) -> subpro
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env={**clean, **environment}, timeout=120)
 
 
-@pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "plan", "demo"])
+@pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "plan", "train", "demo"])
 def test_help_has_an_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str) -> None:
     assert run(monkeypatch, *[command] if command else [], "--help") == 0
     text = capsys.readouterr().out
@@ -53,6 +54,68 @@ def test_generate_writes_a_light_field_that_opens(
     assert re.fullmatch(rf"9 views of 96x64 in [\d.]+ s \([\d.]+ ms per view\): {re.escape(str(out))}", line)
     assert len(list(out.glob("input_Cam*.png"))) == len(list(out.glob("disp_Cam*.pfm"))) == 9
     assert run(monkeypatch, "screenshot", out, "-o", tmp_path / "field.png", "--view", "-1,1") == 0
+
+
+@pytest.fixture
+def trained(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Weights far from the closed form, in a resource folder of their own."""
+    import torch
+
+    from iibr_core.formats.weights_file import save_weights
+    from iibr_core.ray_transformer import RayTransformer
+
+    torch.manual_seed(1)
+    model = RayTransformer()
+    with torch.no_grad():
+        for parameter in model.parameters():
+            parameter.normal_()
+    path = tmp_path / "assets" / "weights" / "ray_transformer.safetensors"
+    path.parent.mkdir(parents=True)
+    save_weights(model, path)
+    monkeypatch.setattr("iibr_core.generate.resource_folder", lambda name: tmp_path / name)
+    return path
+
+
+def test_quality_says_where_the_transformer_runs(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, trained: Path
+) -> None:
+    """Made with generate and seen in a screenshot alike: the more rays it weighs, the more pixels it changes."""
+    from iibr_core.formats.photo import read_photo
+
+    disparity = photo_path.with_name("scene_disparity.npy")
+    rough = np.random.default_rng(0).uniform(0, 0.6, (HEIGHT, WIDTH)).astype(np.float32)
+    np.save(disparity, np.load(disparity) + rough)  # enough for hypotheses to differ, too little to be contested
+    made, shown = {}, {}
+    for quality in ("fast", "balanced", "exact"):
+        out, image = tmp_path / quality, tmp_path / f"{quality}.png"
+        assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", out, "--quality", quality) == 0
+        made[quality] = read_photo(out / "input_Cam000.png").pixels
+        words = ("--grid", 3, "--view", "-1,-1", "-o", image, "--quality", quality)
+        assert run(monkeypatch, "screenshot", photo_path, *words) == 0
+        shown[quality] = read_photo(image).pixels
+    for pictures in (made, shown):
+        balanced, exact = ((pictures[name] != pictures["fast"]).any(axis=2).mean() for name in ("balanced", "exact"))
+        assert 0 < balanced < exact
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-9])])
+def test_weights_missing_or_damaged_are_one_line_and_fast_still_works(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    photo_path: Path,
+    tmp_path: Path,
+    trained: Path,
+    damage: Callable[[Path], object],
+) -> None:
+    damage(trained)
+    before = sorted(tmp_path.rglob("*"))
+    for words in (("generate", "--out", tmp_path / "field"), ("screenshot", "-o", tmp_path / "o.png")):
+        command, *options = words
+        assert run(monkeypatch, command, photo_path, "--grid", 3, *options, "--quality", "balanced") == 2
+        (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+        assert line.startswith(f"iibr: {trained}: ")
+        assert sorted(tmp_path.rglob("*")) == before
+    assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", tmp_path / "field") == 0
 
 
 def test_screenshot_writes_an_image_of_the_size_asked_for(
@@ -112,6 +175,9 @@ GENERATE = ("--out", "{dir}/o", "--grid", "3")
         (("generate", "{photo}", *GENERATE, "--memory", "lots"), "--memory"),
         (("generate", "{photo}", *GENERATE, "--disparity-scale", "nan"), "--disparity-scale"),
         (("generate", "{photo}", *GENERATE, "--max-pixels", "0"), "--max-pixels"),
+        (("generate", "{photo}", *GENERATE, "--quality", "best"), "--quality"),
+        (("screenshot", "{photo}", "--quality", "Exact", "-o", "{dir}/o.png"), "--quality"),
+        (("view", "{photo}", "--quality", ""), "--quality"),
         (("screenshot", "{dir}/gone.png", "-o", "{dir}/o.png"), "gone.png"),
         (("screenshot", "{photo}", "--view", "1", "-o", "{dir}/o.png"), "--view"),
         (("screenshot", "{photo}", "--view", "1,inf", "-o", "{dir}/o.png"), "--view"),

@@ -8,7 +8,15 @@ import pytest
 import typer
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.options import MAX_GRID, finite_from_text, grid_from_text, memory_from_text, size_from_text, view_from_text
+from viewer.options import (
+    MAX_GRID,
+    finite_from_text,
+    grid_from_text,
+    memory_from_text,
+    quality_from_text,
+    size_from_text,
+    view_from_text,
+)
 
 
 @pytest.mark.parametrize(
@@ -23,6 +31,7 @@ from viewer.options import MAX_GRID, finite_from_text, grid_from_text, memory_fr
         (memory_from_text, "1.5G", 3 * 2**29),
         (memory_from_text, "20mib", 20 * 2**20),
         (finite_from_text, "-1e-3", -0.001),
+        (quality_from_text, "balanced", "balanced"),
     ],
 )
 def test_values(parse: Callable[[str], object], text: str, value: object) -> None:
@@ -37,6 +46,7 @@ def test_values(parse: Callable[[str], object], text: str, value: object) -> Non
         (view_from_text, ["", "1", "1,2,3", "a,b", "nan,0", "0,inf"]),
         (memory_from_text, ["", "0", "-1G", "lots", "1X"]),
         (finite_from_text, ["", "nan", "inf", "1,5"]),
+        (quality_from_text, ["", "best", "Fast"]),
     ],
 )
 def test_nonsense_is_named(parse: Callable[[str], object], texts: list[str]) -> None:

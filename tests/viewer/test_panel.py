@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.state import Progress
-from viewer.ui.panel import progress_words
+from iibr_core.plan import ScenePlan
+from iibr_core.types import GridShape, Quality
+from viewer.state import Progress, Scene, Source
+from viewer.ui.panel import progress_words, size_words
 
 
 @pytest.mark.parametrize(
@@ -19,3 +21,19 @@ from viewer.ui.panel import progress_words
 )
 def test_progress_in_words(progress: Progress, words: str) -> None:
     assert progress_words(progress) == words
+
+
+@pytest.mark.parametrize(
+    ("quality", "is_made", "words"),
+    [
+        ("fast", True, "60 × 40 px, 3 × 9 views"),
+        ("balanced", True, "60 × 40 px, 3 × 9 views, balanced"),
+        ("exact", True, "60 × 40 px, 3 × 9 views, exact"),
+        ("exact", False, "60 × 40 px, 3 × 9 views"),
+    ],
+)
+def test_quality_is_told_where_views_are_made_and_not_plain(quality: Quality, is_made: bool, words: str) -> None:
+    grid = GridShape(3, 9)
+    plan = ScenePlan(grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ()) if is_made else None
+    scene = Scene(Source("a.png", quality=quality), "a", 60, 40, grid, (-2.0, 3.0), "a.pfm", plan=plan)
+    assert size_words(scene) == words

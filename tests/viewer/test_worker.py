@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -236,6 +237,23 @@ def test_a_missing_file_is_a_failure_with_its_name(desk_for: Callable[..., Desk]
     failure = desk.next()
     assert isinstance(failure, Failed)
     assert "gone.png" in failure.message
+
+
+def test_weights_that_are_missing_are_a_failure_and_fast_still_works(
+    monkeypatch: pytest.MonkeyPatch, desk_for: Callable[..., Desk], photo_path: Path, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("iibr_core.generate.resource_folder", lambda name: tmp_path / name)
+    desk = desk_for()
+    source = Source(str(photo_path), grid=GridShape(3, 3), quality="balanced")
+    desk.worker.submit(Request(1, source))
+    assert [type(desk.next()) for _ in range(2)] == [SceneReady, ViewReady]
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    assert failure.message.startswith(
+        f"{tmp_path / 'assets' / 'weights' / 'ray_transformer.safetensors'}: no such file"
+    )
+    desk.worker.submit(Request(2, replace(source, quality="fast")))
+    assert [type(desk.next()) for _ in range(10)] == [SceneReady, *[ViewReady] * 9]
 
 
 def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> None:

@@ -77,9 +77,16 @@ def counted_views(number: int) -> str:
     return f"{number} view" if number == 1 else f"{number} views"
 
 
+def size_words(scene: Scene) -> str:
+    """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, exact"."""
+    words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
+    is_made_here = scene.plan is not None
+    return words if scene.source.quality == "fast" or not is_made_here else f"{words}, {scene.source.quality}"
+
+
 def _scene_lines(scene: Scene) -> None:
     imgui.text_wrapped(scene.name)
-    _quiet(f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views")
+    _quiet(size_words(scene))
     _quiet(f"Depth: {scene.depth_source}")
 
 
