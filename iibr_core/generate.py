@@ -47,16 +47,19 @@ def generate(
         return
     farthest = max(max(map(abs, grid.offset(v, u))) for v, u in remaining)
     try:
-        with ViewSynthesis(should_stop, transformer_for(quality), quality == "exact") as synthesis:
-            first = _farthest_views(grid) if plan.has_disocclusion else []
-            rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(first))
+        first = _farthest_views(grid) if plan.has_disocclusion else []
+        rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(first))
+        with ViewSynthesis(should_stop) as synthesis:
             for index in first:
                 offset = grid.offset(*index)
                 view = synthesis.render(rays, offset)
                 if view.occluded.any():
                     rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
-                remaining.remove(index)
-                yield _update(index, view, photo.is_hdr)
+                if quality == "fast":
+                    remaining.remove(index)
+                    yield _update(index, view, photo.is_hdr)
+        # At every quality the ray set is the closed form's: its disparity is smoother, and so is what is inpainted.
+        with ViewSynthesis(should_stop, transformer_for(quality), quality == "exact") as synthesis:
             while remaining:
                 index = _nearest(grid, remaining, nearest_to())
                 remaining.remove(index)

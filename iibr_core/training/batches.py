@@ -18,7 +18,7 @@ from iibr_core.synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.training.degrade import degrade
 from iibr_core.training.loop import Batch
 from iibr_core.training.losses import EpiShape
-from iibr_core.training.scenes import Scene, cast, random_scene, render, seen_from
+from iibr_core.training.scenes import Scene, cast, random_scene, render
 from iibr_core.types import FloatImage, ViewOffset
 from iibr_core.weights import closed_form_weights
 
@@ -36,7 +36,7 @@ Rays = tuple[Contested, FloatImage]
 
 
 def training_batch(step: int, seed: int) -> Batch:
-    """The batch of a step: one EPI, then contested rays that the photo shows, of VIEWS views of one random scene."""
+    """The batch of a step: one EPI, then contested rays of VIEWS views, of one random scene."""
     rng = np.random.default_rng((seed, step))
     radius = int(rng.choice([LIGHT_FIELD, STEREO], p=[0.75, 0.25]))
     largest = float(np.exp(rng.uniform(*np.log(PARALLAX_PX)))) / radius
@@ -70,15 +70,13 @@ def _random_offset(radius: int, rng: np.random.Generator) -> ViewOffset:
 
 
 def _contested(scene: Scene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator) -> Rays:
-    """Contested rays of a view whose true surface the photo shows too: elsewhere no hypothesis can be right."""
+    """Contested rays of a view, also those whose true surface the photo does not show: background is right there."""
     candidates = find_candidates(rays, offset, (0, SIZE[0]))
     weights = closed_form_weights(candidates)
     contested = find_contested(rays, candidates, weights, (0, SIZE[0]), occlusion_mask(weights))
     chosen = rng.permutation(len(contested.pixel))[:RAYS_A_VIEW]
     y, x = contested.pixel[chosen].T
-    truth, disparity = cast(scene, x, y, offset)
-    shown = seen_from(scene, x, y, disparity, offset)
-    return _subset(contested, chosen[shown]), truth[shown]
+    return _subset(contested, chosen), cast(scene, x, y, offset)[0]
 
 
 def _epi(scene: Scene, rays: RaySet, radius: int, rng: np.random.Generator) -> Rays | None:
