@@ -125,22 +125,9 @@ def _blend(weights, votes, colors):  # type: ignore[no-untyped-def]
 
 @kernel
 def _lay_out(  # type: ignore[no-untyped-def]
-    count,
-    surface,
-    origin,
-    weights,
-    occluded,
-    photo_images,
-    parallax,
-    least,
-    first,
-    last,
-    pixel,
-    number,
-    disparity,
-    source,
-    share,
-):
+    count, surface, origin, weights, occluded, photo_images, parallax, least, first, last,
+    pixel, number, disparity, source, share,
+):  # fmt: skip
     """Select contested rays; pick the surfaces on each, then again and again the one around it farthest from those."""
     _, rows, width = surface.shape
     most = 3 * (2 * REACH_PX + 1) ** 2

@@ -30,8 +30,11 @@ def generate(
     `nearest_to()`.
 
     disparity is the field's (`plan.field_disparity(given)`). should_stop is asked between row bands of a view; once
-    it is true the generator returns. Pixels do not depend on the order of the views. Raises ValueError if photo and
-    disparity differ in size.
+    it is true the generator returns. Pixels do not depend on the order of the views. quality: "fast" weighs by the
+    closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for every ray;
+    the farthest views then come with the others, once the ray set is complete.
+
+    Raises ValueError if photo and disparity differ in size, InputError if the trained weights cannot be read.
     """
     if disparity.values.shape != photo.size:
         raise ValueError(f"disparity is {disparity.values.shape}, the photo {photo.size} (height, width)")
@@ -47,6 +50,7 @@ def generate(
         return
     farthest = max(max(map(abs, grid.offset(v, u))) for v, u in remaining)
     try:
+        transformer = transformer_for(quality)
         first = _farthest_views(grid) if plan.has_disocclusion else []
         rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(first))
         with ViewSynthesis(should_stop) as synthesis:
@@ -55,11 +59,11 @@ def generate(
                 view = synthesis.render(rays, offset)
                 if view.occluded.any():
                     rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
-                if quality == "fast":
+                if transformer is None:
                     remaining.remove(index)
                     yield _update(index, view, photo.is_hdr)
         # At every quality the ray set is the closed form's: its disparity is smoother, and so is what is inpainted.
-        with ViewSynthesis(should_stop, transformer_for(quality), quality == "exact") as synthesis:
+        with ViewSynthesis(should_stop, transformer, quality == "exact") as synthesis:
             while remaining:
                 index = _nearest(grid, remaining, nearest_to())
                 remaining.remove(index)
