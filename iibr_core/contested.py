@@ -1,4 +1,4 @@
-"""Contested rays: target rays near which several surfaces land, so that someone has to decide between them.
+"""Contested rays: what they show lies near a depth edge of its source, so that someone has to decide what it is.
 
 For each of them K hypotheses are laid out: surfaces that land within a few pixels, as different from each other as
 possible. A hypothesis says "this ray shows the source ray that disparity d leads to"; its features say how well that
@@ -16,149 +16,205 @@ from numpy.typing import NDArray
 
 from iibr_core.candidates import Candidates
 from iibr_core.kernels import kernel, linear_scalar, nearest_pixel, srgb_scalar
-from iibr_core.lookup import SOLE, look_up
+from iibr_core.lookup import cubic, look_up
 from iibr_core.rays import RaySet
-from iibr_core.types import FloatImage
+from iibr_core.types import FloatImage, ViewOffset
 
-HYPOTHESES = 5
-REACH_PX = 3
+HYPOTHESES = 6
+PLAIN = 128
+"""Added to the source of the hypothesis that the ray shows the front-most surface as the photo mixed it at its edge."""
+REACH_PX = 6
 """Surfaces that land within this many pixels, each way, are considered."""
+AROUND = np.array(
+    [
+        (0, 1), (0, -1), (1, 0), (-1, 0), (2, 2), (2, -2), (-2, 2), (-2, -2), (0, 3), (0, -3), (3, 0), (-3, 0),
+        (0, 6), (0, -6), (6, 0), (-6, 0), (4, 4), (4, -4), (-4, 4), (-4, -4),
+    ]
+)  # fmt: skip
+"""Where, in pixels down and right: this is enough to meet every surface that is not a sliver."""
+AROUND_SHARP = 12
+SOFT = 0.7
+"""Where depth edges are at least this soft, all of AROUND is looked at, else the first AROUND_SHARP."""
 CONTESTED_PX = 0.75
-"""Surfaces whose look-ups differ by less than this do not contest a ray."""
+"""A step of disparity that moves its sides apart by less than this does not contest a ray."""
 DISTINCT_PX = 0.3
 """Hypotheses closer than this are one."""
-SOURCE_REACH_PX = 2
-"""The surroundings of a source ray that its features describe."""
 LEAST_WEIGHT = 0.02
+LEAST_VOTE = 0.004
+"""Weights below this change no colour by a visible step."""
 INPAINTED_APART_PX = 100.0
 """What is inpainted and what the photo shows are different hypotheses, however close their disparities."""
 PROFILE_PX = (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)
 """Where the disparity around a source ray is sampled, along the parallax and across it."""
-FEATURES = 11 + 2 * len(PROFILE_PX)
+MOST_PX = 1e4
 SHARE = 6
 """The feature that is the closed form's weight."""
+PROFILE = 15
+FEATURES = PROFILE + 2 * len(PROFILE_PX) + 1
+"""The last is 0: a multiple of four suits the arithmetic."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contested:
     """Contested rays (N) of one view and their hypotheses (K).
 
-    pixel (N, 2): (row within the candidates, column). mask (N, K): hypotheses in use. disparity (N, K). source (N, K).
-    features (N, K, FEATURES). colors (N, K, 3), sRGB-encoded.
+    offset: of the view. pixel (N, 2): (row, column) in the view. mask (N, K): hypotheses in use, the first always.
+    disparity (N, K). source (N, K). features (N, K, FEATURES).
     """
 
+    offset: ViewOffset
     pixel: NDArray[np.int64]
     mask: NDArray[np.bool_]
     disparity: FloatImage
     source: NDArray[np.uint8]
     features: FloatImage
-    colors: FloatImage
 
 
 def find_contested(
     rays: RaySet,
     candidates: Candidates,
     weights: FloatImage,
+    shown: tuple[FloatImage, NDArray[np.uint8]],
     rows: tuple[int, int],
-    occluded: NDArray[np.bool_],
     every: bool = False,
 ) -> Contested:
     """The contested rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
 
-    occluded (as the candidates): rays to leave out, nothing shows them. every: take all others, contested or not.
+    shown: disparity and source (N, W) of the heaviest candidates, as `look_up_colors` gives them. every: take all rays
+    near which anything lands, contested or not.
     """
     first, last = rows
     shape = (last - first) * candidates.count.shape[1], HYPOTHESES
     pixel, number = np.empty((shape[0], 2), np.int64), np.zeros(shape[0], np.int64)
-    disparity, source = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
-    share = np.zeros(shape, np.float32)
-    least = -1.0 if every else CONTESTED_PX
-    t, s = candidates.offset
-    parallax = max(abs(t), abs(s), 1e-9)
+    disparity, source, share = np.empty(shape, np.float32), np.empty(shape, np.uint8), np.empty(shape, np.float32)
+    offsets, _, surfaces, coverage, _, _, _ = rays.arrays
+    around = rays.surroundings
+    from_sources = np.array(candidates.offset) - offsets
+    parallax = max(*map(abs, candidates.offset), 1e-9)
+    looks = len(AROUND) if around.softness > SOFT else AROUND_SHARP
     count = _lay_out(
-        candidates.count, candidates.disparity, candidates.source, weights, occluded, rays.photo_images, parallax,
-        least, first, last, pixel, number, disparity, source, share,
+        candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step, from_sources,
+        rays.photo_images, parallax, looks, candidates.first_row, first, last, every,
+        pixel, number, disparity, source, share,
     )  # fmt: skip
     pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
-    share = share[:count]
     features = np.zeros((count, HYPOTHESES, FEATURES), np.float32)
-    colors = np.zeros((count, HYPOTHESES, 3), np.float32)
-    offsets, images, surfaces, coverage, _, _, _ = rays.arrays
     _describe(
-        images, surfaces, coverage, np.array(candidates.offset) - offsets, rays.photo_images, candidates.first_row,
-        candidates.count, candidates.disparity, candidates.source, weights,
-        pixel, number, disparity, source, share, parallax, features, colors,
+        surfaces, coverage, around.low, around.high, around.step, around.softness, from_sources, rays.photo_images,
+        candidates.count, *shown, weights, candidates.first_row, parallax, looks,
+        pixel, number, disparity, source, share[:count], features,
     )  # fmt: skip
+    pixel[:, 0] += candidates.first_row
     mask = np.arange(HYPOTHESES) < number[:, None]
-    return Contested(pixel, mask, disparity, source, features, colors)
+    return Contested(candidates.offset, pixel, mask, disparity, source, features)
 
 
-def decide(contested: Contested, weights: FloatImage) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
+def votes(rays: RaySet, contested: Contested) -> FloatImage:
+    """What each hypothesis would show: colours (N, K, 3), sRGB-encoded; black in unused slots."""
+    colors = np.zeros((*contested.mask.shape, 3), np.float32)
+    one = np.eye(HYPOTHESES, dtype=np.float32)
+    for a in range(HYPOTHESES):
+        weights = np.where(contested.mask, one[a], 0.0).astype(np.float32)
+        colors[:, a] = np.where(contested.mask[:, a, None], decide(rays, contested, weights)[0], 0.0)
+    return colors
+
+
+def decide(rays: RaySet, contested: Contested, weights: FloatImage) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
     """Colours (N, 3), disparity (N) and source (N) of contested rays for weights (N, K) whose rows sum to 1.
 
     Colours are summed in linear light; disparity and source are the heaviest hypothesis's.
     """
-    colors = np.empty((len(weights), 3), np.float32)
-    _blend(weights, contested.colors, colors)
+    colors = np.zeros((len(weights), 3), np.float32)
+    offsets, images, surfaces, *_ = rays.arrays
+    _blend(
+        images, surfaces, np.array(contested.offset) - offsets,
+        contested.pixel, contested.disparity, contested.source, weights, colors,
+    )  # fmt: skip
     heaviest = weights.argmax(axis=1)[:, None]
     return (
         colors,
         np.take_along_axis(contested.disparity, heaviest, axis=1)[:, 0],
-        np.take_along_axis(contested.source, heaviest, axis=1)[:, 0],
+        np.take_along_axis(contested.source, heaviest, axis=1)[:, 0] % PLAIN,
     )
 
 
 @kernel
-def _blend(weights, votes, colors):  # type: ignore[no-untyped-def]
+def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors):  # type: ignore[no-untyped-def]
+    _, height, width = surfaces.shape
     for n in range(len(weights)):
-        heaviest = weights[n].max()
-        for c in range(3):
-            total = 0.0
-            for a in range(weights.shape[1]):
-                if weights[n, a] > SOLE:
-                    total = votes[n, a, c]
-                    break
-                if weights[n, a] > 1.0 - SOLE:
-                    total += weights[n, a] * linear_scalar(votes[n, a, c])
-            colors[n, c] = total if heaviest > SOLE else srgb_scalar(total)
+        total = red = green = blue = 0.0
+        heavy = 0
+        for a in range(weights.shape[1]):
+            heavy += weights[n, a] > LEAST_VOTE
+        for a in range(weights.shape[1]):
+            w = weights[n, a]
+            if not w > LEAST_VOTE:
+                continue
+            d, k = disparity[n, a], np.int64(source[n, a] % PLAIN)
+            t, s = offsets[k, 0], offsets[k, 1]
+            x = min(max(pixel[n, 1] + d * s, -0.5), width - 0.5)
+            y = min(max(pixel[n, 0] + d * t, -0.5), height - 0.5)
+            if source[n, a] >= PLAIN:
+                r, g, b = cubic(images, k, x, y)
+            else:
+                r, g, b = look_up(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
+            if heavy == 1:
+                colors[n, 0], colors[n, 1], colors[n, 2] = max(r, 0.0), max(g, 0.0), max(b, 0.0)
+            total += w
+            red += w * linear_scalar(r)
+            green += w * linear_scalar(g)
+            blue += w * linear_scalar(b)
+        if heavy > 1:
+            colors[n, 0] = srgb_scalar(red / total)
+            colors[n, 1] = srgb_scalar(green / total)
+            colors[n, 2] = srgb_scalar(blue / total)
 
 
 @kernel
 def _lay_out(  # type: ignore[no-untyped-def]
-    count, surface, origin, weights, occluded, photo_images, parallax, least, first, last,
+    count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
+    photo_images, parallax, looks, first_row, first, last, every,
     pixel, number, disparity, source, share,
 ):  # fmt: skip
     """Select contested rays; pick the surfaces on each, then again and again the one around it farthest from those."""
     _, rows, width = surface.shape
-    most = 3 * (2 * REACH_PX + 1) ** 2
-    near_d, near_k = np.empty(most), np.empty(most, np.int64)
+    height = step.shape[1]
+    near_d, near_k = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64)
     found = 0
     for y in range(first, last):
         for x in range(width):
-            if occluded[y, x]:
-                continue
-            n = 0
-            low, high = np.inf, -np.inf
-            for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, rows)):
-                for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
-                    for k in range(np.int64(min(count[v, u], 3))):
-                        if weights[k, v, u] > LEAST_WEIGHT or (u == x and v == y):
-                            near_d[n], near_k[n] = surface[k, v, u], origin[k, v, u]
-                            low, high = min(low, near_d[n]), max(high, near_d[n])
-                            n += 1
-            if n == 0 or (high - low) * parallax < least:
+            heavy = 0
+            covered = 0.0
+            for k in range(np.int64(count[y, x])):
+                heavy += weights[k, y, x] > LEAST_WEIGHT
+                covered += weights[k, y, x]
+            is_contested = every or heavy != 1 or covered < 1.0 - LEAST_WEIGHT
+            if not is_contested:
+                d, origin_here = shown_disparity[y, x], np.int64(shown_source[y, x])
+                t, s = offsets[origin_here, 0], offsets[origin_here, 1]
+                u = min(max(nearest_pixel(x + d * s), 0), width - 1)
+                v = min(max(nearest_pixel(first_row + y + d * t), 0), height - 1)
+                is_contested = step[origin_here, v, u] * parallax > CONTESTED_PX
+            if not is_contested:
                 continue
             picked = 0
             for k in range(np.int64(count[y, x])):
-                if weights[k, y, x] > LEAST_WEIGHT and picked < disparity.shape[1]:
+                if weights[k, y, x] > LEAST_WEIGHT and picked < disparity.shape[1] - 1:
                     disparity[found, picked], source[found, picked] = surface[k, y, x], origin[k, y, x]
                     share[found, picked] = weights[k, y, x]
                     picked += 1
-            if picked == 0:
+            n = 0
+            for i in range(looks):
+                v, u = y + AROUND[i, 0], x + AROUND[i, 1]
+                if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
+                    near_d[n], near_k[n] = shown_disparity[v, u], shown_source[v, u]
+                    n += 1
+            if picked == 0 and n > 0:
                 front = np.argmax(near_d[:n])
-                disparity[found, 0], source[found, 0] = near_d[front], near_k[front]
+                disparity[found, 0], source[found, 0], share[found, 0] = near_d[front], near_k[front], 0.0
                 picked = 1
-            while picked < disparity.shape[1]:
+            own_picked = picked
+            while 0 < picked < disparity.shape[1] - 1:
                 best, best_distance = -1, DISTINCT_PX
                 for i in range(n):
                     distance = np.inf
@@ -172,42 +228,53 @@ def _lay_out(  # type: ignore[no-untyped-def]
                 if best < 0:
                     break
                 disparity[found, picked], source[found, picked] = near_d[best], near_k[best]
+                share[found, picked] = 0.0
                 picked += 1
-            pixel[found, 0], pixel[found, 1], number[found] = y, x, picked
-            found += 1
+            if picked > (0 if every else 1):
+                mixed = 0
+                for j in range(own_picked):
+                    if disparity[found, j] > disparity[found, mixed]:
+                        mixed = j
+                disparity[found, picked], source[found, picked] = disparity[found, mixed], source[found, mixed] + PLAIN
+                share[found, picked] = 0.0
+                picked += 1
+                pixel[found, 0], pixel[found, 1], number[found] = y, x, picked
+                found += 1
     return found
 
 
 @kernel
 def _squashed(px):  # type: ignore[no-untyped-def]
-    """Pixels on a scale where small differences count most: finite and bounded for every input."""
+    """Pixels on a scale of -4..4 where small differences count most; 0 where there is no difference to tell."""
     if np.isnan(px):
         return 0.0
-    return np.sign(px) * np.log1p(min(abs(px), 1e4))
+    px = min(max(px, -MOST_PX), MOST_PX)
+    return px / (1.0 + 0.25 * abs(px))
 
 
 @kernel
 def _describe(  # type: ignore[no-untyped-def]
-    images, surfaces, coverage, offsets, photo_images, first_row, count, surface, origin, weights,
-    pixel, number, disparity, source, share, parallax, features, colors,
+    surfaces, coverage, low, high, step, softness, offsets, photo_images,
+    count, shown_disparity, shown_source, weights, first_row, parallax, looks,
+    pixel, number, disparity, source, share, features,
 ):  # fmt: skip
     _, height, width = surfaces.shape
     rows = count.shape[0]
     for n in range(len(pixel)):
         y, x = pixel[n]
-        high = disparity[n, 0]
-        low = high
+        front = back = disparity[n, 0]
         for a in range(number[n]):
-            low, high = min(low, disparity[n, a]), max(high, disparity[n, a])
+            front, back = max(front, disparity[n, a]), min(back, disparity[n, a])
+        uncovered = 1.0
+        for slot in range(np.int64(count[y, x])):
+            uncovered -= weights[slot, y, x]
         for a in range(number[n]):
-            d, k = disparity[n, a], np.int64(source[n, a])
+            d, k = disparity[n, a], np.int64(source[n, a]) % np.int64(PLAIN)
             t, s = offsets[k, 0], offsets[k, 1]
             source_x = min(max(x + d * s, -0.5), width - 0.5)
             source_y = min(max(first_row + y + d * t, -0.5), height - 0.5)
-            r, g, b = look_up(images, surfaces, k, source_x, source_y, d, max(abs(s), abs(t), 1e-9))
-            colors[n, a, 0], colors[n, a, 1], colors[n, a, 2] = max(r, 0.0), max(g, 0.0), max(b, 0.0)
 
-            # The source ray's own disparity, bilinear, and the range of disparities around it.
+            # The source ray's own disparity, bilinear.
             column, row = floor(source_x), floor(source_y)
             fx, fy = source_x - column, source_y - row
             own = total = 0.0
@@ -218,11 +285,6 @@ def _describe(  # type: ignore[no-untyped-def]
                     if surfaces[k, v, u] == surfaces[k, v, u]:
                         own, total = own + w * surfaces[k, v, u], total + w
             own = own / total if total > 0 else d
-            around_low = around_high = d
-            centre_x, centre_y = nearest_pixel(source_x), nearest_pixel(source_y)
-            for v in range(max(centre_y - SOURCE_REACH_PX, 0), min(centre_y + SOURCE_REACH_PX + 1, height)):
-                for u in range(max(centre_x - SOURCE_REACH_PX, 0), min(centre_x + SOURCE_REACH_PX + 1, width)):
-                    around_low, around_high = min(around_low, surfaces[k, v, u]), max(around_high, surfaces[k, v, u])
 
             along = max(np.hypot(s, t), 1e-9)
             for i in range(len(PROFILE_PX)):
@@ -230,25 +292,32 @@ def _describe(  # type: ignore[no-untyped-def]
                 for j in range(2):
                     v = min(max(nearest_pixel(source_y + (step_x if j else step_y)), 0), height - 1)
                     u = min(max(nearest_pixel(source_x + (-step_y if j else step_x)), 0), width - 1)
-                    features[n, a, 11 + 2 * i + j] = _squashed((surfaces[k, v, u] - d) * parallax)
+                    features[n, a, PROFILE + 2 * i + j] = _squashed((surfaces[k, v, u] - d) * parallax)
 
             # The nearest landing of this surface.
-            nearest = REACH_PX + 1.0
-            for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, rows)):
-                for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
-                    for i in range(np.int64(min(count[v, u], 3))):
-                        if weights[i, v, u] > 0.5 and abs(surface[i, v, u] - d) * parallax < CONTESTED_PX:
-                            nearest = min(nearest, np.sqrt((v - y) ** 2 + (u - x) ** 2))
+            nearest = 0.0 if share[n, a] > 0 else REACH_PX + 1.0
+            for i in range(looks):
+                v, u = y + AROUND[i, 0], x + AROUND[i, 1]
+                if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
+                    continue
+                if abs(shown_disparity[v, u] - d) * parallax < CONTESTED_PX:
+                    nearest = min(nearest, np.sqrt(AROUND[i, 0] ** 2 + AROUND[i, 1] ** 2))
 
+            v, u = min(max(nearest_pixel(source_y), 0), height - 1), min(max(nearest_pixel(source_x), 0), width - 1)
+            around_low, around_high = min(low[k, v, u], d), max(high[k, v, u], d)
             out = features[n, a]
             out[0] = _squashed((d - own) * parallax)
             out[1] = _squashed((around_high - d) * parallax)
             out[2] = _squashed((d - around_low) * parallax)
             out[3] = (own - around_low) / max(around_high - around_low, 1e-6)
-            out[4] = _squashed((high - d) * parallax)
-            out[5] = _squashed((d - low) * parallax)
+            out[4] = _squashed((front - d) * parallax)
+            out[5] = _squashed((d - back) * parallax)
             out[SHARE] = share[n, a]
             out[7] = nearest / (REACH_PX + 1.0)
             out[8] = 1.0 if k >= photo_images else 0.0
             out[9] = np.log1p(parallax)
-            out[10] = coverage[k, min(max(centre_y, 0), height - 1), min(max(centre_x, 0), width - 1)]
+            out[10] = coverage[k, v, u]
+            out[11] = softness
+            out[12] = max(uncovered, 0.0)
+            out[14] = 1.0 if source[n, a] >= PLAIN else 0.0
+            out[13] = _squashed(step[k, v, u] * parallax)

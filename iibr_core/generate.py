@@ -73,16 +73,16 @@ def generate(
 
 
 def transformer_for(quality: Quality) -> Callable[[Contested], FloatImage] | None:
-    """What weighs contested rays: the shipped transformer, or None for the closed form. Imports torch where needed.
+    """What weighs contested rays: the shipped transformer, or None for the closed form.
 
     Raises InputError if the shipped weights cannot be read.
     """
     if quality == "fast":
         return None
-    from iibr_core.ray_transformer import TrainedTransformer
+    from iibr_core.ray_weights import TrainedWeights
 
     try:
-        return TrainedTransformer(resource_folder("assets") / "weights" / "ray_transformer.safetensors")
+        return TrainedWeights(resource_folder("assets") / "weights" / "ray_transformer.safetensors")
     except InputError as error:
         raise InputError(f"{error}; use --quality fast, or train them anew with `iibr train`") from error
 

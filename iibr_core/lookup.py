@@ -60,7 +60,7 @@ def _keys(f):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _cubic(images, index, x, y):  # type: ignore[no-untyped-def]
+def cubic(images, index, x, y):  # type: ignore[no-untyped-def]
     """Colour at a position of one image; its border is repeated beyond it."""
     _, height, width, _ = images.shape
     column, row = floor(x), floor(y)
@@ -115,7 +115,7 @@ def look_up(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-unty
     if taps == 16:
         return red, green, blue
     if taps == 0:
-        return _cubic(images, index, x, y)
+        return cubic(images, index, x, y)
     if total < LEAST_TAP_WEIGHT:
         return (
             np.float64(images[index, near_y, near_x, 0]),
@@ -163,7 +163,7 @@ def _gather(  # type: ignore[no-untyped-def]
                     parallax = max(abs(s), abs(t), 1e-9)
                     r, g, b = look_up(images, surfaces, index, source_x, source_y, d, parallax)
                 else:
-                    r, g, b = _cubic(images, index, source_x, source_y)
+                    r, g, b = cubic(images, index, source_x, source_y)
                 if sole:
                     sum_r, sum_g, sum_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
                 else:

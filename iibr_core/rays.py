@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from iibr_core.kernels import kernel
+from iibr_core.surroundings import Surroundings, surroundings_of
 from iibr_core.types import FloatImage, ViewOffset
 
 
@@ -21,10 +22,15 @@ class RaySet:
     column of each row's rays.
     """
 
-    def __init__(self, capacity: int, size: tuple[int, int], surface_step: float) -> None:
-        """surface_step: disparities closer than this are one surface for look-ups."""
+    def __init__(self, capacity: int, size: tuple[int, int], surface_step: float, farthest_views: float = 1.0) -> None:
+        """surface_step: disparities closer than this are one surface for look-ups.
+
+        farthest_views: the largest view offset that will be rendered.
+        """
         self._count = 0
         self._surface_step = surface_step
+        self._farthest_views = farthest_views
+        self._surroundings: Surroundings | None = None
         self._offsets = np.empty((capacity, 2))
         self._colors = np.empty((capacity, *size, 3), np.float32)
         self._disparity = np.empty((capacity, *size), np.float32)
@@ -41,6 +47,7 @@ class RaySet:
         _near_edge(disparity, self._surface_step, self._near_edge[k])
         _row_extents(disparity, coverage, self._row_disparity[k], self._row_columns[k])
         self._count += 1
+        self._surroundings = None
 
     def __len__(self) -> int:
         return self._count
@@ -58,6 +65,13 @@ class RaySet:
             self._near_edge, self._row_disparity, self._row_columns,
         )  # fmt: skip
         return tuple(array[: self._count] for array in everything)
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What lies around the rays added so far; made when first asked for after the last was added."""
+        if self._surroundings is None:
+            self._surroundings = surroundings_of(self._disparity[: self._count], self._farthest_views)
+        return self._surroundings
 
     @property
     def photo_images(self) -> int:

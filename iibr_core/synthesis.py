@@ -57,7 +57,7 @@ def rays_of_photo(colors: FloatImage, disparity: FloatImage, farthest_views: flo
     """
     centre = ViewOffset(0.0, 0.0)
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, EDGE_PX / farthest_views)
-    rays = RaySet(2 + more, disparity.shape, OWN_SURFACE_PX / farthest_views)
+    rays = RaySet(2 + more, disparity.shape, OWN_SURFACE_PX / farthest_views, farthest_views)
     rays.add(centre, own, disparity, np.ones_like(disparity))
     if coverage.any():
         rays.add(centre, fringe, fringe_disparity, coverage)
@@ -94,6 +94,8 @@ class ViewSynthesis:
         Raises Cancelled once should_stop is true.
         """
         height, width = rays.size
+        if self._transformer:
+            rays.surroundings  # noqa: B018 - made before the threads ask for it
 
         def seen(rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
             return self._seen(rays, offset, rows)
@@ -114,9 +116,11 @@ class ViewSynthesis:
         occluded = occlusion_mask(weights)
         inner = slice(above, above + rows[1] - rows[0])
         if self._transformer:
-            contested = find_contested(rays, candidates, weights, (inner.start, inner.stop), occluded, self._every)
-            at = tuple(contested.pixel.T)
-            colors[at], disparity[at], source[at] = decide(contested, self._transformer(contested))
+            shown = disparity, source
+            contested = find_contested(rays, candidates, weights, shown, (inner.start, inner.stop), self._every)
+            at = contested.pixel[:, 0] - candidates.first_row, contested.pixel[:, 1]
+            decided = self._transformer(contested)
+            colors[at], disparity[at], source[at] = decide(rays, contested, decided)
         return colors[inner], disparity[inner], source[inner], occluded[inner]
 
     def _bands(self, work: Callable[[tuple[int, int]], Result], height: int, width: int) -> list[Result]:

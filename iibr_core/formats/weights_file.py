@@ -1,20 +1,24 @@
 """Trained weights on disk: safetensors, which hold numbers and text only, so opening a stranger's file runs no code.
 
 Every file says what it is and in which version; what does not fit the model is refused before the model is touched.
+torch is imported by what needs it only: trained weights are used without.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import torch
+import numpy as np
+from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
-from torch import Tensor, nn
 
 from iibr_core.formats.files import require_file, written_whole
 from iibr_core.types import InputError
+
+if TYPE_CHECKING:
+    from torch import Tensor, nn
 
 VERSION = "1"
 """Raised whenever the same numbers come to mean something else."""
@@ -37,19 +41,21 @@ def load_weights(path: Path, model: nn.Module) -> dict[str, str]:
     Raises InputError, and leaves the model as it was, if the file is missing, truncated, no safetensors, of another
     version, for a model of another shape, or holds a number that is not finite.
     """
-    tensors, metadata = read_weights(path)
+    tensors, metadata = read_tensors(path, WEIGHTS)
     require_shapes(path, tensors, {name: tensor.shape for name, tensor in model.state_dict().items()})
     model.load_state_dict(tensors)
     return metadata
 
 
-def read_weights(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """The tensors by name, on the CPU, and the metadata. Raises InputError as `load_weights` does, but for shapes."""
-    return read_tensors(path, WEIGHTS)
+def read_weights(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """The arrays by name, and the metadata. Raises InputError as `load_weights` does, but for shapes."""
+    return _read(path, WEIGHTS)
 
 
 def write_tensors(path: Path, content: str, tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> None:
     """Write tensors from any device and text; `content` says what they are. Raises as `save_weights` does."""
+    from safetensors.torch import save
+
     taken = [name for name in RESERVED if name in metadata]
     if taken:
         raise ValueError(f'metadata "{taken[0]}" is set by the file format')
@@ -65,22 +71,31 @@ def read_tensors(path: Path, content: str) -> tuple[dict[str, Tensor], dict[str,
 
     Raises InputError if the file is missing, damaged, holds something else, is of another version or not finite.
     """
+    import torch
+
+    arrays, metadata = _read(path, content)
+    return {name: torch.from_numpy(array) for name, array in arrays.items()}, metadata
+
+
+def _read(path: Path, content: str) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
     require_file(path)
     try:
-        with safe_open(path, framework="pt") as file:
+        with safe_open(path, framework="np") as file:
             metadata = dict(file.metadata() or {})
             _require_content(path, metadata, content)
-            # Cloned, because these may lie in the mapped file, which must be free to be replaced.
-            tensors = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+            # Copied, because these may lie in the mapped file, which must be free to be replaced.
+            arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
         raise InputError(f"{path}: is no safetensors file, or is damaged ({_one_line(error)})") from error
-    for name, tensor in tensors.items():
-        if not torch.isfinite(tensor).all():
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
             raise InputError(f"{path}: {name} holds values that are not finite; train again or use another file")
-    return tensors, metadata
+    return arrays, metadata
 
 
-def require_shapes(path: Path, tensors: Mapping[str, Tensor], expected: Mapping[str, torch.Size]) -> None:
+def require_shapes(
+    path: Path, tensors: Mapping[str, Tensor | NDArray[Any]], expected: Mapping[str, tuple[int, ...]]
+) -> None:
     """Raise InputError, naming the first difference, unless the names and shapes are those expected."""
     for name in sorted(tensors.keys() | expected.keys()):
         if name not in tensors:

@@ -5,19 +5,23 @@ Step n of a seed always gives the same batch. Contested rays of a few views come
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from iibr_core.candidates import find_candidates
 from iibr_core.color import linear_from_srgb
-from iibr_core.contested import REACH_PX, Contested, find_contested
-from iibr_core.occlusion import occlusion_mask
+from iibr_core.contested import REACH_PX, SHARE, Contested, find_contested, votes
+from iibr_core.lookup import look_up_colors
 from iibr_core.rays import RaySet
 from iibr_core.synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.training.degrade import degrade
 from iibr_core.training.loop import Batch
-from iibr_core.training.losses import EpiShape
+from iibr_core.training.losses import EpiShape, color_loss, perceived
 from iibr_core.training.scenes import Scene, cast, random_scene, render
 from iibr_core.types import FloatImage, ViewOffset
 from iibr_core.weights import closed_form_weights
@@ -30,9 +34,16 @@ LIGHT_FIELD, STEREO = 4, 1
 """Radii of the grids trained for, view steps: many views a little apart, or two far apart."""
 PARALLAX_PX = 4.0, 45.0
 """Between the outermost view and the photo, at the largest disparity."""
+TYPICAL_ERROR, LEAST_ERROR = 0.004, 0.0005
+"""Of colours, squared: which scenes count once, and below which a scene's error is no matter."""
 
-Rays = tuple[Contested, FloatImage]
-"""Contested rays and their true colours (N, 3), sRGB-encoded."""
+
+class Rays(NamedTuple):
+    """N contested rays: their hypotheses, what those would show (N, K, 3) and the truth (N, 3), both sRGB-encoded."""
+
+    contested: Contested
+    votes: FloatImage
+    truth: FloatImage
 
 
 def training_batch(step: int, seed: int) -> Batch:
@@ -44,7 +55,7 @@ def training_batch(step: int, seed: int) -> Batch:
     colors, disparity = render(scene, SIZE, ViewOffset(0.0, 0.0))
     rays = _ray_set(colors, degrade(disparity, rng, radius), radius)
     epi = _epi(scene, rays, radius, rng)
-    parts = [epi] if epi else []
+    parts = list(epi or [])
     parts += [_contested(scene, rays, _random_offset(radius, rng), rng) for _ in range(VIEWS)]
     return _batch(parts, (1, EPI_VIEWS, EPI_WIDTH) if epi else None)
 
@@ -71,57 +82,58 @@ def _random_offset(radius: int, rng: np.random.Generator) -> ViewOffset:
 
 def _contested(scene: Scene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator) -> Rays:
     """Contested rays of a view, also those whose true surface the photo does not show: background is right there."""
-    candidates = find_candidates(rays, offset, (0, SIZE[0]))
+    contested = _contested_rays(rays, offset, (0, SIZE[0]), every=False)
+    contested = _subset(contested, rng.permutation(len(contested.pixel))[:RAYS_A_VIEW])
+    return _seen(scene, rays, contested)
+
+
+def _contested_rays(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool) -> Contested:
+    """As `ViewSynthesis` finds them."""
+    above = min(rows[0], REACH_PX)
+    candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + REACH_PX, SIZE[0])))
     weights = closed_form_weights(candidates)
-    contested = find_contested(rays, candidates, weights, (0, SIZE[0]), occlusion_mask(weights))
-    chosen = rng.permutation(len(contested.pixel))[:RAYS_A_VIEW]
-    y, x = contested.pixel[chosen].T
-    return _subset(contested, chosen), cast(scene, x, y, offset)[0]
+    _, disparity, source = look_up_colors(rays, candidates, weights)
+    return find_contested(rays, candidates, weights, (disparity, source), (above, above + rows[1] - rows[0]), every)
 
 
-def _epi(scene: Scene, rays: RaySet, radius: int, rng: np.random.Generator) -> Rays | None:
+def _seen(scene: Scene, rays: RaySet, contested: Contested) -> Rays:
+    y, x = contested.pixel.T
+    return Rays(contested, votes(rays, contested), cast(scene, x, y, contested.offset)[0])
+
+
+def _epi(scene: Scene, rays: RaySet, radius: int, rng: np.random.Generator) -> list[Rays] | None:
     """Every ray of a piece of one row in EPI_VIEWS views from left to right; None where one has no hypothesis."""
     row = int(rng.integers(REACH_PX, SIZE[0] - REACH_PX))
     first = int(rng.integers(0, SIZE[1] - EPI_WIDTH + 1))
     columns = np.arange(first, first + EPI_WIDTH)
-    parts, truths = [], []
+    parts = []
     for s in np.linspace(-radius, radius, EPI_VIEWS):
-        offset = ViewOffset(0.0, float(s))
-        candidates = find_candidates(rays, offset, (row - REACH_PX, row + REACH_PX + 1))
-        weights = closed_form_weights(candidates)
-        nothing = np.zeros(candidates.count.shape, np.bool_)
-        contested = find_contested(rays, candidates, weights, (REACH_PX, REACH_PX + 1), nothing, every=True)
+        contested = _contested_rays(rays, ViewOffset(0.0, float(s)), (row, row + 1), every=True)
         chosen = np.flatnonzero(np.isin(contested.pixel[:, 1], columns))
         if len(chosen) < EPI_WIDTH:
             return None
-        parts.append(_subset(contested, chosen))
-        truths.append(cast(scene, columns, np.full(EPI_WIDTH, row), offset)[0])
-    return _joined(parts), np.concatenate(truths)
+        parts.append(_seen(scene, rays, _subset(contested, chosen)))
+    return parts
 
 
 def _subset(contested: Contested, chosen: NDArray[np.intp]) -> Contested:
-    return Contested(
-        contested.pixel[chosen],
-        contested.mask[chosen],
-        contested.disparity[chosen],
-        contested.source[chosen],
-        contested.features[chosen],
-        contested.colors[chosen],
-    )
-
-
-def _joined(parts: list[Contested]) -> Contested:
-    names = ("pixel", "mask", "disparity", "source", "features", "colors")
-    return Contested(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    names = ("pixel", "mask", "disparity", "source", "features")
+    return replace(contested, **{name: getattr(contested, name)[chosen] for name in names})
 
 
 def _batch(parts: list[Rays], epi_shape: EpiShape | None) -> Batch:
-    everything = _joined([contested for contested, _ in parts])
-    truth = np.concatenate([truth for _, truth in parts])
-    return Batch(
-        features=torch.from_numpy(everything.features),
-        mask=torch.from_numpy(everything.mask),
-        colors=torch.from_numpy(linear_from_srgb(everything.colors)),
-        truth=torch.from_numpy(linear_from_srgb(truth)),
-        epi_shape=epi_shape,
-    )
+    features = torch.from_numpy(np.concatenate([part.contested.features for part in parts]))
+    mask = torch.from_numpy(np.concatenate([part.contested.mask for part in parts]))
+    colors = torch.from_numpy(linear_from_srgb(np.concatenate([part.votes for part in parts])))
+    truth = torch.from_numpy(linear_from_srgb(np.concatenate([part.truth for part in parts])))
+    return Batch(features, mask, colors, truth, epi_shape, _color_gain(features, mask, colors, truth))
+
+
+def _color_gain(features: Tensor, mask: Tensor, colors: Tensor, truth: Tensor) -> float:
+    """Makes scenes count alike, as they do in decibels: the closed form's error is what there is to gain.
+
+    Else the scenes with spoilt disparity, whose errors are a hundred times larger, would decide what T learns.
+    """
+    share = (features[..., SHARE] + 1e-6) * mask
+    closed_form = (share / share.sum(dim=1, keepdim=True))[..., None] * colors
+    return TYPICAL_ERROR / (float(color_loss(perceived(closed_form.sum(dim=1)), perceived(truth))) + LEAST_ERROR)

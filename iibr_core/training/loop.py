@@ -11,7 +11,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from math import cos, isfinite, pi
 from pathlib import Path
 from time import perf_counter
@@ -51,7 +51,7 @@ class Batch:
     features: (N, K, F), what the model sees. mask: (N, K) bool, True where there is a candidate; every ray should
     have one. colors: (N, K, 3), each candidate's vote in linear light, finite in empty slots too. truth: (N, 3), linear
     light; both are compared as `losses.perceived`. epi_shape: the first
-    E * V * W rays form EPIs (E, V, W) in this order, or None.
+    E * V * W rays form EPIs (E, V, W) in this order, or None. color_gain: factor on the colour loss of this batch.
     """
 
     features: Tensor
@@ -59,11 +59,12 @@ class Batch:
     colors: Tensor
     truth: Tensor
     epi_shape: EpiShape | None = None
+    color_gain: float = 1.0
 
     def to(self, device: torch.device) -> Batch:
         """The same batch on a device."""
         features, mask, colors, truth = (t.to(device) for t in (self.features, self.mask, self.colors, self.truth))
-        return Batch(features, mask, colors, truth, self.epi_shape)
+        return Batch(features, mask, colors, truth, self.epi_shape, self.color_gain)
 
 
 @dataclass(frozen=True)
@@ -212,7 +213,8 @@ class _Run:
         if weights.shape != batch.mask.shape:
             raise ValueError(f"the model gives weights {tuple(weights.shape)}, needed are {tuple(batch.mask.shape)}")
         rendered = perceived((weights[..., None] * batch.colors).sum(dim=1))
-        losses = total_loss(rendered, perceived(batch.truth), weights, batch.epi_shape, self.config.lambdas)
+        lambdas = replace(self.config.lambdas, color=self.config.lambdas.color * batch.color_gain)
+        losses = total_loss(rendered, perceived(batch.truth), weights, batch.epi_shape, lambdas)
         losses.total.backward()
         gradients = [parameter.grad for parameter in self.parameters if parameter.grad is not None]
         norm = nn.utils.get_total_norm(gradients).to(losses.total)

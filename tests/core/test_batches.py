@@ -3,7 +3,8 @@ import pytest
 import torch
 
 from iibr_core.contested import FEATURES, HYPOTHESES
-from iibr_core.ray_transformer import RayTransformer, TrainedTransformer
+from iibr_core.ray_transformer import RayTransformer
+from iibr_core.ray_weights import TrainedWeights
 from iibr_core.training import batches
 from iibr_core.training.batches import training_batch
 from iibr_core.training.loop import TrainConfig, train
@@ -46,16 +47,17 @@ def test_truth_lies_within_reach_of_the_hypotheses():
 def test_training_lowers_the_loss_of_the_real_model(tmp_path):
     torch.manual_seed(0)
     model = RayTransformer()
-    held_out = [training_batch(1000 + k, seed=77) for k in range(4)]
+    few = [training_batch(k, seed=0) for k in range(1, 6)]
 
     def loss():
         with torch.no_grad():
-            rendered = [(model(b.features, b.mask)[..., None] * b.colors).sum(dim=1) for b in held_out]
-        return np.mean([color_loss(perceived(r), perceived(b.truth)).item() for r, b in zip(rendered, held_out)])
+            rendered = [(model(b.features, b.mask)[..., None] * b.colors).sum(dim=1) for b in few]
+        losses = [color_loss(perceived(r), perceived(b.truth)).item() for r, b in zip(rendered, few)]
+        return np.mean([b.color_gain * loss for b, loss in zip(few, losses)])
 
     before = loss()
     out = tmp_path / "t.safetensors"
-    config = TrainConfig(steps=50, learning_rate=1e-3, lambdas=LossWeights(entropy=0.05), device="cpu")
-    train(model, lambda step: training_batch(step, seed=0), config, out)
-    assert loss() < before
-    assert TrainedTransformer(out) is not None
+    config = TrainConfig(steps=50, learning_rate=3e-3, lambdas=LossWeights(entropy=0.05), device="cpu")
+    train(model, lambda step: few[step % len(few)], config, out)
+    assert loss() < 0.97 * before
+    assert TrainedWeights(out) is not None

@@ -1,12 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from iibr_core.candidates import find_candidates
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.contested import FEATURES, HYPOTHESES, SHARE, Contested, decide, find_contested
-from iibr_core.occlusion import occlusion_mask
+from iibr_core.contested import FEATURES, HYPOTHESES, LEAST_VOTE, PLAIN, SHARE, Contested, decide, find_contested, votes
+from iibr_core.formats.weights_file import save_weights
+from iibr_core.lookup import look_up_colors
 from iibr_core.ray_transformer import RayTransformer
+from iibr_core.ray_weights import TrainedWeights
 from iibr_core.rays import RaySet
 from iibr_core.synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.types import ViewOffset
@@ -17,6 +21,7 @@ OFFSET = ViewOffset(0.0, 2.0)
 
 
 def contested_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
+    """(contested rays, closed-form weights, ray set)."""
     rays = rays_of_photo(photo.pixels, disparity, 2.0, 0)
     if not fringe:  # which pixels are mixed is a matter of colour
         rays = RaySet(1, photo.size, 0.25)
@@ -24,24 +29,25 @@ def contested_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
     height = photo.size[0]
     candidates = find_candidates(rays, offset, (0, height))
     weights = closed_form_weights(candidates)
-    return find_contested(rays, candidates, weights, (0, height), occlusion_mask(weights), every), weights
+    shown = look_up_colors(rays, candidates, weights)[1:]
+    return find_contested(rays, candidates, weights, shown, (0, height), every), weights, rays
 
 
 def test_only_rays_near_depth_edges_are_contested():
     photo, disparity = square_before_wall()
-    contested, _ = contested_of(photo, disparity.values)
+    contested, _, _ = contested_of(photo, disparity.values)
     y, x = contested.pixel.T
     assert 0 < len(y) < 0.4 * disparity.values.size
     assert not ((y < 14) | (y > 45) | (x < 15) | (x > 60)).any()
-    flat, _ = contested_of(photo, np.zeros_like(disparity.values))
+    flat, _, _ = contested_of(photo, np.zeros_like(disparity.values))
     assert len(flat.pixel) == 0
-    everything, _ = contested_of(photo, np.zeros_like(disparity.values), every=True)
+    everything, _, _ = contested_of(photo, np.zeros_like(disparity.values), every=True)
     assert len(everything.pixel) == disparity.values.size
 
 
 def test_hypotheses_are_the_surfaces_around_and_differ():
     photo, disparity = square_before_wall()
-    contested, weights = contested_of(photo, disparity.values)
+    contested, weights, _ = contested_of(photo, disparity.values)
     shares = contested.features[..., SHARE]
     at = tuple(contested.pixel.T)
     assert shares.sum(axis=1) == pytest.approx(np.minimum(weights.sum(axis=0), 1)[at], abs=0.05)
@@ -54,12 +60,12 @@ def test_features_know_no_colour_and_no_place():
     """The same geometry in other colours, or elsewhere in the photo: the same features."""
     photo, disparity = square_before_wall()
     other = photo_of(np.roll(smooth_texture(*photo.size, seed=9), 3, axis=0))
-    here, _ = contested_of(photo, disparity.values, fringe=False)
-    recoloured, _ = contested_of(other, disparity.values, fringe=False)
+    here, _, _ = contested_of(photo, disparity.values, fringe=False)
+    recoloured, _, _ = contested_of(other, disparity.values, fringe=False)
     assert (here.features == recoloured.features).all()
     assert (here.pixel == recoloured.pixel).all()
     down, right = 4, -5
-    moved, _ = contested_of(photo, np.roll(disparity.values, (down, right), axis=(0, 1)), fringe=False)
+    moved, _, _ = contested_of(photo, np.roll(disparity.values, (down, right), axis=(0, 1)), fringe=False)
     assert (moved.pixel == here.pixel + np.array([down, right])).all()
     assert moved.features == pytest.approx(here.features, abs=1e-5)
 
@@ -69,23 +75,21 @@ def test_features_are_finite_for_wild_disparity(wild):
     photo, disparity = square_before_wall()
     values = disparity.values.copy()
     values[25:30, 30:40] = wild
-    contested, _ = contested_of(photo, values)
+    contested, _, rays = contested_of(photo, values)
     assert np.isfinite(contested.features).all()
     assert np.abs(contested.features).max() < 20
-    assert np.isfinite(contested.colors).all()
+    assert np.isfinite(votes(rays, contested)).all()
 
 
 def random_contested(rays=200, seed=0):
     random = np.random.default_rng(seed)
-    mask = random.random((rays, HYPOTHESES)) < 0.7
-    mask[:, 0] = True
     return Contested(
+        OFFSET,
         np.zeros((rays, 2), np.int64),
-        mask,
+        np.arange(HYPOTHESES) < random.integers(1, HYPOTHESES + 1, rays)[:, None],
         random.normal(size=(rays, HYPOTHESES)).astype(np.float32),
         random.integers(0, 3, (rays, HYPOTHESES)).astype(np.uint8),
         random.uniform(-3, 3, (rays, HYPOTHESES, FEATURES)).astype(np.float32),
-        random.uniform(0, 1, (rays, HYPOTHESES, 3)).astype(np.float32),
     )
 
 
@@ -113,7 +117,7 @@ def test_weights_sum_to_one_over_hypotheses_in_use():
 
 def test_the_order_of_hypotheses_does_not_matter():
     contested, model = random_contested(), trained()
-    order = np.array([3, 0, 4, 1, 2])
+    order = np.array([3, 0, 4, 1, 5, 2])
     assert weights_of(model, contested, order) == pytest.approx(weights_of(model, contested)[:, order], abs=1e-5)
 
 
@@ -142,15 +146,37 @@ def test_bfloat16_agrees_within_its_precision():
     assert np.abs(rough.detach().float().numpy() - exact).mean() < 0.02
 
 
-def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
+def test_compiled_weights_are_those_of_the_model(tmp_path):
+    """`ray_weights` against torch, for numbers of rays that fill blocks and do not."""
+    model, path = trained(), tmp_path / "weights.safetensors"
+    save_weights(model, path)
+    compiled = TrainedWeights(path)
+    for rays in (1, 63, 64, 200):
+        contested = random_contested(rays)
+        assert compiled(contested) == pytest.approx(weights_of(model, contested), abs=1e-5)
+
+
+def test_weights_of_a_ray_do_not_depend_on_the_others(tmp_path):
+    path = tmp_path / "weights.safetensors"
+    save_weights(trained(), path)
     contested = random_contested()
-    weights = weights_of(trained(), contested)
-    colors, disparity, source = decide(contested, weights)
-    linear = (weights[..., None] * linear_from_srgb(contested.colors)).sum(axis=1)
+    part = replace(contested, mask=contested.mask[37:], features=contested.features[37:])
+    assert (TrainedWeights(path)(contested)[37:] == TrainedWeights(path)(part)).all()
+
+
+def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
+    photo, disparity = square_before_wall()
+    contested, _, rays = contested_of(photo, disparity.values)
+    random = np.random.default_rng(0)
+    weights = random.uniform(0.01, 1, contested.mask.shape).astype(np.float32) * contested.mask
+    weights /= weights.sum(axis=1, keepdims=True)
+    colors, disparities, source = decide(rays, contested, weights)
+    kept = np.where(weights > LEAST_VOTE, weights, 0)
+    linear = (kept[..., None] * linear_from_srgb(votes(rays, contested))).sum(axis=1) / kept.sum(axis=1)[:, None]
     assert colors == pytest.approx(srgb_from_linear(linear), abs=1e-4)
-    heaviest = weights.argmax(axis=1)
-    assert (disparity == contested.disparity[np.arange(200), heaviest]).all()
-    assert (source == contested.source[np.arange(200), heaviest]).all()
+    at = np.arange(len(weights)), weights.argmax(axis=1)
+    assert (disparities == contested.disparity[at]).all()
+    assert (source == contested.source[at] % PLAIN).all()
 
 
 def test_a_transformer_that_repeats_the_closed_form_changes_nothing():

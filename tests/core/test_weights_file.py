@@ -1,6 +1,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import save
@@ -20,7 +21,7 @@ def values(model):
 
 
 def same(one, other):
-    return one.keys() == other.keys() and all(torch.equal(one[name], other[name]) for name in one)
+    return one.keys() == other.keys() and all(np.array_equal(one[name], other[name]) for name in one)
 
 
 def refused(path, match, model=None):
@@ -58,7 +59,7 @@ def test_the_file_may_be_replaced_or_removed_while_its_weights_are_in_use(tmp_pa
     model = small_model()
     save_weights(model, path)
     tensors, _ = read_weights(path)
-    before = {name: tensor.clone() for name, tensor in tensors.items()}
+    before = {name: array.copy() for name, array in tensors.items()}
     path.write_bytes(b"\0" * path.stat().st_size)
     path.unlink()
     assert same(tensors, before)

@@ -83,8 +83,8 @@ def test_quality_says_where_the_transformer_runs(
     from iibr_core.formats.photo import read_photo
 
     disparity = photo_path.with_name("scene_disparity.npy")
-    rough = np.random.default_rng(0).uniform(0, 0.6, (HEIGHT, WIDTH)).astype(np.float32)
-    np.save(disparity, np.load(disparity) + rough)  # enough for hypotheses to differ, too little to be contested
+    slope = 0.15 * np.abs(np.arange(WIDTH) % 24 - 12)
+    np.save(disparity, np.load(disparity) + slope)  # enough for hypotheses to differ, too little to be contested
     made, shown = {}, {}
     for quality in ("fast", "balanced", "exact"):
         out, image = tmp_path / quality, tmp_path / f"{quality}.png"
@@ -130,6 +130,32 @@ def test_screenshot_writes_an_image_of_the_size_asked_for(
     assert read_photo(out).size == (HEIGHT, WIDTH)
     assert run(monkeypatch, "screenshot", photo_path, *options, "--ui", "--size", "700x500", "-o", out) == 0
     assert read_photo(out).size == (500, 700)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_like_repeats_a_saved_picture_exactly_but_for_what_is_given(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, suffix: str
+) -> None:
+    from iibr_core.formats.photo import read_photo
+
+    first, again, other = (tmp_path / f"{name}{suffix}" for name in ("first", "again", "other"))
+    options = ("--grid", 3, "--view", "-1,0.5", "--focus", "-0.5", "--aperture", 2, "--depth-strength", 1.5)
+    assert run(monkeypatch, "screenshot", photo_path, *options, "--size", "150x100", "-o", first) == 0
+    assert run(monkeypatch, "screenshot", photo_path, "--like", first, "-o", again) == 0
+    np.testing.assert_array_equal(read_photo(again).pixels, read_photo(first).pixels)
+    assert run(monkeypatch, "screenshot", photo_path, "--like", first, "--aperture", 0, "-o", other) == 0
+    assert read_photo(other).size == (100, 150)
+    assert (read_photo(other).pixels != read_photo(first).pixels).any()
+
+
+def test_like_a_picture_without_settings_is_one_line_and_writes_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    for like in (photo_path, tmp_path / "gone.png"):
+        assert run(monkeypatch, "screenshot", photo_path, "--like", like, "-o", tmp_path / "out.png") == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"iibr: {like}: ")
+    assert not (tmp_path / "out.png").exists()
 
 
 def test_plan_says_what_and_why(
