@@ -153,7 +153,8 @@ def main() -> None:
     open_views(renderer, grid, views, centre)
 
     def ours(eye_s: float) -> None:
-        renderer.render(Optics(ViewOffset(0.0, eye_s), focus, 2 * args.radius), size_px)
+        eye = ViewOffset(0.0, eye_s)
+        renderer.render(Optics(eye, focus_disparity=focus, aperture_diameter=2 * args.radius), size_px)
 
     plain = plain_pass(gl.ctx, grid, views, size_px, args.radius, focus)
     times: dict[str, list[float]] = {}

@@ -1,38 +1,91 @@
 #version 330 core
-// Light through the aperture: the mean over its views, sheared to the focus plane.
-// LAYERS: keep light apart by defocus (layers.glsl). DETOURS: some views are missing and others stand in for them.
+// Light through the aperture: the weighted sum over its samples, each sheared to the focus plane.
+// DETOURS: other views stand in for those wanted. TILES: tiles without a layer's content skip it, and where all is
+// sharp few samples suffice.
 #include "samples.glsl"
 #include "layers.glsl"
 
-uniform float share;  // of this pass in the picture; the rest comes from the pinhole pass
+uniform float share;     // of this pass in the picture; the rest comes from the pinhole pass
+#ifdef TILES
+uniform sampler2D tiles; // see defocus_tiles.frag
+#ifndef BLURRED
+uniform int few_count;   // the first samples that suffice where all is sharp
+uniform float few_up_to_px;
+#endif
+#endif
 
 in vec2 uv;
 
-void main() {
-    vec4 sum = vec4(0.0);
-#ifdef LAYERS
-    vec4 front = vec4(0.0), back = vec4(0.0);
-#endif
-    for (int i = 0; i < sample_count; i++) {
-        vec4 wanted = samples[i];
-        vec2 at = uv + wanted.xy;
+// Where sample i reads (xy) in which layer (z), and its weight, next to nothing where it knows nothing.
+vec3 place_of(int i, float focus, inout float weight) {
+    vec4 wanted = samples[i];
+    vec3 place = vec3(uv - focus * wanted.xy / view_size_px, wanted.z);
 #ifdef DETOURS
-        at = detoured(at, wanted, detours[i]);
+    Answer answer = answer_of(i, uv);
+    vec3 found = detoured(uv, wanted.xy, answer, focus);
+    place = vec3(found.xy, answer.layer);
+    weight *= found.z;
 #endif
-        vec4 light = linear_from_stored(textureLod(colors, vec3(at, wanted.z), 0.0));
-        vec4 weighted = vec4(light.rgb, 1.0) * (wanted.w * in_picture(at));
-        sum += weighted;
-#ifdef LAYERS
-        vec2 shares = layer_shares(light.a);
-        front += shares.x * weighted;
-        back += shares.y * weighted;
-#endif
-    }
-    float scale = share / sum.a;
-#ifdef LAYERS
-    in_front = scale * front;
-    behind = scale * back;
-    sum -= front + back;
-#endif
-    in_focus = scale * sum;
+    weight *= in_picture(place.xy) * barrel_share(wanted.xy, uv);
+    return place;
 }
+
+#ifdef BLURRED
+void main() {
+    float focus = focus_at(uv);
+    vec2 line = blur_from_depth(focus);
+    vec4 front = vec4(0.0), back = vec4(0.0);
+    float all = 0.0;
+    bool is_empty = false;
+#ifdef TILES
+    vec2 widest = texelFetch(tiles, ivec2(uv * vec2(textureSize(tiles, 0))), 0).xy;
+    is_empty = max(widest.x, widest.y) <= sharp_up_to_px.x;
+#endif
+    for (int i = 0; i < (is_empty ? sample_count : 0); i++) {
+        float weight = samples[i].w;
+        place_of(i, focus, weight);
+        all += weight;
+    }
+    for (int i = 0; i < (is_empty ? 0 : sample_count); i++) {
+        float weight = samples[i].w;
+        vec3 place = place_of(i, focus, weight);
+        all += weight;
+        vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
+        float blur = blur_beyond_range(light.a * line.x + line.y);
+        vec4 weighted = vec4(light.rgb, 1.0) * (weight - weight * sharpness(blur));
+        front += blur > 0.0 ? weighted : vec4(0.0);
+        back += blur > 0.0 ? vec4(0.0) : weighted;
+    }
+    in_front = share * front;
+    behind = share * back;
+    weights = vec4(all, front.a, 0.0, 0.0) * share;
+}
+#else
+void main() {
+    float focus = focus_at(uv);
+    int count = sample_count;
+#ifdef TILES
+    vec3 tile = texelFetch(tiles, ivec2(uv * vec2(textureSize(tiles, 0))), 0).xyz;
+    bool few = max(tile.x, tile.y) < few_up_to_px;
+    if (few) count = few_count;
+    if (tile.z >= sharp_up_to_px.y) count = 0;
+#endif
+#ifdef SHARP
+    vec2 line = blur_from_depth(focus);
+#endif
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < count; i++) {
+        float weight = samples[i].w;
+#ifdef TILES
+        if (few) weight = detours[i].w;
+#endif
+        vec3 place = place_of(i, focus, weight);
+        vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
+#ifdef SHARP
+        weight *= sharpness(blur_beyond_range(light.a * line.x + line.y));
+#endif
+        sum += weight * vec4(light.rgb, 1.0);
+    }
+    in_focus = share * sum;
+}
+#endif

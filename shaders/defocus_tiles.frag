@@ -1,27 +1,41 @@
 #version 330 core
-// Per tile of the picture: the widest blur in front of the focus plane (x) and behind it (y), output px.
+// Per tile of the picture: the widest blur in front of the focus plane (x) and behind it (y), and the least of all (z),
+// in output px from one sample to the next.
 // DETOURS: see aperture.frag.
 #include "samples.glsl"
 
-uniform vec2 defocus_px_from_depth;  // see layers.glsl
-uniform vec2 tile_uv;                // extent of a tile in texture coordinates
-uniform int taps;                    // across a tile, per sample
+uniform sampler2DArray blocks;  // least and greatest disparity of squares of the views
+uniform float block_px;
+uniform float blur_px;          // see layers.glsl
+uniform vec2 tile_uv;           // extent of a tile in texture coordinates
+uniform int taps;               // across a tile, at least 2, so close that no block is left out
 
-in vec2 uv;
-out vec2 width_px;
+out vec4 width_px;
+
+vec2 disparities_at(int i, vec2 place, float focus) {
+    vec3 at = vec3(place - focus * samples[i].xy / view_size_px, samples[i].z);
+#ifdef DETOURS
+    Answer answer = answer_of(i, place);
+    at = vec3(detoured(place, samples[i].xy, answer, focus).xy, answer.layer);
+#endif
+    ivec2 block = ivec2(at.xy * view_size_px / block_px);
+    return texelFetch(blocks, ivec3(clamp(block, ivec2(0), textureSize(blocks, 0).xy - 1), at.z + 0.5), 0).rg;
+}
 
 void main() {
+    vec2 corner = floor(gl_FragCoord.xy) * tile_uv;
     vec2 widest = vec2(0.0);
-    for (int i = 0; i < sample_count; i++)
-        for (int k = 0; k < taps * taps; k++) {
-            vec2 within = (vec2(k % taps, k / taps) + 0.5) / float(taps) - 0.5;
-            vec2 at = uv + within * tile_uv + samples[i].xy;
-#ifdef DETOURS
-            at = detoured(at, samples[i], detours[i]);
-#endif
-            float depth = textureLod(colors, vec3(at, samples[i].z), 0.0).a;
-            float width = depth * defocus_px_from_depth.x + defocus_px_from_depth.y;
-            widest = max(widest, vec2(width, -width));
+    float least = 1e6;
+    for (int y = 0; y < taps; y++)
+        for (int x = 0; x < taps; x++) {
+            vec2 place = corner + vec2(x, y) / float(taps - 1) * tile_uv;
+            float focus = focus_at(place);
+            for (int i = 0; i < sample_count; i++) {
+                vec2 beside = disparities_at(i, place, focus) - focus;
+                beside -= clamp(beside, -focus_range, focus_range);
+                widest = max(widest, vec2(beside.y, -beside.x));
+                least = min(least, max(beside.x, -beside.y));
+            }
         }
-    width_px = widest;
+    width_px = vec4(blur_px * widest, blur_px * max(least, 0.0), 0.0);
 }

@@ -2,7 +2,8 @@
 // Linear light to the screen: layers put together, exposure, sRGB, and the flip from row 0 first to GL's bottom up.
 uniform sampler2D focus_layer;
 #ifdef LAYERS
-uniform sampler2D back_layer, smooth_front, smooth_back;
+uniform sampler2D weights;  // r: of all layers, g: of the foreground
+uniform sampler2D smooth_front, smooth_back;
 #endif
 uniform float exposure;  // factor
 
@@ -13,13 +14,15 @@ out vec4 color;
 // In-focus and smoothed background share what the smoothed foreground leaves free; where either is unknown (deep inside
 // the foreground) the foreground's own colour stands in.
 vec3 composed(vec2 at) {
-    vec4 front = textureLod(smooth_front, at, 0.0), back = textureLod(smooth_back, at, 0.0);
-    vec4 focus = textureLod(focus_layer, at, 0.0);
-    float back_share = textureLod(back_layer, at, 0.0).a;
-    float unknown = 1e-3 * front.a;
-    vec3 beyond = focus.rgb + back_share * back.rgb / max(back.a, 1e-4) + 1e-3 * front.rgb;
-    beyond /= max(focus.a + back_share + unknown, 1e-6);
-    return front.rgb + max(1.0 - front.a, 0.0) * beyond;
+    vec2 half_at = at + 0.5 / vec2(textureSize(focus_layer, 0));  // see fullscreen.vert
+    vec4 front = textureLod(smooth_front, half_at, 0.0), back = textureLod(smooth_back, half_at, 0.0);
+    vec4 focus = texelFetch(focus_layer, ivec2(at * vec2(textureSize(focus_layer, 0))), 0);
+    vec2 weight = textureLod(weights, half_at, 0.0).rg;
+    float total = max(weight.r, 1e-9);
+    float back_weight = max(total - focus.a - weight.g, 0.0);
+    float back_scale = back_weight / max(back.a, 1e-4 * total);
+    vec4 beyond = focus + back_scale * back + 1e-3 * front;
+    return mix(beyond.rgb / max(beyond.a, 1e-9), front.rgb / max(front.a, 1e-9), min(front.a / total, 1.0));
 }
 #endif
 
@@ -33,7 +36,8 @@ void main() {
 #ifdef LAYERS
     vec3 light = composed(at);
 #else
-    vec3 light = textureLod(focus_layer, at, 0.0).rgb;
+    vec4 sum = texelFetch(focus_layer, ivec2(at * vec2(textureSize(focus_layer, 0))), 0);
+    vec3 light = sum.rgb / max(sum.a, 1e-12);
 #endif
     color = vec4(srgb_from_linear(clamp(light * exposure, 0.0, 1.0)), 1.0);
 }

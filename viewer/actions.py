@@ -1,33 +1,124 @@
-"""What the user and the worker can do to the state: typed actions, and `apply`, the only place where it changes."""
+"""What the user and the worker can do to the state: typed records. `viewer.apply` says what each of them changes."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from iibr_core.types import GridShape, ViewOffset
-from viewer.state import AppState, Notice, Optics, Progress, Scene, Source
+from iibr_core.types import ViewOffset
+from viewer.presets import PresetName
+from viewer.state import (
+    ApertureShape,
+    ChoiceOf,
+    DrawReport,
+    Hover,
+    LoopKind,
+    Notice,
+    Progress,
+    Prompt,
+    SavedSettings,
+    Scene,
+    Section,
+    Source,
+    Task,
+    Theme,
+)
 
-EYE_MARGIN_VIEWS = 0.5
-"""How far the viewpoint may leave the grid of views."""
-
-EXPOSURE_LIMIT_STOPS = 6.0
-DEPTH_STRENGTH_LIMIT = 4.0
-NOTICES_KEPT = 5
+# The viewpoint
 
 
 @dataclass(frozen=True)
 class MoveEye:
-    """Put the viewpoint at this view offset (clamped to the grid and a little beyond)."""
+    """Put the viewpoint at this view offset (clamped to the grid and a margin beyond)."""
 
     eye: ViewOffset
 
 
 @dataclass(frozen=True)
+class SetDolly:
+    """Step forward (positive) or back; see `Optics.dolly`."""
+
+    dolly: float
+
+
+@dataclass(frozen=True)
+class ReturnHome:
+    """Glide back to the middle viewpoint; the click that began the double click no longer counts."""
+
+
+@dataclass(frozen=True)
+class SetLoop:
+    """Move the viewpoint along this path, over and over; None stops it where it is."""
+
+    kind: LoopKind | None
+
+
+@dataclass(frozen=True)
+class SetSpeed:
+    """Speed of loops, turns per second."""
+
+    turns_per_second: float
+
+
+@dataclass(frozen=True)
+class PauseMotion:
+    """Hold the motion, or let it go on."""
+
+    is_paused: bool
+
+
+@dataclass(frozen=True)
+class Tick:
+    """The clock shows this many seconds: a motion goes on."""
+
+    now_s: float
+
+
+# Focus, aperture, light
+
+
+@dataclass(frozen=True)
 class SetFocus:
-    """Focus on this field disparity (px per view step)."""
+    """Focus on this field disparity (px per view step), in the middle of the picture."""
 
     disparity: float
+
+
+@dataclass(frozen=True)
+class FocusOn:
+    """What was clicked at this place (-1..1, see focal_plane) with this disparity becomes sharp."""
+
+    place: tuple[float, float]
+    disparity: float
+
+
+@dataclass(frozen=True)
+class SetFocusRange:
+    """Everything within this much disparity around the focus is sharp."""
+
+    disparity: float
+
+
+@dataclass(frozen=True)
+class SetTilt:
+    """Tilt the plane of focus; see `Optics.focus_tilt`."""
+
+    tilt: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ShowTiltHandles:
+    """Show or hide the two handles over the picture."""
+
+    is_shown: bool
+
+
+@dataclass(frozen=True)
+class MoveTiltHandle:
+    """Drag a handle (0 or 1) to this place, over this disparity; None where nothing is known there."""
+
+    index: int
+    place: tuple[float, float]
+    disparity: float | None
 
 
 @dataclass(frozen=True)
@@ -35,6 +126,20 @@ class SetAperture:
     """Open the aperture to this diameter in view steps."""
 
     diameter: float
+
+
+@dataclass(frozen=True)
+class SetApertureShape:
+    """Give the opening this shape."""
+
+    shape: ApertureShape
+
+
+@dataclass(frozen=True)
+class SetHighlightRecovery:
+    """Let clipped pixels count for more: 0..1."""
+
+    amount: float
 
 
 @dataclass(frozen=True)
@@ -53,8 +158,40 @@ class SetDepthStrength:
 
 
 @dataclass(frozen=True)
+class ApplyPreset:
+    """Set focus and aperture for a purpose."""
+
+    name: PresetName
+
+
+@dataclass(frozen=True)
 class ResetOptics:
     """Back to the centre viewpoint, the planned focus plane, a pinhole and the photo's exposure."""
+
+
+@dataclass(frozen=True)
+class TakeSettings:
+    """Take over the settings a picture was saved with; they are made to fit the open scene."""
+
+    settings: SavedSettings
+
+
+@dataclass(frozen=True)
+class EndGesture:
+    """The pointer went down or up: the next edit is another one, for undo."""
+
+
+@dataclass(frozen=True)
+class Undo:
+    """Take the last edit back."""
+
+
+@dataclass(frozen=True)
+class Redo:
+    """Do again what was taken back last."""
+
+
+# Files and the worker
 
 
 @dataclass(frozen=True)
@@ -62,6 +199,16 @@ class OpenPath:
     """Open a photo or a light-field folder instead of the present scene."""
 
     source: Source
+
+
+@dataclass(frozen=True)
+class StopWork:
+    """Make no more views; those that are there stay."""
+
+
+@dataclass(frozen=True)
+class ResumeWork:
+    """Make the views again that were stopped."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +221,11 @@ class SceneOpened:
 
 @dataclass(frozen=True)
 class ProgressMade:
-    """The worker of this generation came further."""
+    """The worker of this generation came further. view: index (row, column) of the one just made."""
 
     generation: int
     progress: Progress
+    view: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -86,6 +234,61 @@ class OpenFailed:
 
     generation: int
     message: str
+
+
+@dataclass(frozen=True)
+class WorkerLost:
+    """The worker's thread ended unasked."""
+
+
+@dataclass(frozen=True)
+class DoTask:
+    """Ask this of the outside world."""
+
+    task: Task
+
+
+@dataclass(frozen=True)
+class TaskTaken:
+    """The loop has taken this task up."""
+
+    task: Task
+
+
+@dataclass(frozen=True)
+class PictureDrawn:
+    """The picture was drawn, and this is known of it."""
+
+    report: DrawReport
+
+
+# Prompts, notices, preferences
+
+
+@dataclass(frozen=True)
+class ShowPrompt:
+    """Show this prompt in place of any other, or as the user has edited it; None closes it."""
+
+    prompt: Prompt | None
+
+
+@dataclass(frozen=True)
+class AskForPath:
+    """Ask for a file in the window, for the system has no dialog."""
+
+    what: ChoiceOf
+
+
+@dataclass(frozen=True)
+class AskToSave:
+    """Ask where to save the picture."""
+
+
+@dataclass(frozen=True)
+class SetHover:
+    """The pointer is here in the picture; None where it is not in it."""
+
+    hover: Hover | None
 
 
 @dataclass(frozen=True)
@@ -103,139 +306,82 @@ class DismissNotice:
 
 
 @dataclass(frozen=True)
+class SetTheme:
+    """Light or dark."""
+
+    theme: Theme
+
+
+@dataclass(frozen=True)
+class SetFontScale:
+    """Size of text and widgets, 1 = usual."""
+
+    scale: float
+
+
+@dataclass(frozen=True)
+class ToggleSection:
+    """Open or close a section of the panel."""
+
+    section: Section
+
+
+@dataclass(frozen=True)
+class PlaceWindow:
+    """The window is here: x, y, width, height in screen units."""
+
+    place: tuple[int, int, int, int]
+
+
+@dataclass(frozen=True)
 class Quit:
     """Close the window."""
 
 
-Action = (
+OpticsEdit = (
     MoveEye
+    | SetDolly
     | SetFocus
+    | FocusOn
+    | SetFocusRange
+    | SetTilt
+    | MoveTiltHandle
     | SetAperture
+    | SetApertureShape
+    | SetHighlightRecovery
     | SetExposure
-    | SetDepthStrength
+    | ApplyPreset
     | ResetOptics
+)
+"""Edits of the optics alone."""
+
+MotionEdit = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
+WorkerNews = SceneOpened | ProgressMade | OpenFailed
+SettingsEdit = SetTheme | SetFontScale | ToggleSection | PlaceWindow
+
+Action = (
+    OpticsEdit
+    | MotionEdit
+    | WorkerNews
+    | SettingsEdit
+    | ShowTiltHandles
+    | SetDepthStrength
+    | TakeSettings
+    | EndGesture
+    | Undo
+    | Redo
     | OpenPath
-    | SceneOpened
-    | ProgressMade
-    | OpenFailed
+    | StopWork
+    | ResumeWork
+    | WorkerLost
+    | PictureDrawn
+    | DoTask
+    | TaskTaken
+    | ShowPrompt
+    | AskForPath
+    | AskToSave
+    | SetHover
     | Notify
     | DismissNotice
     | Quit
 )
-
-
-def apply(state: AppState, action: Action) -> AppState:
-    """The state after an action. Pure; values that are not finite leave the state as it is, others are clamped."""
-    match action:
-        case MoveEye() | SetFocus() | SetAperture() | SetExposure() | ResetOptics():
-            return replace(state, optics=_edited_optics(state.optics, state.scene, action))
-        case SetDepthStrength():
-            return _depth_strength_set(state, action)
-        case OpenPath(source):
-            progress = Progress(doing=f"reading {source.path}")
-            return replace(state, source=source, progress=progress, generation=state.generation + 1)
-        case SceneOpened(generation) | ProgressMade(generation) | OpenFailed(generation):
-            return _heard_from_worker(state, action) if generation == state.generation else state
-        case Notify(notice):
-            return _noticed(state, notice)
-        case DismissNotice(notice):
-            return replace(state, notices=tuple(other for other in state.notices if other != notice))
-        case Quit():
-            return replace(state, should_quit=True)
-
-
-def clamped_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:
-    """The nearest viewpoint within the grid and `EYE_MARGIN_VIEWS` beyond it."""
-    row, column = grid.centre
-    t = _clamped(eye.t, -row - EYE_MARGIN_VIEWS, grid.rows - 1 - row + EYE_MARGIN_VIEWS)
-    s = _clamped(eye.s, -column - EYE_MARGIN_VIEWS, grid.columns - 1 - column + EYE_MARGIN_VIEWS)
-    return ViewOffset(t, s)
-
-
-def focus_limits(scene: Scene) -> tuple[float, float]:
-    """Least and greatest focus disparity worth setting: the scene's range and a tenth more on both sides."""
-    near_and_far = (*scene.disparity_range_px, 0.0)
-    margin = 0.1 * (max(near_and_far) - min(near_and_far)) or 0.1
-    return min(near_and_far) - margin, max(near_and_far) + margin
-
-
-def aperture_limit(grid: GridShape) -> float:
-    """The widest aperture in view steps: the whole grid; 0 where there is a single view."""
-    return float(max(grid) if max(grid) > 1 else 0)
-
-
-def _edited_optics(optics: Optics, scene: Scene | None, action: Action) -> Optics:
-    if scene is None:
-        return optics
-    match action:
-        case MoveEye(eye) if all(map(math.isfinite, eye)):
-            return replace(optics, eye=clamped_eye(eye, scene.grid))
-        case SetFocus(disparity) if math.isfinite(disparity):
-            return replace(optics, focus_disparity=_clamped(disparity, *focus_limits(scene)))
-        case SetAperture(diameter) if math.isfinite(diameter):
-            return replace(optics, aperture_diameter=_clamped(diameter, 0.0, aperture_limit(scene.grid)))
-        case SetExposure(stops) if math.isfinite(stops):
-            return replace(optics, exposure_stops=_clamped(stops, -EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS))
-        case ResetOptics():
-            return Optics()
-    return optics
-
-
-def _depth_strength_set(state: AppState, action: SetDepthStrength) -> AppState:
-    if not math.isfinite(action.strength):
-        return state
-    strength = _clamped(action.strength, 0.0, DEPTH_STRENGTH_LIMIT)
-    restarts = action.is_finished and state.source is not None
-    return replace(state, depth_strength=strength, generation=state.generation + restarts)
-
-
-def _heard_from_worker(state: AppState, action: Action) -> AppState:
-    match action:
-        case SceneOpened(_, scene):
-            is_new = (
-                state.scene is None or state.scene.source is not scene.source
-            )  # the same file, opened again, is new
-            notices = tuple(Notice(note) for note in scene.notes)[-NOTICES_KEPT:] if is_new else state.notices
-            optics = _carried_optics(state.optics, state.scene, scene)
-            progress = Progress(doing="making views")
-            return replace(state, scene=scene, optics=optics, notices=notices, progress=progress)
-        case ProgressMade(_, progress):
-            return replace(state, progress=progress)
-        case OpenFailed(_, message):
-            return _failed(state, message)
-    return state
-
-
-def _failed(state: AppState, message: str) -> AppState:
-    """Say why. Where another scene was open before, the program returns to it: its views may not all have been made."""
-    state = replace(_noticed(state, Notice(message, is_error=True)), progress=Progress())
-    if state.scene is None or state.scene.source is state.source:
-        return state
-    return replace(state, source=state.scene.source, generation=state.generation + 1)
-
-
-def _clamped(value: float, low: float, high: float) -> float:
-    return min(max(value, low), high)
-
-
-def _noticed(state: AppState, notice: Notice) -> AppState:
-    others = tuple(other for other in state.notices if other != notice)
-    return replace(state, notices=(*others, notice)[-NOTICES_KEPT:])
-
-
-def _carried_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
-    """The optics that show a newly planned scene as it was seen before; a scene not seen before starts afresh."""
-    if old is None or old.source is not new.source or old.plan is None or new.plan is None:
-        return Optics()
-    eye = ViewOffset(*(x * _steps(b) / _steps(a) for x, a, b in zip(optics.eye, old.grid, new.grid)))
-    ratio = new.plan.disparity_scale / old.plan.disparity_scale if old.plan.disparity_scale else 0.0
-    # (given - zero) * scale, for the given disparity that was in focus
-    focus = (
-        optics.focus_disparity * ratio + (old.plan.disparity_zero - new.plan.disparity_zero) * new.plan.disparity_scale
-    )
-    aperture = min(optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0]), aperture_limit(new.grid))
-    return replace(optics, eye=clamped_eye(eye, new.grid), focus_disparity=focus, aperture_diameter=aperture)
-
-
-def _steps(views: int) -> int:
-    return max(views - 1, 1)

@@ -2,24 +2,56 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 from iibr_core.types import InputError
-from viewer.actions import Action, OpenFailed, OpenPath, ProgressMade, Quit, SceneOpened, apply
+from viewer.actions import (
+    Action,
+    Notify,
+    OpenFailed,
+    OpenPath,
+    PictureDrawn,
+    PlaceWindow,
+    ProgressMade,
+    Quit,
+    SceneOpened,
+    Tick,
+    WorkerLost,
+)
+from viewer.apply import apply
+from viewer.errands import Errands
 from viewer.gpu.context import create_for_window
-from viewer.input import actions_from_drop, actions_from_keys, actions_from_pointer, read_keys, read_pointer
+from viewer.input import (
+    Pointer,
+    actions_from_drop,
+    actions_from_hover,
+    actions_from_keys,
+    actions_from_pointer,
+    gesture_end,
+    gesture_start,
+    read_keys,
+    read_pointer,
+)
+from viewer.kept import keep, with_kept
 from viewer.layout import Layout, layout_of
 from viewer.stage import VIEW_REFRESH_S, Stage
-from viewer.state import AppState, Picture
+from viewer.state import AppState, Notice, Picture
 from viewer.ui.host import UiHost
 from viewer.ui.screen import build_screen
+from viewer.ui.style import Look
 from viewer.window import Window, wake
 from viewer.worker import Request, Result, SceneReady, ViewReady, Worker
 
 UPLOAD_BUDGET_S = 0.006
 IDLE_WAIT_S = 1.0
 """Nothing is expected to happen unannounced; this only bounds the harm of a lost wake-up."""
+
+MOTION_FRAME_S = 1 / 60
+DIALOG_LOOK_S = 0.1
+"""How often an open file dialog is asked for its answer."""
 
 SETTLING_FRAMES = 3
 """ImGui hands out quick events over several frames and lays out in two: so many must look the same before a sleep."""
@@ -29,31 +61,40 @@ EMPTY = AppState()
 
 @dataclass(frozen=True)
 class Frame:
-    """Everything the window shows: the picture, the panels (as a digest), where they lie, and repairs asked for."""
+    """Everything the window shows: picture, panels (as a digest), where they lie, their look, repairs asked for."""
 
     picture: Picture | None
     panels: bytes
     layout: Layout
+    look: Look
     damages: int
 
 
 class App:
     """The viewer: one window, one worker. state changes only through `apply`; frames_shown counts what was shown."""
 
-    def __init__(self, state: AppState = EMPTY) -> None:
-        """Open the window. Raises InputError where that cannot be."""
-        self.state = state
+    def __init__(self, state: AppState = EMPTY, kept_in: Path | None = None) -> None:
+        """Open the window. kept_in: folder of preferences and recent files; None keeps nothing.
+
+        Raises InputError where no window can be opened.
+        """
+        self.state = with_kept(state, kept_in) if kept_in else state
         self.frames_shown = 0
-        self.window = Window("iibr")
+        self.window = Window("iibr", self.state.preferences.window)
         try:
             self._gl = create_for_window(self.window.handle)
         except InputError:
             self.window.close()
             raise
         self.stage = Stage(self._gl)
-        self._ui = UiHost(self.window.ui_scale, self.window.handle)
+        self._ui = UiHost(self.look(), self.window.handle)
         self._worker = Worker(wake)
+        self._errands = Errands(self.stage)
+        self._kept_in = kept_in
+        self._kept_recent = self.state.recent
         self._submitted = 0
+        self._stopped: int | None = None
+        self._stepped_at = 0.0
         self._shown: Frame | None = None
         self._same_frames = 0
         self._is_busy = True
@@ -66,43 +107,75 @@ class App:
     def step(self) -> None:
         """One turn of the loop; sleeps first where nothing was going on in the last ones."""
         self.window.poll(self.wait_s)
-        heard = self._drained() + self._dropped()
-        self._do(heard)
+        heard = self._drained() + self._dropped() + self._happened()
+        self.do(*heard)
         self._is_busy = self.stage.upload(UPLOAD_BUDGET_S) or bool(heard)
-        layout = self.layout()
+        layout, look = self.layout(), self.look()
         picture = self.stage.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
-        self._ui.begin(layout)
-        actions = build_screen(self.state, layout, self.stage.texture if picture else None) + self._input(layout)
-        self._show(Frame(picture, self._ui.end(), layout, self.window.damages))
-        self._do(actions)
+        if picture and self.stage.report != self.state.report:
+            self.do(PictureDrawn(self.stage.report))
+        self._ui.begin(layout, look)
+        pointer = read_pointer()
+        actions = gesture_start(pointer, self.state)
+        actions += build_screen(self.state, layout, self.stage.texture if picture else None)
+        actions += self._input(pointer, layout)
+        self._show(Frame(picture, self._ui.end(), layout, look, self.window.damages))
+        self.do(*actions)
         self._is_busy |= bool(actions)
-        self._restart_worker()
+        self._direct_worker()
+        self._keep_recent()
 
     @property
     def wait_s(self) -> float:
         """How long the next turn may sleep before it looks."""
+        if self.state.motion.is_running:
+            return max(self._stepped_at + MOTION_FRAME_S - time.perf_counter(), 0.0)
         if self._is_busy or self._same_frames < SETTLING_FRAMES:
             return 0.0
+        if self._errands.is_waiting:
+            return DIALOG_LOOK_S
         return IDLE_WAIT_S if self.stage.shows_all_views() else VIEW_REFRESH_S
 
     def layout(self) -> Layout:
         """Where things lie in the window as it is now."""
         scene = self.state.scene
         size = (scene.width, scene.height) if scene else None
-        return layout_of(self.window.size, size, self.window.pixel_ratio, self.window.ui_scale)
+        return layout_of(self.window.size, size, self.window.pixel_ratio, self.look().ui_scale)
+
+    def look(self) -> Look:
+        """Theme, and size of text and widgets on this display."""
+        preferences = self.state.preferences
+        return Look(self.window.ui_scale * preferences.font_scale, preferences.theme)
 
     def close(self) -> None:
-        """Stop the worker and free everything."""
+        """Stop the worker, keep what is kept, and free everything."""
         self._worker.close()
+        self._keep()
         self._ui.release()
         self.stage.release()
         self._gl.release()
         self.window.close()
 
-    def _do(self, actions: list[Action]) -> None:
+    def do(self, *actions: Action) -> None:
+        """Change the state. What follows from it may take a few frames to be seen, see SETTLING_FRAMES."""
+        if actions:
+            self._same_frames = 0
         for action in actions:
             self.state = apply(self.state, action)
         self._worker.eye = self.state.optics.eye
+
+    def _happened(self) -> list[Action]:
+        """What neither user nor worker says: the clock, errands done, the window moved, the worker lost."""
+        self._stepped_at = time.perf_counter()
+        actions = self._errands.run(self.state)
+        if self.state.motion.is_running:
+            actions.append(Tick(self._stepped_at))
+        place = self.window.place
+        if place is not None and place != self.state.preferences.window:
+            actions.append(PlaceWindow(place))
+        if self._worker.is_lost and self.state.stopped != self.state.generation == self._submitted:
+            actions.append(WorkerLost())
+        return actions
 
     def _drained(self) -> list[Action]:
         """The worker's results, as actions; the one place where they arrive."""
@@ -119,7 +192,8 @@ class App:
                 return [SceneOpened(result.generation, result.scene)]
             if isinstance(result, ViewReady):
                 self.stage.add(result.view)
-                return [ProgressMade(result.generation, result.progress)]
+                view = result.view.row, result.view.column
+                return [ProgressMade(result.generation, result.progress, view)]
         except InputError as error:  # no room on the graphics card: there is no use in more views
             self._worker.cancel()
             return [OpenFailed(result.generation, str(error))]
@@ -129,20 +203,39 @@ class App:
         paths = self.window.take_dropped()
         return actions_from_drop(paths, self.state) if paths else []
 
-    def _input(self, layout: Layout) -> list[Action]:
+    def _input(self, pointer: Pointer, layout: Layout) -> list[Action]:
         pick = partial(self.stage.pick, self.state.optics.eye)
-        actions = actions_from_pointer(read_pointer(), layout, self.state, pick)
+        actions = actions_from_pointer(pointer, layout, self.state, pick)
+        actions += actions_from_hover(pointer, layout, self.state, pick)
         actions += actions_from_keys(read_keys(), self.state)
+        actions += gesture_end(pointer)
         return [*actions, Quit()] if self.window.should_close else actions
 
-    def _restart_worker(self) -> None:
-        """A new generation is a new job. The photo is read again only if a file was opened since."""
+    def _direct_worker(self) -> None:
+        """A new generation is a new job, a stopped one is cancelled. The photo is read again only if one was opened."""
+        if self.state.stopped == self.state.generation != self._stopped:
+            self._worker.cancel()
+            self._stopped = self.state.stopped
         if self.state.generation == self._submitted or self.state.source is None:
             return
         scene = self.state.scene
         loaded = self.stage.loaded if scene and scene.source is self.state.source else None
         self._submitted = self.state.generation
         self._worker.submit(Request(self.state.generation, self.state.source, self.state.depth_strength, loaded))
+
+    def _keep_recent(self) -> None:
+        """At once: they are what one misses after a crash."""
+        if self.state.recent != self._kept_recent:
+            self._kept_recent = self.state.recent
+            self._keep()
+
+    def _keep(self) -> None:
+        if self._kept_in is None:
+            return
+        try:
+            keep(self.state, self._kept_in)
+        except InputError as error:
+            self.do(Notify(Notice(str(error), is_error=True)))
 
     def _show(self, frame: Frame) -> None:
         if frame == self._shown or not all(self.window.framebuffer_size):
@@ -155,9 +248,9 @@ class App:
         self.frames_shown += 1
 
 
-def run(state: AppState) -> None:
+def run(state: AppState, kept_in: Path | None = None) -> None:
     """Open the window on this state and show it until the user quits. Raises InputError where none can be opened."""
-    app = App(state)
+    app = App(state, kept_in)
     try:
         app.run()
     finally:

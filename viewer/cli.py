@@ -16,6 +16,7 @@ from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 from viewer.options import (
     Size,
     finite_from_text,
+    given_options,
     grid_from_text,
     memory_from_text,
     quality_from_text,
@@ -137,14 +138,14 @@ def view(
 
     Example: iibr view holiday.jpg --disparity holiday.pfm
     """
-    source = _source(
-        path or _demo_photo(), disparity, disparity_scale, grid, focus_disparity, max_pixels, memory, quality
-    )
+    path = path.absolute() if path else _demo_photo()
+    source = _source(path, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory, quality)
     _require_existing(source)
     from viewer.actions import OpenPath
     from viewer.app import opening, run
+    from viewer.kept import user_folder
 
-    run(opening(OpenPath(source), depth_strength))
+    run(opening(OpenPath(source), depth_strength), user_folder())
 
 
 @app.command()
@@ -191,14 +192,25 @@ def generate(
 
 @app.command()
 def screenshot(
+    context: typer.Context,
     path: Scene,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Image to write (.png, .exr).")],
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A picture saved before: take its settings, except for those given here.",
+            show_default=False,
+        ),
+    ] = None,
     view: Annotated[
-        ViewOffset,
-        typer.Option(parser=view_from_text, metavar="S,T", help="Viewpoint in view steps, right and down."),
-    ] = "0,0",  # type: ignore[assignment]
-    focus: Annotated[float, _number("Disparity that is sharp, px per view step (the panel's Focus).")] = 0.0,
-    aperture: Annotated[float, _number("Aperture diameter in view steps.")] = 0.0,
+        ViewOffset | None,
+        typer.Option(
+            parser=view_from_text, metavar="S,T", help="Viewpoint in view steps, right and down.", show_default="0,0"
+        ),
+    ] = None,
+    focus: Annotated[float | None, _number("Disparity that is sharp, px per view step (the panel's Focus).")] = None,
+    aperture: Annotated[float | None, _number("Aperture diameter in view steps.")] = None,
     size: Annotated[
         Size | None,
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
@@ -214,25 +226,40 @@ def screenshot(
     memory: Memory = None,
     quality: QualityChoice = "fast",
 ) -> None:
-    """Render one picture without a display.
+    """Render one picture without a display; its settings are saved in it.
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
     source = _source(path, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory, quality)
     _require_existing(source)
     from iibr_core.formats.photo import write_image
-    from viewer.actions import MoveEye, SetAperture, SetFocus
+    from viewer.actions import Action, MoveEye, SetAperture, SetFocus, TakeSettings
     from viewer.headless import HeadlessViewer
+    from viewer.saved_settings import decided_like, read_settings
+    from viewer.saving import write_picture
 
+    actions: list[Action] = []
+    if like is not None:
+        saved, given = read_settings(like), given_options(context)
+        source = decided_like(source, saved, given)
+        size = size or (None if ui else Size(*saved.size_px))
+        depth_strength = depth_strength if "depth_strength" in given else saved.depth_strength
+        actions.append(TakeSettings(saved))
+    actions += [] if view is None else [MoveEye(view)]
+    actions += [] if focus is None else [SetFocus(focus)]
+    actions += [] if aperture is None else [SetAperture(aperture)]
     with HeadlessViewer(backend.value) as viewer:
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
         with _progress_shown("reading") as show:
             viewer.open(source, depth_strength, lambda progress: show(progress.done, progress.total))
         _print_notes(viewer.state.scene.notes if viewer.state.scene else ())
-        viewer.do(MoveEye(view), SetFocus(focus), SetAperture(aperture))
+        viewer.do(*actions)
         pixels = viewer.screen(size or DEMO_SIZE) if ui else viewer.picture(size)
-    write_image(output, pixels)
+    if ui:
+        write_image(output, pixels)
+    else:
+        write_picture(output, pixels, viewer.state, (pixels.shape[1], pixels.shape[0]))
     print(output)
 
 
@@ -276,7 +303,7 @@ def train(
 ) -> None:
     """Train the ray transformer on made-up scenes. Ctrl-C saves, --resume goes on; a log lies beside the weights.
 
-    Example: iibr train --steps 3800 --learning-rate 2e-3 --out weights.safetensors
+    Example: iibr train --steps 2200 --learning-rate 3e-3 --out weights.safetensors
     """
     from viewer.train_command import train_weights
 
@@ -291,11 +318,12 @@ def demo() -> None:
     """
     from viewer.actions import OpenPath
     from viewer.app import App, opening
+    from viewer.kept import user_folder
     from viewer.state import Source
 
     source = Source(str(_demo_photo()))
     try:
-        window = App(opening(OpenPath(source)))
+        window = App(opening(OpenPath(source)), user_folder())
     except InputError as error:
         print(f"{error}. Rendering without one.")
         _demo_pictures(source)

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.types import ViewOffset
-from viewer.actions import MoveEye, ResetOptics, SetAperture, SetFocus, aperture_limit
+from viewer.actions import MoveEye, ResetOptics, SetAperture, SetFocus
 from viewer.headless import HeadlessViewer
+from viewer.limits import aperture_limit
 
 TILE_WIDTH = 480
 GAP = 8

@@ -8,14 +8,15 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.actions import Action, OpenPath, ProgressMade, SceneOpened, apply
+from viewer.actions import Action, OpenPath, ProgressMade, SceneOpened
+from viewer.apply import apply
 from viewer.gpu.context import Backend, create_headless
 from viewer.layout import Layout, Rect, layout_of, letterboxed
 from viewer.stage import Stage
 from viewer.state import CENTRE, AppState, Progress, Source
 from viewer.ui.host import UiHost
 from viewer.ui.screen import build_screen
-from viewer.ui.style import BACKGROUND
+from viewer.ui.style import BACKGROUND, Look
 from viewer.worker import Request, SceneReady, results_of
 
 LAYOUT_FRAMES = 3
@@ -56,7 +57,7 @@ class HeadlessViewer:
                 self.do(SceneOpened(result.generation, result.scene))
             else:
                 self._stage.add(result.view)
-                self.do(ProgressMade(result.generation, result.progress))
+                self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
                 on_progress(result.progress)
             self._stage.upload_all()
 
@@ -77,21 +78,22 @@ class HeadlessViewer:
         image[:] = np.round(np.array(BACKGROUND[:3]) * 255)
         assert layout.picture_px is not None
         x, y, box_width, box_height = layout.picture_px
-        self._stage.draw(self.state, (box_width, box_height))
+        self._stage.converge(self.state, (box_width, box_height))
         image[y : y + box_height, x : x + box_width] = self._stage.renderer.read_image()[..., :3]
         return image
 
     def screen(self, size: tuple[int, int]) -> NDArray[np.uint8]:
         """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
-        scene = self.state.scene
-        layout = layout_of(size, (scene.width, scene.height) if scene else None)
-        has_picture = layout.picture_px and self._stage.draw(self.state, layout.picture_px[2:])
+        scene, preferences = self.state.scene, self.state.preferences
+        look = Look(preferences.font_scale, preferences.theme)
+        layout = layout_of(size, (scene.width, scene.height) if scene else None, ui_scale=look.ui_scale)
+        has_picture = layout.picture_px and self._stage.converge(self.state, layout.picture_px[2:])
         texture = self._stage.texture if has_picture else None
         target = self._gl.ctx.simple_framebuffer(size, 4)
-        ui = UiHost(ui_scale=1.0)
+        ui = UiHost(look)
         try:
             for _ in range(LAYOUT_FRAMES):
-                ui.begin(layout)
+                ui.begin(layout, look)
                 build_screen(self.state, layout, texture)
                 ui.end()
                 target.use()

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from iibr_core.types import ViewOffset
-from viewer.actions import Action, MoveEye, OpenPath, Quit, ResetOptics, SetFocus, focus_limits
-from viewer.layout import Layout, pixel_at
-from viewer.state import CENTRE, AppState, Scene, Source
+from viewer.actions import (
+    Action,
+    EndGesture,
+    FocusOn,
+    MoveEye,
+    MoveTiltHandle,
+    OpenPath,
+    Quit,
+    ReturnHome,
+    SetFocus,
+    SetHover,
+    ShowPrompt,
+)
+from viewer.commands import BY_NAME, COMMANDS, Chord
+from viewer.focal_plane import handle_points, place_of
+from viewer.layout import Layout, Rect, pixel_at
+from viewer.limits import focus_limits
+from viewer.state import CENTRE, AppState, Hover, Scene, Source
 
 DRAG_THRESHOLD = 4.0
 """A press that moved farther than this (window units) is a drag, not a click."""
@@ -21,6 +37,9 @@ FOCUS_STEPS = 40
 """Notches of the wheel from the nearest focus to the farthest."""
 
 ARROW_STEP_VIEWS = 0.5
+HANDLE_REACH = 14.0
+"""A press this close to a tilt handle (window units at usual size) takes it."""
+
 DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
 
 
@@ -36,6 +55,7 @@ class Pointer:
     pressed_x: float = 0.0
     pressed_y: float = 0.0
     is_down: bool = False
+    is_pressed: bool = False
     is_released: bool = False
     clicks: int = 0
     wheel: float = 0.0
@@ -44,11 +64,11 @@ class Pointer:
 
 @dataclass(frozen=True)
 class Keys:
-    """The keys of this frame that mean something: arrows as a view offset, and the two commands."""
+    """The keys of this frame that mean something: arrows as a view offset, Esc, and commands by name."""
 
     arrows: ViewOffset = CENTRE
-    is_reset: bool = False
-    is_quit: bool = False
+    is_escape: bool = False
+    commands: tuple[str, ...] = ()
 
 
 Pick = Callable[[float, float], float | None]
@@ -66,22 +86,43 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     if not picture.contains(pointer.pressed_x, pointer.pressed_y):
         return []
     if pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD:
-        return _drag(pointer, layout, scene, state.optics.eye)
+        return _drag(pointer, layout, state, scene, picture, pick)
     if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
         if pointer.clicks > 1:
-            return [ResetOptics()]
-        picked = pick(*pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y))
-        return [] if picked is None else [SetFocus(picked)]
+            return [ReturnHome()]
+        at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        picked = pick(*at)
+        return [] if picked is None else [FocusOn(place_of(*at, scene), picked)]
     return []
 
 
+def gesture_start(pointer: Pointer, state: AppState) -> list[Action]:
+    """What a press ends: more of the same kind is another edit from here on. Goes before the frame's edits."""
+    return [EndGesture()] if pointer.is_pressed and state.history.gesture else []
+
+
+def gesture_end(pointer: Pointer) -> list[Action]:
+    """What letting go ends. Goes after the frame's edits."""
+    return [EndGesture()] if pointer.is_released else []
+
+
+def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
+    """Tell where the pointer is in the picture, if that is news. While it drags it points at nothing."""
+    scene, picture = state.scene, layout.picture
+    hover = None
+    is_pointing = not pointer.is_over_panel and not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD)
+    if scene is not None and picture is not None and is_pointing and picture.contains(pointer.x, pointer.y):
+        x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        hover = Hover(x_px, y_px, pick(x_px, y_px))
+    return [SetHover(hover)] if hover != state.hover else []
+
+
 def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
-    """What the keys ask for."""
+    """What the keys ask for. Esc closes what is open in the window first."""
     actions: list[Action] = []
-    if keys.is_quit:
-        actions.append(Quit())
-    if keys.is_reset:
-        actions.append(ResetOptics())
+    if keys.is_escape:
+        actions.append(Quit() if state.prompt is None else ShowPrompt(None))
+    actions += [BY_NAME[name].action(state) for name in keys.commands]
     if any(keys.arrows):
         eye = state.optics.eye
         step = ARROW_STEP_VIEWS
@@ -102,7 +143,28 @@ def actions_from_drop(paths: Sequence[str], state: AppState) -> list[Action]:
     return [OpenPath(Source(path)) for path in maps[:1]]
 
 
-def _drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -> list[Action]:
+def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:
+    """A tilt handle where one was taken, else the viewpoint."""
+    index = _taken_handle(pointer, layout, state, picture)
+    if index is not None:
+        at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        return [MoveTiltHandle(index, place_of(*at, scene), pick(*at))]
+    return _eye_drag(pointer, layout, scene, state.optics.eye)
+
+
+def _taken_handle(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> int | None:
+    """Which tilt handle is dragged: the one taken already, else the nearer one the press was close to."""
+    handles = state.tilt_handles
+    if handles is None:
+        return None
+    if handles.taken is not None:
+        return handles.taken
+    distances = [math.hypot(x - pointer.pressed_x, y - pointer.pressed_y) for x, y in handle_points(handles, picture)]
+    nearest = distances.index(min(distances))
+    return nearest if distances[nearest] <= HANDLE_REACH * layout.ui_scale else None
+
+
+def _eye_drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -> list[Action]:
     """Content follows the hand: a point of disparity d goes d px left for a step right, so the eye goes against it."""
     if not (pointer.step_x or pointer.step_y):
         return []
@@ -136,6 +198,7 @@ def read_pointer() -> Pointer:
         pressed_x=io.mouse_pos.x - moved.x,
         pressed_y=io.mouse_pos.y - moved.y,
         is_down=bool(io.mouse_down[0]),
+        is_pressed=bool(io.mouse_clicked[0]),
         is_released=bool(io.mouse_released[0]),
         clicks=int(io.mouse_clicked_last_count[0]),
         wheel=io.mouse_wheel,
@@ -154,7 +217,12 @@ def read_keys() -> Keys:
     def pressed(key: imgui.Key) -> bool:
         return imgui.is_key_pressed(key)
 
+    def is_struck(chord: Chord) -> bool:
+        holds = bool(io.key_ctrl or io.key_super) == chord.ctrl and bool(io.key_shift) == chord.shift
+        return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key))
+
     down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
     right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
-    is_quit = pressed(imgui.Key.escape) or (io.key_ctrl and pressed(imgui.Key.q))
-    return Keys(ViewOffset(float(down), float(right)), pressed(imgui.Key.r), is_quit)
+    commands = tuple(command.name for command in COMMANDS if any(map(is_struck, command.chords)))
+    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False))
+    return Keys(ViewOffset(float(down), float(right)), is_escape, commands)

@@ -69,6 +69,13 @@ def finite_from_text(text: str) -> float:
     return value
 
 
+def given_options(context: typer.Context) -> set[str]:
+    """Names of the options that were given rather than left at their defaults, as fields of `Source` where they are."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    names = {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
+    return names | {"memory_bytes"} if "memory" in names else names
+
+
 def memory_from_text(text: str) -> int:
     """Bytes from "2G", "500M" or "1000000". Raises BadParameter."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)

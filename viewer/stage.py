@@ -14,11 +14,14 @@ from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.renderer import Renderer
 from viewer.picking import is_kept_for_picking, pick_disparity
-from viewer.state import AppState, Picture, Scene
+from viewer.state import AppState, DrawReport, Picture, Scene
 from viewer.worker import Loaded, SceneReady
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
+
+NO_MORE_VIEWS_S = 2.0
+"""After so long without a new view none is thought to be on its way."""
 
 WAITING_VIEWS = 4
 PREVIEW_GRID = GridShape(1, 1)
@@ -31,6 +34,7 @@ class Stage:
     """
 
     def __init__(self, gl: GLContext) -> None:
+        self._gl = gl
         self.renderer = Renderer(gl)
         self.generation = 0
         self.loaded: Loaded | None = None
@@ -42,6 +46,7 @@ class Stage:
         self._disparities: dict[ViewOffset, FloatImage] = {}
         self._drawn: Picture | None = None
         self._drawn_at = 0.0
+        self._view_came_at = 0.0
 
     def open(self, ready: SceneReady) -> None:
         """Show this scene from now on. Raises InputError where it does not fit the graphics card; the old one stays.
@@ -68,6 +73,7 @@ class Stage:
             self.renderer.upload_view(*scene.grid.centre, self._preview.colors, self._preview.disparity)
             self._preview = None
         self._waiting.append(view)
+        self._view_came_at = time.perf_counter()
         self._keep_for_picking(scene, view)
 
     @property
@@ -105,12 +111,32 @@ class Stage:
         if self.views_present == 0:
             return None
         wanted = Picture(self.generation, self.views_present, state.optics, size_px)
-        if wanted == self._drawn or self._can_wait(wanted):
-            return self._drawn
-        self.renderer.render(wanted.optics, wanted.size_px)
-        self._drawn, self._drawn_at = wanted, time.perf_counter()
-        self.pictures_drawn += 1
-        return wanted
+        budget_s = self._gl.frame_budget_s
+        if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
+            self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s)
+            self._drawn_at = time.perf_counter()
+            self.pictures_drawn += 1
+            self._drawn = replace(wanted, samples=self.report.samples)
+        elif self._is_same(wanted) and not self.renderer.is_converged and self._refines():
+            self.renderer.refine(budget_s)
+            self._drawn = replace(wanted, samples=self._drawn.samples + 1)
+        return self._drawn
+
+    def converge(self, state: AppState, size_px: tuple[int, int]) -> Picture | None:
+        """Like `draw`, with every sample the picture will ever get, however long that takes."""
+        if self.draw(state, size_px) is not None:
+            self.renderer.refine()
+        return self._drawn
+
+    @property
+    def note(self) -> str:
+        """What of the scene the graphics card has no room for, a sentence for people; empty where it holds all."""
+        return self.renderer.note
+
+    @property
+    def report(self) -> DrawReport:
+        """What is known of the picture drawn last."""
+        return self.renderer.report
 
     def shows_all_views(self) -> bool:
         """Whether the picture last drawn knows every view uploaded."""
@@ -127,7 +153,17 @@ class Stage:
         """Whether only views are new, and the picture is too."""
         if self._drawn is None or time.perf_counter() - self._drawn_at >= VIEW_REFRESH_S:
             return False
-        return replace(wanted, views_present=self._drawn.views_present) == self._drawn
+        return replace(wanted, views_present=self._drawn.views_present, samples=self._drawn.samples) == self._drawn
+
+    def _is_same(self, wanted: Picture) -> bool:
+        """Whether the picture drawn last is this one, however far it has come."""
+        return self._drawn is not None and replace(wanted, samples=self._drawn.samples) == self._drawn
+
+    def _refines(self) -> bool:
+        """While views are being made, the processor has better things to do."""
+        scene = self._scene
+        has_all = scene is not None and self.views_present == scene.grid.rows * scene.grid.columns
+        return has_all or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
 
     def release(self) -> None:
         """Free the GL objects."""

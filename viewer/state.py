@@ -6,6 +6,7 @@ Comparing two records decides what an edit costs: a new `generation` restarts th
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from iibr_core.plan import ScenePlan
 from iibr_core.types import GridShape, Quality, ViewOffset
@@ -13,17 +14,57 @@ from iibr_core.types import GridShape, Quality, ViewOffset
 CENTRE = ViewOffset(0.0, 0.0)
 
 
+ApertureKind = Literal["disc", "polygon", "ring", "cat_eye", "mask"]
+APERTURE_KINDS: tuple[ApertureKind, ...] = ("disc", "polygon", "ring", "cat_eye", "mask")
+
+
+@dataclass(frozen=True)
+class ApertureMask:
+    """A small grey image as aperture: rows x columns values of one byte each, row 0 on top, 255 = open."""
+
+    name: str
+    rows: int
+    columns: int
+    values: bytes
+
+
+@dataclass(frozen=True)
+class ApertureShape:
+    """The opening, within a circle of the aperture's diameter.
+
+    blades: corners of the polygon, 3 to 11. rotation_deg: turns polygon and mask clockwise. ring_inner: radius of the
+    ring's blocked middle as a share of the opening's. cat_eye: 0..1, how much of the opening the lens barrel cuts off
+    in the picture's corners. mask: None unless kind is "mask".
+    """
+
+    kind: ApertureKind = "disc"
+    blades: int = 6
+    rotation_deg: float = 0.0
+    ring_inner: float = 0.5
+    cat_eye: float = 0.5
+    mask: ApertureMask | None = None
+
+
 @dataclass(frozen=True)
 class Optics:
     """What the virtual camera does.
 
-    eye: viewpoint in view steps (t down, s right). focus_disparity: the field disparity that is sharp (px per
-    view step). aperture_diameter: in view steps, 0 = pinhole. exposure_stops: brightness as a power of two.
+    eye: viewpoint in view steps (t down, s right). dolly: how far forward, as the view steps by which the rays at the
+    left and right border of the picture then cross the grid farther out. focus_disparity: the field disparity that is
+    sharp in the middle of the picture (px per view step). focus_range: everything within this much disparity around it
+    is sharp. focus_tilt: change of the sharp disparity from the picture's middle to its right and to its lower border.
+    aperture_diameter: in view steps, 0 = pinhole. highlight_recovery: 0..1, how much brighter than white clipped
+    pixels count. exposure_stops: brightness as a power of two.
     """
 
     eye: ViewOffset = CENTRE
+    dolly: float = 0.0
     focus_disparity: float = 0.0
+    focus_range: float = 0.0
+    focus_tilt: tuple[float, float] = (0.0, 0.0)
     aperture_diameter: float = 0.0
+    aperture_shape: ApertureShape = ApertureShape()
+    highlight_recovery: float = 0.0
     exposure_stops: float = 0.0
 
 
@@ -49,7 +90,9 @@ class Source:
 class Scene:
     """What is open: a photo with its plan, or a light field from disk (plan None).
 
-    has_view_disparity: whether every view comes with its own disparity.
+    has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
+    not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
+    file was saved with by this program, "" without.
     """
 
     source: Source
@@ -63,6 +106,9 @@ class Scene:
     has_view_disparity: bool = True
     plan: ScenePlan | None = None
     notes: tuple[str, ...] = ()
+    focal_px: float | None = None
+    subject_disparity_px: float = 0.0
+    settings: str = ""
 
 
 @dataclass(frozen=True)
@@ -76,16 +122,185 @@ class Progress:
 
 
 @dataclass(frozen=True)
+class SavedSettings:
+    """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height)."""
+
+    optics: Optics
+    depth_strength: float
+    source: Source
+    size_px: tuple[int, int]
+
+
+@dataclass(frozen=True)
 class Notice:
-    """A message the user can dismiss."""
+    """A message the user can dismiss. offer: settings that a button beside it takes over."""
 
     text: str
     is_error: bool = False
+    offer: SavedSettings | None = None
+
+
+LoopKind = Literal["circle", "eight", "swing"]
+LOOPS: tuple[LoopKind, ...] = ("circle", "eight", "swing")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A viewpoint that moves by itself; `viewer.motion` says along which path.
+
+    kind: None at rest. turns: of the path since it began at the viewpoint `start` (and its dolly). ticked_s: clock of
+    the last step, None before the first. speed, in turns per second, and is_paused outlast a change of kind.
+    """
+
+    kind: LoopKind | Literal["home"] | None = None
+    turns: float = 0.0
+    ticked_s: float | None = None
+    start: ViewOffset = CENTRE
+    start_dolly: float = 0.0
+    speed: float = 0.25
+    is_paused: bool = False
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the picture changes without anybody touching it."""
+        return self.kind is not None and not self.is_paused
+
+
+@dataclass(frozen=True)
+class Edit:
+    """What undo brings back."""
+
+    optics: Optics
+    depth_strength: float
+
+
+@dataclass(frozen=True)
+class History:
+    """Edits to go back to (the latest last) and forth to (the nearest first), in the units of the open scene.
+
+    last: the kind of the latest edit. gesture: that kind too while it is under way, "" after: more of the same belongs
+    to it until the pointer goes down or up.
+    """
+
+    past: tuple[Edit, ...] = ()
+    future: tuple[Edit, ...] = ()
+    last: str = ""
+    gesture: str = ""
+
+
+@dataclass(frozen=True)
+class Hover:
+    """Where the pointer is in the picture: pixels of it, and the disparity seen there (None where not known)."""
+
+    x_px: float
+    y_px: float
+    disparity: float | None
+
+
+@dataclass(frozen=True)
+class TiltHandles:
+    """Two places that the sharp plane is laid through, (x, y) from -1 to 1 across the picture, y down.
+
+    taken: which of them is being dragged.
+    """
+
+    first: tuple[float, float] = (-0.5, 0.4)
+    second: tuple[float, float] = (0.5, -0.4)
+    taken: int | None = None
+
+
+ChoiceOf = Literal["photo", "folder", "mask"]
+
+
+@dataclass(frozen=True)
+class PathPrompt:
+    """The question for a file, where the system has no file dialog."""
+
+    what: ChoiceOf
+    path: str = ""
+
+
+@dataclass(frozen=True)
+class SavePrompt:
+    """The question where to save the picture, and how large. already_there: such a file exists."""
+
+    path: str
+    size_px: tuple[int, int]
+    already_there: bool = False
+
+
+@dataclass(frozen=True)
+class PalettePrompt:
+    """The list of commands, narrowed down by what was typed."""
+
+    text: str = ""
+
+
+Prompt = PathPrompt | SavePrompt | PalettePrompt | Literal["help"]
+
+
+@dataclass(frozen=True)
+class ChooseTask:
+    """Let the user choose in the system's dialog."""
+
+    what: ChoiceOf
+
+
+@dataclass(frozen=True)
+class SaveTask:
+    """Write the picture. size_px: (width, height)."""
+
+    path: str
+    size_px: tuple[int, int]
+    may_replace: bool = False
+
+
+@dataclass(frozen=True)
+class ReadMaskTask:
+    """Read an aperture mask."""
+
+    path: str
+
+
+Task = ChooseTask | SaveTask | ReadMaskTask
+"""What the state asks of the outside world; the loop does it and says what came of it by an action."""
+
+Theme = Literal["dark", "light"]
+Section = Literal["view", "focus", "aperture", "light", "scene"]
+SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "scene")
+
+
+@dataclass(frozen=True)
+class Preferences:
+    """What outlasts the program. window: x, y, width, height in screen units, None before the first."""
+
+    theme: Theme = "dark"
+    font_scale: float = 1.0
+    open_sections: tuple[Section, ...] = ("view", "focus", "aperture", "light")
+    window: tuple[int, int, int, int] | None = None
+
+
+@dataclass(frozen=True)
+class DrawReport:
+    """What is known of the picture drawn last.
+
+    samples: drawn so far, of samples_converged. draw_ms: what the last drawing took. error: estimated root mean square
+    difference to the converged picture, 1 = white; None where it is not known.
+    """
+
+    samples: int = 0
+    samples_converged: int = 0
+    draw_ms: float = 0.0
+    error: float | None = None
 
 
 @dataclass(frozen=True)
 class AppState:
-    """Everything. source is what was asked for last, scene what is open; generation numbers the worker's jobs."""
+    """Everything. source is what was asked for last, scene what is open; generation numbers the worker's jobs.
+
+    views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
+    they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
+    """
 
     optics: Optics = field(default_factory=Optics)
     source: Source | None = None
@@ -95,13 +310,28 @@ class AppState:
     depth_strength: float = 1.0
     generation: int = 0
     should_quit: bool = False
+    views_there: frozenset[tuple[int, int]] = frozenset()
+    stopped: int | None = None
+    motion: Motion = Motion()
+    history: History = History()
+    hover: Hover | None = None
+    tilt_handles: TiltHandles | None = None
+    prompt: Prompt | None = None
+    tasks: tuple[Task, ...] = ()
+    preferences: Preferences = Preferences()
+    recent: tuple[str, ...] = ()
+    report: DrawReport | None = None
 
 
 @dataclass(frozen=True)
 class Picture:
-    """Everything the picture depends on: the scene's generation, the views present, the optics, its size in pixels."""
+    """Everything the picture depends on: the scene's generation, the views present, the optics, its size in pixels.
+
+    samples: how far it has come on its way to the converged picture.
+    """
 
     generation: int
     views_present: int
     optics: Optics
     size_px: tuple[int, int]
+    samples: int = 0

@@ -29,15 +29,19 @@ class Window:
     handle: GLFW's window. damages: how often the system asked for a redraw.
     """
 
-    def __init__(self, title: str) -> None:
-        """Open it. Raises InputError without a display or without OpenGL 3.3."""
+    def __init__(self, title: str, place: tuple[int, int, int, int] | None = None) -> None:
+        """Open it, at (x, y, width, height) if that is still on a screen. Raises InputError without a display or
+        without OpenGL 3.3.
+        """
         with warnings.catch_warnings(record=True) as reasons:
             warnings.simplefilter("always")
-            self.handle: Any = _open(title)
+            self.handle: Any = _open(title, place)
         if not self.handle:
             reason = "; ".join(_words_of(warning.message) for warning in reasons) or "GLFW gives no reason"
             glfw.terminate()
             raise InputError(f"no window can be opened ({reason}): `iibr screenshot` works without a display")
+        if place is not None and _is_on_a_screen(place):
+            glfw.set_window_pos(self.handle, place[0], place[1])
         self.damages = 0
         self._dropped: list[str] = []
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
@@ -50,6 +54,15 @@ class Window:
         """(width, height) in window units."""
         width, height = glfw.get_window_size(self.handle)
         return width, height
+
+    @property
+    def place(self) -> tuple[int, int, int, int] | None:
+        """(x, y, width, height) in screen units; None while it is minimised or fills the screen."""
+        is_hidden = glfw.get_window_attrib(self.handle, glfw.ICONIFIED)
+        if is_hidden or glfw.get_window_attrib(self.handle, glfw.MAXIMIZED):
+            return None
+        x, y = glfw.get_window_pos(self.handle)
+        return (x, y, *self.size)
 
     @property
     def framebuffer_size(self) -> tuple[int, int]:
@@ -101,6 +114,7 @@ class Window:
         """Close the window and GLFW with it."""
         glfw.destroy_window(self.handle)
         glfw.terminate()
+        self.handle = None
 
     def _on_damage(self, _: Any) -> None:
         self.damages += 1
@@ -111,7 +125,14 @@ def _words_of(warning: Warning | str) -> str:
     return str(warning).partition(" b'")[2].rstrip("'") or str(warning)
 
 
-def _open(title: str) -> Any:
+def _is_on_a_screen(place: tuple[int, int, int, int]) -> bool:
+    """Whether the middle of the upper edge, where one grips it, can be seen."""
+    x, y = place[0] + place[2] // 2, place[1]
+    areas = [glfw.get_monitor_workarea(monitor) for monitor in glfw.get_monitors()]
+    return any(left <= x < left + width and top <= y < top + height for left, top, width, height in areas)
+
+
+def _open(title: str, place: tuple[int, int, int, int] | None) -> Any:
     if not glfw.init():
         return None
     glfw.default_window_hints()
@@ -120,4 +141,5 @@ def _open(title: str) -> Any:
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
     glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
     glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
-    return glfw.create_window(*WINDOW_SIZE, title, None, None)
+    size = place[2:] if place is not None else WINDOW_SIZE
+    return glfw.create_window(*size, title, None, None)

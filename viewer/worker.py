@@ -11,13 +11,17 @@ import itertools
 import queue
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from iibr_core.color import stored_from_encoded
 from iibr_core.plan import PlanOverrides, ScenePlan, plan_for_viewing
 from iibr_core.types import Disparity, FloatImage, InputError, Photo, ViewOffset, ViewUpdate
+from viewer.saved_settings import settings_text_in
 from viewer.state import CENTRE, Progress, Scene, Source
 
 QUEUED_RESULTS = 8
@@ -31,10 +35,14 @@ POST_RETRY_S = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A photo as read and its disparity as given, kept so that another plan does not read them again."""
+    """A photo as read and its disparity as given, kept so that another plan does not read them again.
+
+    settings: text of the settings the photo was saved with by this program, "" without.
+    """
 
     photo: Photo
     disparity: Disparity
+    settings: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,20 +96,25 @@ class Worker:
     def __init__(self, wake: Callable[[], None], work: Work | None = None) -> None:
         self.eye = CENTRE
         """Where the user looks now; views near it are made first. Set by the window, read by the job."""
+        self.is_lost = False
+        """Whether the thread ended unasked. The next request starts another one."""
         self._wake = wake
         self._work = work or results_of
         self._results: queue.Queue[Result] = queue.Queue(QUEUED_RESULTS)
         self._changed = threading.Condition()
         self._wanted: Request | None = None
         self._is_closed = False
-        self._thread = threading.Thread(target=self._run, name="iibr-worker", daemon=True)
-        self._thread.start()
+        self._thread = self._started_thread()
 
     def submit(self, request: Request) -> None:
-        """Start this job; the one before it is cancelled."""
+        """Start this job; the one before it is cancelled. A lost thread is replaced."""
         with self._changed:
             self._wanted = request
             self._changed.notify()
+        if self.is_lost:
+            self._thread.join()
+            self.is_lost = False
+            self._thread = self._started_thread()
 
     def cancel(self) -> None:
         """Stop the present job; nothing more is heard of it."""
@@ -125,6 +138,19 @@ class Worker:
             self._is_closed = True
             self._changed.notify()
         self._thread.join()
+
+    def _started_thread(self) -> threading.Thread:
+        thread = threading.Thread(target=self._run_and_wake, name="iibr-worker", daemon=True)
+        thread.start()
+        return thread
+
+    def _run_and_wake(self) -> None:
+        try:
+            self._run()
+        except BaseException:  # the window says so and goes on; the trace is for whoever mends it
+            traceback.print_exc()
+            self.is_lost = True
+            self._wake()
 
     def _run(self) -> None:
         request: Request | None = None
@@ -189,7 +215,7 @@ def load(source: Source) -> Loaded:
     path = Path(source.path)
     photo = read_photo(path, source.max_pixels) if source.max_pixels else read_photo(path)
     explicit = Path(source.disparity_path) if source.disparity_path else None
-    return Loaded(photo, disparity_for(photo, path, explicit, source.disparity_scale))
+    return Loaded(photo, disparity_for(photo, path, explicit, source.disparity_scale), settings_text_in(path))
 
 
 def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
@@ -206,7 +232,24 @@ def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
         is_hdr=loaded.photo.is_hdr,
         plan=plan,
         notes=loaded.photo.notes + loaded.disparity.notes,
+        focal_px=_known_focal_px(loaded.photo),
+        subject_disparity_px=_middle(plan.field_disparity(loaded.disparity).values),
+        settings=loaded.settings,
     )
+
+
+def _known_focal_px(photo: Photo) -> float | None:
+    """None where the photo did not tell, and a usual field of view stands in."""
+    from iibr_core.formats.photo import focal_px_from_fov
+
+    return None if photo.focal_px == focal_px_from_fov(photo.size[1]) else photo.focal_px
+
+
+def _middle(disparity: FloatImage) -> float:
+    """The median of the middle ninth of the picture."""
+    height, width = disparity.shape
+    part = disparity[height // 3 : height - height // 3, width // 3 : width - width // 3]
+    return float(np.median(part))
 
 
 def _results_of_photo(
@@ -243,6 +286,7 @@ def _results_of_folder(request: Request, should_stop: Callable[[], bool]) -> Ite
         depth_source="light field" if first[0].disparity is not None else "none",
         is_hdr=header.is_hdr,
         has_view_disparity=all(view.disparity is not None for view in first),
+        subject_disparity_px=_middle(first[0].disparity) if first[0].disparity is not None else 0.0,
     )
     yield SceneReady(request.generation, scene, None, first[0])
     rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain(first, views))

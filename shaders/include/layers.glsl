@@ -1,15 +1,32 @@
-// Output of the passes that gather light. With LAYERS, light is kept in three layers by its defocus, so that each can be
-// smoothed by what lies between neighbouring views: in front of the focus plane, in focus, behind it. Premultiplied.
+// Output of the passes that gather light: sums weighted by alpha, which the last pass divides by. Light is kept in
+// three layers by its defocus, so that what is strongly defocused is gathered at half size and smoothed by what lies
+// between neighbouring samples. One program gathers what is sharp (SHARP), one the rest (BLURRED), one all (neither).
+#ifdef BLURRED
+layout(location = 0) out vec4 in_front;
+layout(location = 1) out vec4 behind;
+layout(location = 2) out vec4 weights;  // r: of all three layers, g: of what is in front
+#else
 layout(location = 0) out vec4 in_focus;
-#ifdef LAYERS
-layout(location = 1) out vec4 in_front;
-layout(location = 2) out vec4 behind;
-
-uniform vec2 defocus_px_from_depth;  // factor and offset: depth 0..1 (colors.a) to blur width in output px, > 0 in front
-
-// Shares of (front, behind) for a blur width; below one pixel nothing needs smoothing.
-vec2 layer_shares(float depth) {
-    float width_px = depth * defocus_px_from_depth.x + defocus_px_from_depth.y;
-    return clamp(vec2(width_px, -width_px) - 1.0, 0.0, 1.0);
-}
 #endif
+
+uniform float blur_px;         // output px that one px of disparity beside the focus moves from one sample to the next
+uniform vec2 sharp_up_to_px;   // blur where the sharp layer begins to fade, and where it ends
+
+// Blur for a depth of 0..1 (colors.a), in units of the fade: factor and offset. Positive in front of the focus.
+vec2 blur_from_depth(float focus) {
+    return blur_px * vec2(nearest - farthest, farthest - focus) / (sharp_up_to_px.y - sharp_up_to_px.x);
+}
+
+float blur_beyond_range(float blur) {
+#ifdef RANGE
+    float range = blur_px * focus_range / (sharp_up_to_px.y - sharp_up_to_px.x);
+    return blur - clamp(blur, -range, range);
+#else
+    return blur;
+#endif
+}
+
+// Share of the sharp layer.
+float sharpness(float blur) {
+    return clamp(sharp_up_to_px.y / (sharp_up_to_px.y - sharp_up_to_px.x) - abs(blur), 0.0, 1.0);
+}

@@ -6,7 +6,7 @@ import ctypes
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
 EGL_DRAW, EGL_READ = 0x3059, 0x305A
+SMALL_WINDOW = 0, 0, 720, 800
+"""x, y, width, height: high enough for the panel; a small picture, because each test waits for it to converge."""
+
 DEADLINE_S = 120.0
 """For a condition that always comes true; generous, because the first run compiles the core."""
 
@@ -80,6 +83,53 @@ class Driver:
         assert picture is not None
         return round(picture.x + x_share * picture.width), round(picture.y + y_share * picture.height)
 
+    def find(self, widget: str, window: str = "panel") -> tuple[int, int]:
+        """Move the pointer down a window until it is over the widget of this ImGui name, and say where that is."""
+        from imgui_bundle import imgui
+
+        self.until(lambda app: imgui.internal.find_window_by_name(window) is not None)
+        frame = imgui.internal.find_window_by_name(window)
+        wanted = frame.get_id(widget)
+        for share in (0.7, 0.33, 0.5, 0.12, 0.9):
+            x = round(frame.pos.x + share * frame.size.x)
+            for y in range(round(frame.pos.y) + 8, round(frame.pos.y + frame.size.y), 8):
+                self.send("mousemove", x, y)
+                self.until(lambda app, y=y: imgui.get_io().mouse_pos.y == y)  # type: ignore[misc]
+                if imgui.get_current_context().hovered_id == wanted:
+                    return x, y
+        raise AssertionError(f"no {widget} in {window}")
+
+    def press(self, widget: str, window: str = "panel") -> None:
+        """Click a widget."""
+        self.find(widget, window)
+        self.send("click", 1)
+        self.app.step()
+
+    def slide(self, widget: str, share: float) -> None:
+        """Drag a slider of the panel to this share of its width."""
+        from imgui_bundle import imgui
+
+        panel = self.app.layout().panel
+        x, y = self.find(widget)
+        left, right = panel.x + 0.36 * panel.width, panel.x + 0.95 * panel.width
+        self.send("mousemove", x, y, "mousedown", 1)
+        self.app.step()
+        end = round(left + share * (right - left))
+        self.send("mousemove", end, y)
+        self.until(lambda app: imgui.get_io().mouse_pos.x == end)
+        self.send("mouseup", 1)
+        self.until_idle()
+
+    def type(self, text: str) -> None:
+        """Type into the field that has the keyboard, in place of what it holds."""
+        self.send("key", "ctrl+a")
+        self.send("type", "--delay", 20, text)
+        self.until_idle()
+
+    def close(self) -> None:
+        """Close the window, as leaving the program does."""
+        self.app.close()
+
     def image(self) -> np.ndarray:
         """The picture as it was drawn last."""
         return self.app.stage.renderer.read_image()
@@ -110,15 +160,16 @@ def open_window(display: str, no_egl_context: None) -> Iterator[Callable[..., Dr
     """Opens the viewer on a photo; closes it after the test."""
     from viewer.actions import OpenPath
     from viewer.app import App, opening
-    from viewer.state import Source
+    from viewer.state import AppState, Preferences, Source
 
     apps = []
 
-    def start(path: Path | None, **changes: object) -> Driver:
+    def start(path: Path | None, kept_in: Path | None = None, **changes: object) -> Driver:
         state = opening(OpenPath(Source(str(path), **changes))) if path else None  # type: ignore[arg-type]
-        apps.append(App(state) if state else App())
+        apps.append(App(replace(state or AppState(), preferences=Preferences(window=SMALL_WINDOW)), kept_in))
         return Driver(apps[-1])
 
     yield start
     for app in apps:
-        app.close()
+        if app.window.handle is not None:
+            app.close()

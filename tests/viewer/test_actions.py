@@ -12,11 +12,9 @@ from hypothesis import strategies as st
 from iibr_core.plan import ScenePlan
 from iibr_core.types import GridShape, ViewOffset
 from viewer.actions import (
-    DEPTH_STRENGTH_LIMIT,
-    EXPOSURE_LIMIT_STOPS,
-    EYE_MARGIN_VIEWS,
-    NOTICES_KEPT,
+    ApplyPreset,
     DismissNotice,
+    FocusOn,
     MoveEye,
     Notify,
     OpenFailed,
@@ -26,13 +24,49 @@ from viewer.actions import (
     ResetOptics,
     SceneOpened,
     SetAperture,
+    SetApertureShape,
     SetDepthStrength,
+    SetDolly,
     SetExposure,
     SetFocus,
-    apply,
-    focus_limits,
+    SetFocusRange,
+    SetHighlightRecovery,
+    SetHover,
+    SetTheme,
+    SetTilt,
+    StopWork,
+    TakeSettings,
+    Undo,
 )
-from viewer.state import AppState, Notice, Optics, Picture, Progress, Scene, Source
+from viewer.apply import apply
+from viewer.limits import (
+    DEPTH_STRENGTH_LIMIT,
+    EXPOSURE_LIMIT_STOPS,
+    STEEPEST_TILT,
+    aperture_limit,
+    dolly_limit,
+    eye_margin,
+    focus_limits,
+    focus_span,
+    is_extrapolated,
+    is_finite,
+)
+from viewer.presets import PRESETS
+from viewer.state import (
+    APERTURE_KINDS,
+    ApertureMask,
+    ApertureShape,
+    AppState,
+    Hover,
+    Notice,
+    Optics,
+    Picture,
+    Progress,
+    SavedSettings,
+    Scene,
+    Source,
+)
+from viewer.worker_news import NOTICES_KEPT
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)
@@ -60,7 +94,9 @@ def test_the_eye_stays_within_the_grid_and_a_margin(grid: GridShape, t: float, s
         assert eye == before.optics.eye
         return
     for value, wanted, views in zip(eye, (t, s), grid):
-        low, high = -(views // 2) - EYE_MARGIN_VIEWS, views - 1 - views // 2 + EYE_MARGIN_VIEWS
+        margin = max(0.5, (views - 1) / 4)  # half the radius on each side, at least half a view
+        low, high = -(views // 2) - margin, views - 1 - views // 2 + margin
+        assert eye_margin(views) == margin
         assert low <= value <= high
         assert value == wanted or value in (low, high)
 
@@ -86,12 +122,152 @@ def test_focus_exposure_and_depth_stay_finite_and_in_range(value: float) -> None
     assert 0 <= state.depth_strength <= DEPTH_STRENGTH_LIMIT
 
 
+shapes = st.builds(
+    ApertureShape, st.sampled_from(APERTURE_KINDS), st.integers(-5, 50), floats, floats, floats, st.none()
+)
+
+
+@given(grids, floats, floats, st.tuples(floats, floats), shapes, floats)
+def test_every_optic_stays_finite_and_within_its_limits(
+    grid: GridShape, dolly: float, spread: float, tilt: tuple[float, float], shape: ApertureShape, highlights: float
+) -> None:
+    scene = scene_of(grid)
+    state = state_with(scene)
+    edits = (SetDolly(dolly), SetFocusRange(spread), SetTilt(tilt), SetApertureShape(shape))
+    for action in (*edits, SetHighlightRecovery(highlights)):
+        state = apply(state, action)
+    optics, span = state.optics, focus_span(scene)
+    assert is_finite(optics)
+    assert abs(optics.dolly) <= dolly_limit(grid) == (grid.columns - 1) / 2
+    assert 0 <= optics.focus_range <= span
+    assert max(map(abs, optics.focus_tilt)) <= STEEPEST_TILT * span
+    assert 0 <= optics.highlight_recovery <= 1
+    opening = optics.aperture_shape
+    assert 3 <= opening.blades <= 11
+    assert 0 <= opening.rotation_deg < 360
+    assert 0 <= opening.ring_inner < 1
+    assert 0 <= opening.cat_eye <= 1
+    assert opening.kind != "mask", "there is no mask"
+
+
+def test_a_mask_is_kept_while_another_shape_is_tried() -> None:
+    mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255]))
+    state = apply(state_with(scene_of()), SetApertureShape(ApertureShape("mask", mask=mask)))
+    assert state.optics.aperture_shape.kind == "mask"
+    state = apply(state, SetApertureShape(replace(state.optics.aperture_shape, kind="ring")))
+    assert state.optics.aperture_shape.mask == mask
+
+
+@pytest.mark.parametrize(
+    ("eye", "grid", "outside"),
+    [
+        (ViewOffset(4, -4), GridShape(9, 9), False),
+        (ViewOffset(0, 4.01), GridShape(9, 9), True),
+        (ViewOffset(0.2, 0), GridShape(1, 9), True),
+        (ViewOffset(-2, 1), GridShape(4, 4), False),
+        (ViewOffset(0, 1.5), GridShape(4, 4), True),
+    ],
+)
+def test_where_the_picture_is_extrapolated(eye: ViewOffset, grid: GridShape, outside: bool) -> None:
+    assert is_extrapolated(eye, grid) == outside
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_presets_keep_viewpoint_and_light_and_can_be_taken_back(name: str) -> None:
+    before = state_with(scene_of(subject_disparity_px=1.5))
+    for action in (MoveEye(ViewOffset(1, 2)), SetDolly(1), SetExposure(1), SetTilt((1, 1)), SetAperture(2)):
+        before = apply(before, action)
+    after = apply(before, ApplyPreset(name))  # type: ignore[arg-type]
+    kept = [(o.eye, o.dolly, o.exposure_stops) for o in (before.optics, after.optics)]
+    assert kept[0] == kept[1]
+    assert after.optics.focus_tilt == (0, 0)
+    assert apply(after, Undo()).optics == before.optics
+
+
+def test_what_the_presets_are_for() -> None:
+    state = state_with(scene_of(subject_disparity_px=1.5))
+    portrait, macro, sharp = (apply(state, ApplyPreset(name)).optics for name in PRESETS)
+    assert portrait.focus_disparity == 1.5
+    assert portrait.focus_range > 0
+    assert macro.focus_disparity == 3.0, "the nearest"
+    assert macro.aperture_diameter == aperture_limit(GridShape(9, 9)) > portrait.aperture_diameter > 0
+    assert sharp.aperture_diameter == 0
+
+
+def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> None:
+    state = state_with(scene_of(GridShape(5, 5)))
+    optics = Optics(eye=ViewOffset(9, 9), aperture_diameter=20, focus_disparity=1)
+    saved = SavedSettings(optics, 1.0, Source(""), (10, 10))
+    offered = apply(state, Notify(Notice("It has settings.", offer=saved)))
+    after = apply(offered, TakeSettings(saved))
+    assert after.optics == Optics(eye=ViewOffset(3, 3), aperture_diameter=5, focus_disparity=1)
+    assert after.notices == ()
+    assert apply(after, Undo()).optics == state.optics
+    broken = replace(saved, optics=replace(optics, dolly=math.nan))
+    assert apply(state, TakeSettings(broken)).optics == state.optics
+
+
+def test_stopping_keeps_what_is_there_and_late_progress_does_not_bring_it_back() -> None:
+    state = apply(state_with(scene_of()), ProgressMade(1, Progress(3, 81, 0.1), (0, 0)))
+    state = apply(state, StopWork())
+    assert state.stopped == state.generation == 1
+    assert "3 of 81" in state.progress.doing
+    late = apply(state, ProgressMade(1, Progress(4, 81, 0.2), (0, 1)))
+    assert late.progress == state.progress
+    assert late.views_there == {(0, 0), (0, 1)}
+
+
+def test_stopping_while_another_file_is_read_returns_to_the_scene_that_is_open() -> None:
+    before = state_with(scene_of())
+    state = apply(apply(before, OpenPath(Source("other.png"))), StopWork())
+    assert state.source is before.source
+    assert state.generation == before.generation + 2
+    assert state.stopped is None
+    first = apply(apply(AppState(), OpenPath(SOURCE)), StopWork())
+    assert (first.source, first.stopped, first.progress) == (None, 1, Progress())
+
+
+def test_a_finished_field_cannot_be_stopped() -> None:
+    state = apply(state_with(scene_of()), ProgressMade(1, Progress(81, 81, 0.1), (0, 0)))
+    assert apply(state, StopWork()) == state
+
+
+def test_views_that_came_are_known_until_another_field_is_made() -> None:
+    state = apply(state_with(None), SceneOpened(1, scene_of(GridShape(3, 3))))
+    assert state.views_there == {(1, 1)}
+    state = apply(state, ProgressMade(1, Progress(2, 9, 0.1), (0, 2)))
+    assert state.views_there == {(1, 1), (0, 2)}
+    state = apply(state, SceneOpened(1, scene_of(GridShape(5, 5))))
+    assert state.views_there == {(2, 2)}
+
+
+def test_recent_files_are_listed_once_the_latest_first() -> None:
+    state = state_with(None)
+    for name in ("a.png", "b.png", "a.png"):
+        state = apply(state, SceneOpened(1, scene_of(source=Source(name))))
+    assert state.recent == ("a.png", "b.png")
+
+
 def test_focus_can_be_set_in_a_flat_scene() -> None:
     low, high = focus_limits(scene_of(disparity_range_px=(0.0, 0.0)))
     assert low < 0 < high
 
 
-@pytest.mark.parametrize("action", [MoveEye(ViewOffset(1, 1)), SetFocus(1), SetAperture(1), ResetOptics()])
+@pytest.mark.parametrize(
+    "action",
+    [
+        MoveEye(ViewOffset(1, 1)),
+        SetFocus(1),
+        SetAperture(1),
+        SetDolly(1),
+        SetTilt((1, 1)),
+        FocusOn((0, 0), 1),
+        ApplyPreset("macro"),
+        ResetOptics(),
+        StopWork(),
+        Undo(),
+    ],
+)
 def test_optics_do_not_change_before_a_scene_is_open(action: object) -> None:
     assert apply(AppState(), action) == AppState()  # type: ignore[arg-type]
 
@@ -100,7 +276,7 @@ def test_reset_brings_the_first_optics_back() -> None:
     state = state_with(scene_of())
     for action in (MoveEye(ViewOffset(1, 2)), SetFocus(1), SetAperture(3), SetExposure(1)):
         state = apply(state, action)
-    assert state.optics == Optics(ViewOffset(1, 2), 1, 3, 1)
+    assert state.optics == Optics(eye=ViewOffset(1, 2), focus_disparity=1, aperture_diameter=3, exposure_stops=1)
     assert apply(state, ResetOptics()).optics == Optics()
 
 
@@ -111,6 +287,18 @@ def test_reset_brings_the_first_optics_back() -> None:
         (SetFocus(1.0), True, False),
         (SetAperture(2.0), True, False),
         (SetExposure(1.0), True, False),
+        (SetDolly(1.0), True, False),
+        (SetFocusRange(0.5), True, False),
+        (SetTilt((0.5, 0.0)), True, False),
+        (SetApertureShape(ApertureShape("polygon")), True, False),
+        (SetHighlightRecovery(0.5), True, False),
+        (FocusOn((0.0, 0.0), 1.0), True, False),
+        (ApplyPreset("macro"), True, False),
+        (SetHover(Hover(3.0, 4.0, 1.0)), False, False),
+        (SetTheme("light"), False, False),
+        (StopWork(), False, False),
+        (Undo(), False, False),
+        (SetTilt((math.inf, 0.0)), False, False),
         (SetFocus(0.0), False, False),
         (MoveEye(ViewOffset(math.nan, 0.0)), False, False),
         (SetDepthStrength(2.0, is_finished=False), False, False),

@@ -7,19 +7,37 @@ from dataclasses import replace
 import pytest
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.actions import MoveEye, OpenPath, Quit, ResetOptics, SetFocus
+from viewer.actions import (
+    EndGesture,
+    FocusOn,
+    MoveEye,
+    MoveTiltHandle,
+    OpenPath,
+    Quit,
+    ResetOptics,
+    ReturnHome,
+    SetFocus,
+    SetHover,
+    ShowPrompt,
+    Undo,
+)
+from viewer.commands import BY_NAME
+from viewer.focal_plane import handle_points
 from viewer.input import (
     DRAG_ACROSS_GRID,
     Keys,
     Pointer,
     actions_from_drop,
+    actions_from_hover,
     actions_from_keys,
     actions_from_pointer,
+    gesture_end,
+    gesture_start,
     units_per_view,
 )
 from viewer.layout import Layout, layout_of, letterboxed, pixel_at
 from viewer.layout import Rect as R
-from viewer.state import AppState, Optics, Scene, Source
+from viewer.state import AppState, History, Hover, Optics, Scene, Source, TiltHandles
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
 STATE = AppState(source=SCENE.source, scene=SCENE)
@@ -77,7 +95,7 @@ def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
         return 0.75
 
     pointer = replace(OVER_PICTURE, is_released=True, clicks=1)
-    assert actions_from_pointer(pointer, LAYOUT, STATE, pick) == [SetFocus(0.75)]
+    assert actions_from_pointer(pointer, LAYOUT, STATE, pick) == [FocusOn(pytest.approx((0, 0)), 0.75)]
     assert seen == [pytest.approx((299.5, 199.5))]
 
 
@@ -87,7 +105,7 @@ def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
         (replace(OVER_PICTURE), []),
         (replace(OVER_PICTURE, is_down=True, drag_distance=2, step_x=2), []),
         (replace(OVER_PICTURE, is_released=True, clicks=1, drag_distance=40), []),
-        (replace(OVER_PICTURE, is_released=True, clicks=2), [ResetOptics()]),
+        (replace(OVER_PICTURE, is_released=True, clicks=2), [ReturnHome()]),
         (replace(OVER_PICTURE, is_released=True, clicks=1, is_over_panel=True), []),
         (replace(OVER_PICTURE, is_down=True, drag_distance=40, step_x=9, is_over_panel=True), []),
         (replace(OVER_PICTURE, wheel=1.0, is_over_panel=True), []),
@@ -118,10 +136,69 @@ def test_nothing_is_asked_for_without_a_scene_or_room() -> None:
 
 def test_keys() -> None:
     assert actions_from_keys(Keys(), STATE) == []
-    assert actions_from_keys(Keys(is_quit=True, is_reset=True), STATE) == [Quit(), ResetOptics()]
+    reset = "Reset viewpoint, focus and aperture"
+    assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [Quit(), ResetOptics(), Undo()]
+    assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [ShowPrompt(None)]
+    assert reset in BY_NAME
     (move,) = actions_from_keys(Keys(arrows=ViewOffset(1, -1)), STATE)
     assert isinstance(move, MoveEye)
     assert move.eye.t > 0 > move.eye.s
+
+
+WITH_HANDLES = replace(STATE, tilt_handles=TiltHandles())
+HANDLES = handle_points(TiltHandles(), PICTURE)
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_drag_that_begins_on_a_handle_moves_it_onto_what_is_there(index: int) -> None:
+    x, y = HANDLES[index]
+    pointer = replace(OVER_PICTURE, pressed_x=x + 5, pressed_y=y - 5, is_down=True, drag_distance=30, step_x=3)
+    assert asked(pointer, WITH_HANDLES) == [MoveTiltHandle(index, pytest.approx((0, 0)), 1.5)]
+    assert asked(pointer, WITH_HANDLES, picked=None) == [MoveTiltHandle(index, pytest.approx((0, 0)), None)]
+    (move,) = asked(pointer)
+    assert isinstance(move, MoveEye), "no handles shown"
+
+
+def test_a_handle_that_was_taken_is_kept_wherever_the_drag_leads() -> None:
+    held = replace(STATE, tilt_handles=TiltHandles(taken=1))
+    pointer = replace(OVER_PICTURE, is_down=True, drag_distance=300, step_x=3)
+    (move,) = asked(pointer, held)
+    assert isinstance(move, MoveTiltHandle)
+    assert move.index == 1
+
+
+def test_a_drag_beside_the_handles_moves_the_viewpoint() -> None:
+    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=3), WITH_HANDLES)
+    assert isinstance(move, MoveEye)
+
+
+def hovered(pointer: Pointer, state: AppState = STATE) -> list[object]:
+    return list(actions_from_hover(pointer, LAYOUT, state, lambda x, y: x / 100))
+
+
+def test_the_pointer_says_once_where_it_is_and_once_that_it_left() -> None:
+    (found,) = hovered(OVER_PICTURE)
+    assert found == SetHover(Hover(pytest.approx(299.5), pytest.approx(199.5), pytest.approx(2.995)))
+    assert isinstance(found, SetHover)
+    there = replace(STATE, hover=found.hover)
+    assert hovered(OVER_PICTURE, there) == []
+    outside = (
+        replace(OVER_PICTURE, x=1.0),
+        replace(OVER_PICTURE, is_over_panel=True),
+        replace(OVER_PICTURE, is_down=True, drag_distance=50),
+    )
+    for pointer in outside:
+        assert hovered(pointer, there) == [SetHover(None)]
+        assert hovered(pointer) == []
+
+
+def test_presses_and_releases_part_the_edits() -> None:
+    under_way = replace(STATE, history=History(gesture="SetFocus"))
+    pressed, released = replace(OVER_PICTURE, is_pressed=True), replace(OVER_PICTURE, is_released=True)
+    assert gesture_start(pressed, under_way) == [EndGesture()]
+    assert gesture_start(pressed, STATE) == gesture_start(released, under_way) == []
+    assert gesture_end(released) == [EndGesture()]
+    assert gesture_end(pressed) == []
 
 
 @pytest.mark.parametrize(

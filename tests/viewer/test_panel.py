@@ -15,7 +15,11 @@ from viewer.ui.panel import progress_words, size_words
     [
         (Progress(), ""),
         (Progress(doing="reading a.png"), "reading a.png"),
-        (Progress(23, 81, 1.2345), "23 of 81 views, 1.2 s"),
+        (Progress(23, 81, 0.2345), "23 of 81 views, 0.2 s"),
+        (Progress(23, 81, 12.3), "23 of 81 views, 12.3 s, 31 s left"),
+        (Progress(1, 81, 5.0), "1 of 81 views, 5.0 s, 7 min left"),
+        (Progress(81, 81, 31.0), "81 of 81 views, 31.0 s"),
+        (Progress(0, 81, 31.0), "0 of 81 views, 31.0 s"),
         (Progress(1, 1, 0.0), "1 of 1 view, 0.0 s"),
     ],
 )

@@ -87,18 +87,12 @@ def test_the_wheel_changes_the_focus_and_keys_the_viewpoint(viewer: Driver) -> N
 
 
 def test_a_slider_changes_the_aperture_and_not_the_viewpoint(viewer: Driver) -> None:
-    panel = viewer.app.layout().panel
-    rows = np.arange(60, 260, 6)
     before = viewer.image()
-    for y in rows:  # down the panel, until the aperture's slider is met
-        x = panel.x + 0.8 * panel.width
-        viewer.send("mousemove", int(x), int(y), "mousedown", 1, "mousemove", int(x) + 3, int(y), "mouseup", 1)
-        viewer.until_idle()
-        if viewer.app.state.optics.aperture_diameter > 0:
-            break
+    viewer.slide("##Diameter", 0.8)
     assert viewer.app.state.optics.aperture_diameter > 1
     assert viewer.app.state.optics.eye == ViewOffset(0, 0)
     assert np.abs(viewer.image().astype(int) - before).max() > 8
+    assert len(viewer.app.state.history.past) == 1, "a drag is one edit"
 
 
 def test_an_idle_window_draws_nothing_however_often_it_is_woken(viewer: Driver) -> None:
@@ -150,13 +144,9 @@ def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
     photo_path.unlink()
     scene = viewer.app.state.scene
     assert scene is not None
-    for y in range(100, 300, 6):  # down the panel, until the depth slider is met
-        panel = viewer.app.layout().panel
-        x = int(panel.x + 0.9 * panel.width)
-        viewer.send("mousemove", x, y, "mousedown", 1, "mousemove", x + 3, y, "mouseup", 1)
-        viewer.until_idle()
-        if viewer.app.state.generation == 2:
-            break
+    viewer.press("section Scene")
+    viewer.slide("##Parallax", 0.9)
+    assert viewer.app.state.generation == 2
     assert viewer.app.state.depth_strength > 1
     viewer.until(lambda app: app.stage.generation == 2)
     viewer.until_idle()

@@ -35,6 +35,10 @@ class Desk:
         self._woken = threading.Semaphore(0)
         self.worker = Worker(self._woken.release, work)
 
+    def woken(self) -> bool:
+        """Wait to be woken."""
+        return self._woken.acquire(timeout=DEADLINE_S)
+
     def next(self) -> Result:
         """The next result that is not late, waiting for it."""
         while True:
@@ -77,6 +81,43 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
     indices = {(v.view.row, v.view.column) for v in views if isinstance(v, ViewReady)}
     assert indices == {(row, column) for row in range(3) for column in range(3)}
     assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
+
+
+def test_a_lost_worker_says_so_and_the_next_request_starts_another(
+    desk_for: Callable[..., Desk], capfd: pytest.CaptureFixture[str]
+) -> None:
+    def work(asked: Request, *_: object) -> Iterator[ViewReady]:
+        if asked.generation == 1:
+            raise SystemExit("a library tried to end the program")
+        yield view(asked.generation)
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert desk.woken()
+    assert desk.worker.is_lost
+    desk.worker.submit(request(2))
+    result = desk.next()
+    assert result.generation == 2
+    assert not desk.worker.is_lost
+    assert "a library tried" in capfd.readouterr().err
+
+
+def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path, tmp_path: Path) -> None:
+    from iibr_core.formats.photo import read_photo, write_image
+
+    known = tmp_path / "known.png"
+    write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
+    for path, expected in ((photo_path, None), (known, read_photo(known).focal_px)):
+        ready = next(results_of(Request(1, Source(str(path))), lambda: False, lambda: CENTRE))
+        assert isinstance(ready, SceneReady)
+        assert ready.scene.focal_px == expected
+    assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
+
+
+def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
+    ready = next(results_of(Request(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
+    assert isinstance(ready, SceneReady)
+    assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
 
 
 def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:

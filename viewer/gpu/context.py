@@ -20,6 +20,7 @@ from iibr_core.types import InputError
 import glfw  # isort: skip
 
 Backend = Literal["auto", "egl", "osmesa"]
+SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader", "swr", "software", "basic render")
 
 
 class GlfwLoader:
@@ -59,6 +60,26 @@ class GLContext:
         self.max_layers: int = ctx.info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
         self.max_texture_size: int = ctx.info["GL_MAX_TEXTURE_SIZE"]
         self._own_window = own_window
+
+    @property
+    def is_software(self) -> bool:
+        """Whether the processor draws."""
+        return any(name in self.renderer.lower() for name in SOFTWARE_RENDERERS)
+
+    @property
+    def frame_budget_s(self) -> float:
+        """How long a picture may take while the user drags."""
+        return 0.033 if self.is_software else 0.016
+
+    @property
+    def seconds_per_sample(self) -> float:
+        """First guess at what a sample of the aperture costs per pixel; what is measured then replaces it."""
+        return 3e-9 if self.is_software else 4e-11
+
+    @property
+    def seconds_per_picture(self) -> float:
+        """Guess at what a picture costs per pixel besides its samples."""
+        return 10 * self.seconds_per_sample
 
     def clear_screen(self, red: float = 0.0, green: float = 0.0, blue: float = 0.0) -> None:
         """Fill the window with one colour and leave it bound for drawing."""

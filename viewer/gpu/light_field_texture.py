@@ -16,6 +16,9 @@ _ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255
 
 HALF_MAX = float(np.finfo(np.float16).max)
 
+BLOCK_PX = 16
+"""Side of the squares whose nearest and farthest disparity is kept, to tell quickly what a part of a view contains."""
+
 RANGE_MARGIN = 0.05
 """Views generated later may reach a little beyond the first one's disparity range."""
 
@@ -24,44 +27,68 @@ class LightFieldTexture:
     """Texture arrays of the views present.
 
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
-    view step. present, has_disparity: (V, U) bool. range_px: (farthest, nearest) disparity, known from the first view
-    that has any.
+    view step. blocks: RG16F, least and greatest disparity of each BLOCK_PX square. present, has_disparity: (V, U) bool.
+    range_px: (farthest, nearest) disparity, known from the first view that has any.
     """
 
     def __init__(
-        self, ctx: moderngl.Context, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool
+        self,
+        ctx: moderngl.Context,
+        grid: GridShape,
+        width: int,
+        height: int,
+        hdr: bool,
+        with_disparity: bool,
+        stride: int = 1,
     ) -> None:
-        """Allocate. Raises InputError where this graphics driver cannot hold it, saying what to do."""
-        check_fits(ctx, grid, width, height)
+        """Allocate. Raises InputError where this graphics driver cannot hold it, saying what to do.
+
+        stride: room for every so manieth view across and down, the centre among them; others are not kept.
+        """
+        self.stride = stride
+        counts = (len(range(middle % stride, count, stride)) for middle, count in zip(grid.centre, grid))
+        self._kept = GridShape(*counts)
+        check_fits(ctx, self._kept, width, height)
         self.grid, self.width, self.height, self.hdr = grid, width, height, hdr
         self.present = np.zeros(grid, bool)
         self.has_disparity = np.zeros(grid, bool)
         self.range_px = (0.0, 0.0)
         self._dtype = np.float16 if hdr else np.uint8
-        layers = grid.rows * grid.columns
+        layers = self._kept.rows * self._kept.columns
         self.colors = _allocate(ctx, (width, height, layers), 4, "f2" if hdr else "f1")
         self.colors.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.disparities = _allocate(ctx, (width, height, layers) if with_disparity else (1, 1, 1), 1, "f2")
         self.disparities.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        blocks = (-(-width // BLOCK_PX), -(-height // BLOCK_PX), layers)
+        self.blocks = _allocate(ctx, blocks if with_disparity else (1, 1, 1), 2, "f2")
+        self.blocks.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._texels = np.zeros((height, width, 4), self._dtype)
 
     def layer(self, row: int, column: int) -> int:
-        """Array layer of a view."""
-        return row * self.grid.columns + column
+        """Array layer of a view that is kept."""
+        return (row // self.stride) * self._kept.columns + column // self.stride
+
+    def keeps(self, row: int, column: int) -> bool:
+        """Whether there is room for this view."""
+        return all((at - middle) % self.stride == 0 for at, middle in zip((row, column), self.grid.centre))
 
     def upload(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
-        """Store the view at index (row, column).
+        """Store the view at index (row, column), if it is kept.
 
         colors: (H, W, 3), see StoredColors. disparity: (H, W) px per view step; ignored in a field opened without.
         Raises ValueError for an index or a shape that does not belong to this field.
         """
         self._check(row, column, colors, disparity)
+        if not self.keeps(row, column):
+            return
         keeps_disparity = disparity is not None and self.disparities.size == self.colors.size
         if disparity is not None and keeps_disparity:
             if not self.has_disparity.any():
                 self.range_px = _range_of(disparity)
             half = np.clip(disparity, -HALF_MAX, HALF_MAX).astype(np.float16)
             self.disparities.write(half, self._viewport(row, column))
+            blocks = _block_ranges(half)
+            self.blocks.write(blocks, (0, 0, self.layer(row, column), blocks.shape[1], blocks.shape[0], 1))
         self._fill_texels(colors, disparity if keeps_disparity else None)
         self.colors.write(self._texels, self._viewport(row, column))
         self.present[row, column], self.has_disparity[row, column] = True, keeps_disparity
@@ -70,6 +97,7 @@ class LightFieldTexture:
         """Free the arrays."""
         self.colors.release()
         self.disparities.release()
+        self.blocks.release()
 
     def _viewport(self, row: int, column: int) -> tuple[int, int, int, int, int, int]:
         return 0, 0, self.layer(row, column), self.width, self.height, 1
@@ -137,6 +165,14 @@ def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:
     if colors.dtype != np.uint8:
         raise ValueError("float colours in a field opened without hdr")
     return _ROOT_FROM_SRGB[colors.view(np.uint8)]
+
+
+def _block_ranges(disparity: NDArray[np.float16]) -> NDArray[np.float16]:
+    """(blocks down, blocks across, 2): least and greatest value of each square."""
+    values = disparity.astype(np.float32)  # half floats compare slowly
+    rows, columns = np.arange(0, values.shape[0], BLOCK_PX), np.arange(0, values.shape[1], BLOCK_PX)
+    ends = [end.reduceat(end.reduceat(values, rows, axis=0), columns, axis=1) for end in (np.minimum, np.maximum)]
+    return np.ascontiguousarray(np.stack(ends, axis=-1), np.float16)
 
 
 def _range_of(disparity: FloatImage) -> tuple[float, float]:

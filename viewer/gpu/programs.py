@@ -142,3 +142,59 @@ def _explain(message: str, stages: Mapping[str, FlatSource], fragment: str) -> s
     first = found[0][1]
     body = _MESSAGE_LINE.sub(lambda match: f"{stage.locate(int(match[1]))}:", message[found[0][0].start() :])
     return f"{first}: the shader does not compile\n{body.strip()}"
+
+
+class ProgramCache:
+    """The programs in use, compiled when first asked for. folder: where the shaders are, if not the program's own."""
+
+    def __init__(self, ctx: moderngl.Context, folder: Path | None = None) -> None:
+        self._ctx = ctx
+        self._folder = folder or resource_folder("shaders")
+        self._programs: dict[tuple[str, tuple[str, ...]], tuple[Program, moderngl.VertexArray]] = {}
+        self._read_at = self._newest_change()
+
+    def __len__(self) -> int:
+        """How many programs have been compiled."""
+        return len(self._programs)
+
+    def get(self, fragment: str, switches: tuple[str, ...] = ()) -> tuple[Program, moderngl.VertexArray]:
+        """The program of a pass with these defines, and what to draw it with. Raises ShaderError."""
+        key = fragment, switches
+        if key not in self._programs:
+            self._programs[key] = self._compiled(fragment, switches)
+        return self._programs[key]
+
+    def reload(self) -> list[str]:
+        """Compile anew what is in use, if a file changed since; what no longer compiles stays as it was.
+
+        Returns what is wrong, one message a program.
+        """
+        newest = self._newest_change()
+        if newest == self._read_at:
+            return []
+        self._read_at = newest
+        problems = []
+        for key, (old, quad) in self._programs.items():
+            try:
+                self._programs[key] = self._compiled(*key)
+            except ShaderError as error:
+                problems.append(str(error))
+                continue
+            quad.release()
+            old.release()
+        return problems
+
+    def release(self) -> None:
+        """Free every program."""
+        for program, quad in self._programs.values():
+            quad.release()
+            program.release()
+        self._programs.clear()
+
+    def _compiled(self, fragment: str, switches: tuple[str, ...]) -> tuple[Program, moderngl.VertexArray]:
+        program = load_program(self._ctx, "fullscreen.vert", fragment, dict.fromkeys(switches, 1), self._folder)
+        return program, self._ctx.vertex_array(program.program, [])
+
+    def _newest_change(self) -> tuple[tuple[str, int], ...]:
+        files = sorted(path for path in self._folder.rglob("*") if path.is_file())
+        return tuple((str(path), path.stat().st_mtime_ns) for path in files)

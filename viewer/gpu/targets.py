@@ -1,4 +1,7 @@
-"""The images that passes draw into on the way to the screen. Linear light as RGBA16F; row 0 first but in the last."""
+"""The images that passes draw into on the way to the screen: sums of linear light as RGBA32F.
+
+Row 0 comes first in all but the last, which is the screen's.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +14,39 @@ class Target:
     def __init__(self, ctx: moderngl.Context, textures: list[moderngl.Texture]) -> None:
         self.textures = textures
         self.framebuffer = ctx.framebuffer(textures)
+        self._ctx = ctx
+        self._holds_sum = False
 
     def use(self) -> None:
         """Draw here from now on."""
         self.framebuffer.use()
 
+    def start_sum(self) -> None:
+        """The next `add` replaces what is here: blending and clearing cost time."""
+        self._holds_sum = False
+
+    def add(self) -> None:
+        """Add what is drawn from now on to what is here."""
+        self.framebuffer.use()
+        if self._holds_sum:
+            self._ctx.enable(moderngl.BLEND)
+            self._ctx.blend_func = moderngl.ONE, moderngl.ONE
+        else:
+            self._ctx.disable(moderngl.BLEND)
+        self._holds_sum = True
+
+    def release(self) -> None:
+        """Free framebuffer and textures."""
+        self.framebuffer.release()
+        for texture in self.textures:
+            texture.release()
+
 
 class Targets:
     """The targets of one picture size.
 
-    light: all light in one layer. light_layers: in focus, in front, behind, see shaders/include/layers.glsl.
-    tiles, wide_tiles: blur widths. half_across, half_smooth: front and back layers, smoothed, at half size.
+    light: all of it, or what is sharp. blurred: in front, behind, and all weights, at half size, see
+    shaders/include/layers.glsl. half_across, half_smooth: front and behind, smoothed. tiles, wide_tiles: blur widths.
     image: the finished picture, RGBA8, rows bottom-up.
     """
 
@@ -31,27 +56,23 @@ class Targets:
         half = (width + 1) // 2, (height + 1) // 2
         tiles = -(-width // tile_px), -(-height // tile_px)
         self.image = Target(ctx, [ctx.texture(size_px, 4)])
-        layers = [_light(ctx, size_px) for _ in range(3)]
-        self.light = Target(ctx, layers[:1])
-        self.light_layers = Target(ctx, layers)
+        self.light = Target(ctx, [_light(ctx, size_px)])
+        self.blurred = Target(ctx, [_light(ctx, half), _light(ctx, half), _light(ctx, half, 2)])
         self.half_across = Target(ctx, [_light(ctx, half) for _ in range(2)])
         self.half_smooth = Target(ctx, [_light(ctx, half) for _ in range(2)])
-        self.tiles = Target(ctx, [_light(ctx, tiles, 2)])
-        self.wide_tiles = Target(ctx, [_light(ctx, tiles, 2)])
+        self.tiles = Target(ctx, [_light(ctx, tiles)])
+        self.wide_tiles = Target(ctx, [_light(ctx, tiles)])
 
     def release(self) -> None:
         """Free framebuffers and textures."""
         self._ctx.detect_framebuffer(0).use()  # moderngl binds what was last used again, and that must still exist
-        own = [self.image, self.light_layers, self.half_across, self.half_smooth, self.tiles, self.wide_tiles]
-        for target in (*own, self.light):
-            target.framebuffer.release()
-        for target in own:  # the texture of `light` is the first of `light_layers`
-            for texture in target.textures:
-                texture.release()
+        for target in (self.image, self.light, self.blurred, self.half_across, self.half_smooth, self.tiles):
+            target.release()
+        self.wide_tiles.release()
 
 
 def _light(ctx: moderngl.Context, size_px: tuple[int, int], components: int = 4) -> moderngl.Texture:
-    texture = ctx.texture(size_px, components, dtype="f2")
+    texture = ctx.texture(size_px, components, dtype="f4")
     texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = False
     return texture

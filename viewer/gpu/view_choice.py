@@ -5,14 +5,21 @@ Weights change smoothly with the eye and the aperture, so that nothing jumps whi
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
+from viewer.gpu.aperture_shape import opening
+from viewer.state import ApertureShape
 
 MAX_SOURCES = 4
+DISC = ApertureShape()
+UNMOVED = ViewOffset(0.0, 0.0)
+LEAST_WEIGHT = 2e-4
+"""A sample that counts for less is not worth its drawing: it changes white by a twentieth of an 8-bit step."""
 
 
 class Source(NamedTuple):
@@ -47,6 +54,20 @@ def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
     return _cell_corners(eye, grid, present) or _nearest_present(eye, grid, present)
 
 
+def pinhole_weights(sources: list[Source], eyes: list[ViewOffset], grid: GridShape) -> NDArray[np.float64]:
+    """(sources, eyes): bilinear weights for other eyes in the same cell; where the sources are no cell's, as given."""
+    rows, columns = {source.row for source in sources}, {source.column for source in sources}
+    if max(rows) - min(rows) > 1 or max(columns) - min(columns) > 1 or len(sources) != len(rows) * len(columns):
+        return np.repeat([[source.weight] for source in sources], len(eyes), axis=1)
+    inside = [clamped_to_grid(eye, grid) for eye in eyes]
+    v, u = (np.array([eye[axis] + grid.centre[axis] for eye in inside]) for axis in (0, 1))
+    weights = np.ones((len(sources), len(eyes)))
+    for i, source in enumerate(sources):
+        weights[i] *= 1 - np.abs(source.row - v) if len(rows) > 1 else 1.0
+        weights[i] *= 1 - np.abs(source.column - u) if len(columns) > 1 else 1.0
+    return weights
+
+
 def _cell_corners(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[Source]:
     inside = clamped_to_grid(eye, grid)
     v, u = inside.t + grid.centre[0], inside.s + grid.centre[1]
@@ -78,29 +99,58 @@ def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_
 
 
 def aperture_samples(
-    eye: ViewOffset, diameter: float, grid: GridShape, present: NDArray[np.bool_]
+    eye: ViewOffset,
+    diameter: float,
+    grid: GridShape,
+    present: NDArray[np.bool_],
+    shape: ApertureShape = DISC,
+    stride: int = 1,
+    moved: ViewOffset = UNMOVED,
 ) -> list[ApertureSample]:
-    """The grid's views inside a disc around the eye, its edge one view step wide. present: (V, U) bool, not all False.
+    """Places of a square lattice inside the aperture around the eye. present: (V, U) bool, not all False.
 
-    diameter: view steps, at least 1. The eye is clamped to the grid, and so never without a view.
+    diameter: view steps, at least 1; beyond the grid's own it is cut to a square. stride: view steps between places,
+    each weighted by what the aperture leaves of its square. moved: where the lattice lies, (0, 0) = on the stored
+    views, those of the centre view's row and column among them. What lies off the grid is answered by its border.
     """
-    eye = clamped_to_grid(eye, grid)
-    v, u = np.mgrid[: grid.rows, : grid.columns]
-    t, s = v - grid.centre[0], u - grid.centre[1]
-    weights = np.clip(diameter / 2 + 0.5 - np.hypot(t - eye.t, s - eye.s), 0, 1)
+    widest = float(max(grid))
+    reach = (min(diameter, widest) + stride) / 2
+    t, s = np.meshgrid(*(_lattice(middle, reach, stride, start) for middle, start in zip(eye, moved)), indexing="ij")
+    width = min(float(stride), diameter)
+    weights = opening(shape, t - eye.t, s - eye.s, diameter, width)
+    within_widest = 0.5 + (widest / 2 - np.maximum(np.abs(t - eye.t), np.abs(s - eye.s))) / width
+    weights = np.minimum(weights, np.clip(within_widest, 0, 1))
+    if weights.sum() <= 0:  # a mask's hole, or one smaller than the samples
+        weights = (np.hypot(t - eye.t, s - eye.s) == np.hypot(t - eye.t, s - eye.s).min()).astype(float)
     weights /= weights.sum()
     stand_in = nearest_present(present)
+    chosen = weights > LEAST_WEIGHT
     return [
-        ApertureSample(
-            ViewOffset(float(t[at]), float(s[at])), int(stand_in[at][0]), int(stand_in[at][1]), float(weights[at])
-        )
-        for at in zip(*np.nonzero(weights > 1e-5))
+        ApertureSample(wanted, *_answer_to(wanted, grid, stand_in), weight)
+        for wanted, weight in zip(map(ViewOffset, t[chosen].tolist(), s[chosen].tolist()), weights[chosen].tolist())
     ]
 
 
+def _lattice(middle: float, reach: float, stride: int, start: float) -> NDArray[np.float64]:
+    first, last = math.ceil((middle - reach - start) / stride), math.floor((middle + reach - start) / stride)
+    return start + stride * np.arange(first, last + 1, dtype=float)
+
+
+def _answer_to(wanted: ViewOffset, grid: GridShape, stand_in: NDArray[np.intp]) -> tuple[int, int]:
+    row = min(max(math.floor(wanted.t + 0.5) + grid.centre[0], 0), grid.rows - 1)
+    column = min(max(math.floor(wanted.s + 0.5) + grid.centre[1], 0), grid.columns - 1)
+    return int(stand_in[row, column, 0]), int(stand_in[row, column, 1])
+
+
 def nearest_present(present: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """(V, U, 2): index of the present view nearest to each of the grid, the first in reading order among equals."""
+    """(V, U, 2): index of the present view nearest to each of the grid.
+
+    Neighbours take turns among equally near ones, lest all their errors lie on one side.
+    """
     indices = np.argwhere(present)
     every = np.indices(present.shape).reshape(2, -1).T
     distances = ((every[:, None] - indices[None]) ** 2).sum(-1)
-    return indices[distances.argmin(1)].reshape(*present.shape, 2)
+    is_nearest = distances == distances.min(1, keepdims=True)
+    turn = (every @ (1, 2)) % is_nearest.sum(1)
+    chosen = (is_nearest & (np.cumsum(is_nearest, 1) == turn[:, None] + 1)).argmax(1)
+    return indices[chosen].reshape(*present.shape, 2)

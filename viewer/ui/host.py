@@ -13,7 +13,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from viewer.layout import Layout
-from viewer.ui.style import apply_style, load_fonts
+from viewer.ui.style import Look, apply_style, load_fonts
 
 VERTEX_BYTES = 20
 INDEX_BYTES = 2
@@ -22,18 +22,22 @@ INDEX_BYTES = 2
 class UiHost:
     """Owns the ImGui context. The GL context must be current when it is made, drawn and released."""
 
-    def __init__(self, ui_scale: float, window: Any = None) -> None:
+    def __init__(self, look: Look, window: Any = None) -> None:
         self._context = imgui.create_context()
         imgui.get_io().set_ini_filename(None)
         load_fonts()
-        apply_style(ui_scale)
+        apply_style(look)
+        self._look = look
         self._has_window = window is not None
         if window is not None:
             imgui.backends.glfw_init_for_opengl(ctypes.cast(window, ctypes.c_void_p).value or 0, True)
         imgui.backends.opengl3_init("#version 330")
 
-    def begin(self, layout: Layout) -> None:
-        """Start a frame. Without a window its size and time step come from here."""
+    def begin(self, layout: Layout, look: Look) -> None:
+        """Start a frame of this look. Without a window its size and time step come from here."""
+        if look != self._look:
+            apply_style(look)
+            self._look = look
         imgui.backends.opengl3_new_frame()
         if self._has_window:
             imgui.backends.glfw_new_frame()

@@ -1,13 +1,13 @@
-"""Notices over the lower left of the picture, each with a button that takes it away."""
+"""Notices over the lower left of the picture, each with a button that takes it away, and one for what it offers."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.actions import Action, DismissNotice
+from viewer.actions import Action, DismissNotice, TakeSettings
 from viewer.layout import MARGIN, Layout
 from viewer.state import AppState, Notice
-from viewer.ui.style import ERROR_TEXT, TEXT
+from viewer.ui.style import Palette, palette_of
 
 NOTICE_WIDTH = 420.0
 _FLAGS = (
@@ -22,28 +22,31 @@ _FLAGS = (
 
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
-    """Build the notices, the newest at the bottom; those dismissed come back as actions."""
+    """Build the notices, the newest at the bottom; what was pressed comes back as actions."""
     if not state.notices:
         return []
     margin = MARGIN * layout.ui_scale
     width = min(NOTICE_WIDTH * layout.ui_scale, layout.panel.x - 2 * margin)
     if width <= 0:
         return []
+    palette = palette_of(state.preferences.theme)
     imgui.set_next_window_pos(imgui.ImVec2(margin, layout.window.height - margin), 0, imgui.ImVec2(0, 1))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
     imgui.begin("notices", None, _FLAGS)
-    dismissed = [notice for index, notice in enumerate(state.notices) if _notice(index, notice)]
+    actions = [action for i, notice in enumerate(state.notices) for action in _notice(i, notice, palette)]
     imgui.end()
-    return [DismissNotice(notice) for notice in dismissed]
+    return actions
 
 
-def _notice(index: int, notice: Notice) -> bool:
-    """One notice; True when its button was pressed."""
-    imgui.push_id(index)
-    pressed = imgui.button("×")
+def _notice(index: int, notice: Notice, palette: Palette) -> list[Action]:
+    actions: list[Action] = [DismissNotice(notice)] if imgui.button(f"×##{index}") else []
     imgui.same_line()
-    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(ERROR_TEXT if notice.is_error else TEXT)))
+    imgui.begin_group()
+    imgui.align_text_to_frame_padding()
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     imgui.text_wrapped(notice.text)
     imgui.pop_style_color()
-    imgui.pop_id()
-    return pressed
+    if notice.offer is not None and imgui.button(f"Use its settings##{index}"):
+        actions.append(TakeSettings(notice.offer))
+    imgui.end_group()
+    return actions

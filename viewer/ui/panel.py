@@ -1,36 +1,40 @@
-"""The panel at the right: what is open, how it is looked at, how far the work is, what the plan chose, and the keys."""
+"""The panel at the right: common commands, what is open and how far the work is, then sections that open and close."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from viewer.actions import (
-    DEPTH_STRENGTH_LIMIT,
-    EXPOSURE_LIMIT_STOPS,
-    Action,
-    SetAperture,
-    SetDepthStrength,
-    SetExposure,
-    SetFocus,
-    aperture_limit,
-    focus_limits,
-)
+from viewer.actions import Action, ApplyPreset, OpenPath, ResumeWork, StopWork, ToggleSection
+from viewer.commands import BY_NAME
 from viewer.layout import Layout
-from viewer.state import AppState, Progress, Scene
-from viewer.ui.style import QUIET_TEXT
+from viewer.limits import aperture_limit
+from viewer.presets import PRESETS
+from viewer.state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source
+from viewer.ui.lens_sections import aperture_section, focus_section, light_section
+from viewer.ui.scene_section import scene_section
+from viewer.ui.style import Palette, palette_of
+from viewer.ui.view_section import view_section
+from viewer.ui.widgets import button, gap, heading, quiet, tooltip
 
-LABEL_WIDTH = 104.0
-NO_DEPTH = "none"
-HELP = (
-    ("Drag, arrows", "move the viewpoint"),
-    ("Click", "focus there"),
-    ("Wheel", "change the focus"),
-    ("R, double-click", "reset"),
-    ("Drop a file", "open it"),
-    ("Esc", "quit"),
+TOOLS = (
+    (icons.ICON_FA_IMAGE, "Open a photo…"),
+    (icons.ICON_FA_FOLDER_OPEN, "Open a folder of views…"),
+    (icons.ICON_FA_FLOPPY_DISK, "Save the picture…"),
+    (icons.ICON_FA_ROTATE_LEFT, "Undo"),
+    (icons.ICON_FA_ROTATE_RIGHT, "Redo"),
+    (icons.ICON_FA_CIRCLE_HALF_STROKE, "Light or dark"),
+    (icons.ICON_FA_CIRCLE_QUESTION, "Mouse and keys"),
 )
+SECTION_WORDS: dict[Section, str] = {
+    "view": "View",
+    "focus": "Focus",
+    "aperture": "Aperture",
+    "light": "Light",
+    "scene": "Scene",
+}
 _FIXED = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
@@ -38,38 +42,59 @@ _FIXED = (
     | imgui.WindowFlags_.no_collapse
     | imgui.WindowFlags_.no_saved_settings
     | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
 )
 
 
 def panel(state: AppState, layout: Layout) -> list[Action]:
     """Build the panel; what the user changed comes back as actions."""
-    rect = layout.panel
+    rect, palette = layout.panel, palette_of(state.preferences.theme)
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
     imgui.begin("panel", None, _FIXED)
-    actions: list[Action] = []
+    actions = _tools(state, layout)
+    gap(layout, 2)
     if state.scene is None:
-        imgui.text_wrapped("Drop a photo or a light-field folder on this window to open it.")
+        actions += _welcome(state, layout)
+        actions += _progress(state, layout)
     else:
-        _scene_lines(state.scene)
-        _gap(layout)
-        actions += _sliders(state, state.scene, layout)
-    _gap(layout)
-    _progress(state.progress, layout)
-    if state.scene and state.scene.plan:
-        _heading("Scene plan", layout)
-        for reason in state.scene.plan.reasons:
-            _quiet(reason)
-    _help(layout)
+        imgui.text_wrapped(state.scene.name)
+        quiet(size_words(state.scene))
+        actions += _progress(state, layout)
+        if state.report is not None:
+            quiet(report_words(state.report))
+        actions += _presets(state.scene, layout)
+        for section in SECTIONS:
+            actions += _section(section, state, state.scene, layout, palette)
     imgui.end()
     return actions
 
 
 def progress_words(progress: Progress) -> str:
-    """The progress in one line, "23 of 81 views, 1.2 s"; empty where nothing was asked for."""
-    if progress.total:
-        return f"{progress.done} of {counted_views(progress.total)}, {progress.seconds:.1f} s"
-    return progress.doing
+    """The progress in one line, "23 of 81 views, 1.2 s, 3 s left"; empty where nothing was asked for."""
+    if not progress.total:
+        return progress.doing
+    words = f"{progress.done} of {counted_views(progress.total)}, {progress.seconds:.1f} s"
+    left_s = seconds_left(progress)
+    return words if left_s < 1 else f"{words}, {time_words(left_s)} left"
+
+
+def report_words(report: DrawReport) -> str:
+    """How long drawing took and how far it is from the final picture: "Drawn in 12 ms, error 0.3 %"."""
+    words = f"Drawn in {report.draw_ms:.0f} ms"
+    if report.samples >= report.samples_converged:
+        return f"{words}, final"
+    return words if report.error is None else f"{words}, error {report.error:.1%}".replace("%", " %")
+
+
+def seconds_left(progress: Progress) -> float:
+    """How long the rest will take if it goes on as before; 0 while nothing is known."""
+    return progress.seconds / progress.done * (progress.total - progress.done) if progress.done else 0.0
+
+
+def time_words(seconds: float) -> str:
+    """Seconds for people: "12 s", "3 min"."""
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def counted_views(number: int) -> str:
@@ -84,71 +109,120 @@ def size_words(scene: Scene) -> str:
     return words if scene.source.quality == "fast" or not is_made_here else f"{words}, {scene.source.quality}"
 
 
-def _scene_lines(scene: Scene) -> None:
-    imgui.text_wrapped(scene.name)
-    _quiet(size_words(scene))
-    _quiet(f"Depth: {scene.depth_source}")
-
-
-def _sliders(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """One row a quantity. Depth strength tells when the edit ends, because it costs a new light field."""
-    optics = state.optics
+def _tools(state: AppState, layout: Layout) -> list[Action]:
+    """A row of icons for commands; what cannot be done now is grey."""
     actions: list[Action] = []
-
-    def add(label: str, value: float, low: float, high: float, form: str, action: Callable[[float], Action]) -> None:
-        changed, new = _slider(label, value, low, high, form, layout)
-        if changed:
-            actions.append(action(new))
-
-    if widest := aperture_limit(scene.grid):
-        add("Focus", optics.focus_disparity, *focus_limits(scene), "%.2f px", SetFocus)
-        add("Aperture", optics.aperture_diameter, 0.0, widest, "%.1f views", SetAperture)
-    add("Exposure", optics.exposure_stops, -EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS, "%+.1f stops", SetExposure)
-    if scene.plan and scene.depth_source != NO_DEPTH:
-        changed, strength = _slider("Depth", state.depth_strength, 0.0, DEPTH_STRENGTH_LIMIT, "× %.2f", layout)
-        is_finished = imgui.is_item_deactivated_after_edit()
-        if changed or is_finished:
-            actions.append(SetDepthStrength(strength, is_finished))
+    spacing = 4 * layout.ui_scale
+    width = (imgui.get_content_region_avail().x - spacing * (len(TOOLS) - 1)) / len(TOOLS)
+    for i, (icon, name) in enumerate(TOOLS):
+        command = BY_NAME[name]
+        chords = f" ({command.chords[0].words})" if command.chords else ""
+        if i:
+            imgui.same_line(0, spacing)
+        if button(f"{icon}##{name}", layout, name.rstrip("…") + chords, _is_possible(name, state), width):
+            actions.append(command.action(state))
     return actions
 
 
-def _slider(label: str, value: float, low: float, high: float, form: str, layout: Layout) -> tuple[bool, float]:
-    imgui.align_text_to_frame_padding()
-    imgui.text(label)
-    imgui.same_line(LABEL_WIDTH * layout.ui_scale)
-    imgui.set_next_item_width(-1)
-    return imgui.slider_float(f"##{label}", value, low, high, form, imgui.SliderFlags_.always_clamp)
+def _is_possible(name: str, state: AppState) -> bool:
+    needs: dict[str, bool] = {
+        "Undo": bool(state.history.past),
+        "Redo": bool(state.history.future),
+        "Save the picture…": state.scene is not None,
+    }
+    return needs.get(name, True)
 
 
-def _progress(progress: Progress, layout: Layout) -> None:
-    """A bar that stays when the work is done, so that nothing below it jumps."""
+def _welcome(state: AppState, layout: Layout) -> list[Action]:
+    """What to do in an empty window, and what was open before."""
+    imgui.text_wrapped("Drop a photo or a folder of views on this window to open it.")
+    gap(layout)
+    return _recent(state.recent, layout)
+
+
+def _recent(paths: tuple[str, ...], layout: Layout) -> list[Action]:
+    actions: list[Action] = []
+    if paths:
+        quiet("Recent")
+    for path in paths:
+        is_chosen, _ = imgui.selectable(f"{_last_part(path)}##{path}", False)
+        tooltip(path, layout)
+        if is_chosen:
+            actions.append(OpenPath(Source(path)))
+    return actions
+
+
+def _last_part(path: str) -> str:
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or path
+
+
+def _progress(state: AppState, layout: Layout) -> list[Action]:
+    """A bar that stays when the work is done, so that nothing below it jumps; a button stops the work."""
+    progress = state.progress
     words = progress_words(progress)
     if not words:
-        return
+        return []
+    actions: list[Action] = []
     fraction = progress.done / progress.total if progress.total else 0.0
     imgui.progress_bar(fraction, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
-    _quiet(words)
+    is_working = (progress.total == 0 or progress.done < progress.total) and state.stopped != state.generation
+    if is_working and _small_button("Cancel", "Make no more views; those that are there stay.", layout):
+        actions.append(StopWork())
+    if state.stopped == state.generation and state.scene and _small_button("Resume", "Make the views again.", layout):
+        actions.append(ResumeWork())
+    quiet(words)
+    return actions
 
 
-def _help(layout: Layout) -> None:
-    _heading("Mouse and keys", layout)
-    for keys, meaning in HELP:
-        _quiet(keys)
-        imgui.same_line(LABEL_WIDTH * layout.ui_scale + imgui.get_style().window_padding.x)
-        imgui.text(meaning)
+def _small_button(text: str, tip: str, layout: Layout) -> bool:
+    """A button at the right end of the line, which goes on at its left."""
+    start, padding = imgui.get_cursor_pos_x(), 2 * imgui.get_style().frame_padding.x
+    room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x - padding
+    imgui.set_cursor_pos_x(start + room)
+    pressed = imgui.small_button(text)
+    tooltip(tip, layout)
+    imgui.same_line(start)
+    return bool(pressed)
 
 
-def _heading(text: str, layout: Layout) -> None:
-    _gap(layout)
-    imgui.separator()
-    imgui.text(text)
+def _presets(scene: Scene, layout: Layout) -> list[Action]:
+    """Three buttons as wide as their words ask."""
+    if not aperture_limit(scene.grid):
+        return []
+    actions: list[Action] = []
+    spacing = 4 * layout.ui_scale
+    words = [name.capitalize() for name in PRESETS]
+    room = imgui.get_content_region_avail().x - spacing * (len(words) - 1)
+    lengths = [imgui.calc_text_size(word).x for word in words]
+    padding = (room - sum(lengths)) / len(words)
+    for i, (name, word, length) in enumerate(zip(PRESETS, words, lengths)):
+        if i:
+            imgui.same_line(0, spacing)
+        if button(word, layout, "Sets focus and aperture; viewpoint and light stay.", width=length + padding):
+            actions.append(ApplyPreset(name))
+    return actions
 
 
-def _quiet(text: str) -> None:
-    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*QUIET_TEXT))
-    imgui.text_wrapped(text)
-    imgui.pop_style_color()
+def _section(section: Section, state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
+    """A heading that opens and closes what is under it. Where there is one view, focus and aperture mean nothing."""
+    if section in ("focus", "aperture", "view") and not aperture_limit(scene.grid):
+        return []
+    builders: dict[Section, Callable[[], list[Action]]] = {
+        "view": lambda: view_section(state, scene, layout, palette),
+        "focus": lambda: focus_section(state, scene, layout),
+        "aperture": lambda: aperture_section(state, scene, layout, palette),
+        "light": lambda: light_section(state, layout),
+        "scene": lambda: [*scene_section(state, scene, layout), *_recent_elsewhere(state, layout)],
+    }
+    is_open = section in state.preferences.open_sections
+    toggled: list[Action] = [ToggleSection(section)] if heading(SECTION_WORDS[section], is_open, layout) else []
+    return toggled + (builders[section]() if is_open else [])
 
 
-def _gap(layout: Layout) -> None:
-    imgui.dummy(imgui.ImVec2(0, 4 * layout.ui_scale))
+def _recent_elsewhere(state: AppState, layout: Layout) -> list[Action]:
+    """Recent files other than the one that is open."""
+    others = tuple(path for path in state.recent if state.source is None or path != state.source.path)
+    if not others:
+        return []
+    gap(layout, 2)
+    return _recent(others, layout)

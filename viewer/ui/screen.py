@@ -1,4 +1,4 @@
-"""The whole screen: the picture behind, panel and notices over it. The same with a window and without."""
+"""The whole screen: the picture behind, overlays, panel, notices and prompts over it. With a window and without."""
 
 from __future__ import annotations
 
@@ -8,18 +8,21 @@ from viewer.actions import Action
 from viewer.layout import Layout
 from viewer.state import AppState
 from viewer.ui.notices import notices
+from viewer.ui.overlays import overlays
 from viewer.ui.panel import panel
-from viewer.ui.style import BACKGROUND
+from viewer.ui.prompts import prompts
+from viewer.ui.style import packed, palette_of
 
 
 def build_screen(state: AppState, layout: Layout, picture_texture: int | None) -> list[Action]:
     """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up."""
-    window = layout.window
+    window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
-    imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, imgui.get_color_u32(BACKGROUND))
+    imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, packed(palette.background))
     if picture_texture is not None and layout.picture is not None:
         _picture(layout, picture_texture)
-    return panel(state, layout) + notices(state, layout)
+        overlays(state, layout)
+    return panel(state, layout) + notices(state, layout) + prompts(state, layout)
 
 
 def _picture(layout: Layout, texture: int) -> None:

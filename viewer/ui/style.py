@@ -1,65 +1,138 @@
-"""How the panels look: fonts, spacing and one accent colour on dark grey."""
+"""How the panels look: fonts, spacing, and one accent colour on grey, dark or light."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import imgui_bundle
 from imgui_bundle import imgui
 
-FONT_SIZE = 16.0
-BACKGROUND = (0.07, 0.07, 0.08, 1.0)
-"""Around the picture, sRGB."""
+from viewer.state import Theme
 
-ACCENT = (0.36, 0.60, 0.72, 1.0)
-ACCENT_DIM = (0.22, 0.42, 0.52, 1.0)
-"""Under white text."""
-TEXT = (0.90, 0.90, 0.90, 1.0)
-QUIET_TEXT = (0.62, 0.63, 0.65, 1.0)
-ERROR_TEXT = (0.96, 0.55, 0.45, 1.0)
-PANEL = (0.115, 0.12, 0.13, 1.0)
-FRAME = (0.19, 0.20, 0.215, 1.0)
-FRAME_HOVERED = (0.24, 0.25, 0.27, 1.0)
+FONT_SIZE = 16.0
+Color = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Palette:
+    """Colours of a theme, sRGB. background: around the picture. warning: what is made up rather than stored."""
+
+    background: Color
+    panel: Color
+    frame: Color
+    frame_hovered: Color
+    text: Color
+    quiet: Color
+    accent: Color
+    accent_dim: Color
+    error: Color
+    warning: Color
+    selected: Color
+
+
+DARK = Palette(
+    background=(0.07, 0.07, 0.08, 1.0),
+    panel=(0.115, 0.12, 0.13, 1.0),
+    frame=(0.19, 0.20, 0.215, 1.0),
+    frame_hovered=(0.24, 0.25, 0.27, 1.0),
+    text=(0.90, 0.90, 0.90, 1.0),
+    quiet=(0.62, 0.63, 0.65, 1.0),
+    accent=(0.36, 0.60, 0.72, 1.0),
+    accent_dim=(0.22, 0.42, 0.52, 1.0),
+    error=(0.96, 0.55, 0.45, 1.0),
+    warning=(0.93, 0.72, 0.38, 1.0),
+    selected=(0.20, 0.36, 0.44, 1.0),
+)
+LIGHT = Palette(
+    background=(0.80, 0.80, 0.81, 1.0),
+    panel=(0.945, 0.945, 0.95, 1.0),
+    frame=(0.86, 0.865, 0.875, 1.0),
+    frame_hovered=(0.81, 0.82, 0.835, 1.0),
+    text=(0.13, 0.14, 0.15, 1.0),
+    quiet=(0.38, 0.39, 0.41, 1.0),
+    accent=(0.12, 0.45, 0.60, 1.0),
+    accent_dim=(0.45, 0.68, 0.79, 1.0),
+    error=(0.72, 0.18, 0.10, 1.0),
+    warning=(0.68, 0.42, 0.02, 1.0),
+    selected=(0.68, 0.82, 0.89, 1.0),
+)
+BACKGROUND = DARK.background
+
+
+@dataclass(frozen=True)
+class Look:
+    """What decides the style. ui_scale multiplies every length (HiDPI, font scale)."""
+
+    ui_scale: float = 1.0
+    theme: Theme = "dark"
+
+
+def palette_of(theme: Theme) -> Palette:
+    """The colours of a theme."""
+    return LIGHT if theme == "light" else DARK
+
+
+def packed(color: Color, alpha: float = 1.0) -> int:
+    """A colour for draw lists."""
+    return int(imgui.get_color_u32(imgui.ImVec4(color[0], color[1], color[2], color[3] * alpha)))
 
 
 def load_fonts() -> None:
-    """Give ImGui a readable sans serif; its own bitmap font stays where the bundle comes without one."""
-    font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
+    """Give ImGui a readable sans serif with icons; its own bitmap font stays where the bundle comes without one."""
+    folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
+    font, icons = folder / "Roboto" / "Roboto-Regular.ttf", folder / "Font_Awesome_6_Free-Solid-900.otf"
+    fonts = imgui.get_io().fonts
     if font.is_file():
-        imgui.get_io().fonts.add_font_from_file_ttf(str(font), FONT_SIZE)
+        fonts.add_font_from_file_ttf(str(font), FONT_SIZE)
+    if font.is_file() and icons.is_file():
+        merged = imgui.ImFontConfig()
+        merged.merge_mode = True
+        merged.glyph_offset = imgui.ImVec2(0, 1)
+        fonts.add_font_from_file_ttf(str(icons), 0.85 * FONT_SIZE, merged)
 
 
-def apply_style(ui_scale: float) -> None:
-    """Set colours and sizes. ui_scale multiplies every length (HiDPI)."""
-    imgui.style_colors_dark()
-    style = imgui.get_style()
-    style.window_padding = imgui.ImVec2(14, 14)
-    style.frame_padding = imgui.ImVec2(8, 4)
-    style.item_spacing = imgui.ImVec2(8, 7)
-    style.window_border_size = 0
-    style.window_rounding = style.frame_rounding = style.grab_rounding = 4
-    style.grab_min_size = 10
-    style.scrollbar_size = 10
-    style.font_size_base = FONT_SIZE
-    style.font_scale_dpi = ui_scale
-    style.scale_all_sizes(ui_scale)
-    for color, value in _colors().items():
+def apply_style(look: Look) -> None:
+    """Set colours and sizes; may be called again between frames."""
+    (imgui.style_colors_light if look.theme == "light" else imgui.style_colors_dark)()
+    style, scale = imgui.get_style(), look.ui_scale
+
+    def pair(x: float, y: float) -> imgui.ImVec2:
+        return imgui.ImVec2(round(x * scale), round(y * scale))
+
+    style.window_padding, style.frame_padding = pair(14, 12), pair(8, 4)
+    style.item_spacing, style.item_inner_spacing = pair(8, 6), pair(6, 4)
+    style.window_border_size = style.popup_border_size = 0
+    style.window_rounding = style.frame_rounding = style.grab_rounding = style.popup_rounding = round(4 * scale)
+    style.grab_min_size = style.scrollbar_size = round(10 * scale)
+    style.indent_spacing = round(12 * scale)
+    style.font_size_base, style.font_scale_dpi = FONT_SIZE, scale
+    for color, value in _colors(palette_of(look.theme)).items():
         style.set_color_(color, imgui.ImVec4(*value))
 
 
-def _colors() -> dict[int, tuple[float, float, float, float]]:
+def _colors(palette: Palette) -> dict[int, Color]:
     c = imgui.Col_
+    clear = (0.0, 0.0, 0.0, 0.0)
     return {
-        c.text: TEXT,
-        c.window_bg: PANEL,
-        c.frame_bg: FRAME,
-        c.frame_bg_hovered: FRAME_HOVERED,
-        c.frame_bg_active: FRAME_HOVERED,
-        c.slider_grab: ACCENT_DIM,
-        c.slider_grab_active: ACCENT,
-        c.plot_histogram: ACCENT,
-        c.button: FRAME,
-        c.button_hovered: FRAME_HOVERED,
-        c.button_active: ACCENT,
-        c.separator: FRAME,
+        c.text: palette.text,
+        c.text_disabled: palette.quiet,
+        c.window_bg: palette.panel,
+        c.popup_bg: palette.frame,
+        c.frame_bg: palette.frame,
+        c.frame_bg_hovered: palette.frame_hovered,
+        c.frame_bg_active: palette.frame_hovered,
+        c.check_mark: palette.accent,
+        c.slider_grab: palette.accent_dim,
+        c.slider_grab_active: palette.accent,
+        c.plot_histogram: palette.accent,
+        c.button: palette.frame,
+        c.button_hovered: palette.frame_hovered,
+        c.button_active: palette.accent_dim,
+        c.header: clear,
+        c.header_hovered: palette.frame,
+        c.header_active: palette.frame_hovered,
+        c.separator: palette.frame,
+        c.scrollbar_bg: clear,
+        c.scrollbar_grab: palette.frame_hovered,
     }

@@ -23,8 +23,11 @@ PICTURES = {
     "preview": ([12], Optics(ViewOffset(1.0, -1.5))),
     "between-views": (EVERY_VIEW, Optics(ViewOffset(0.5, -1.5))),
     "front-in-focus": (EVERY_VIEW, Optics(focus_disparity=3.0, aperture_diameter=4.0)),
-    "background-in-focus": (EVERY_VIEW, Optics(ViewOffset(0.3, 0.0), -4.0, 4.0, -0.5)),
-    "small-aperture": (EVERY_VIEW, Optics(ViewOffset(0.5, 0.5), -4.0, 1.4)),
+    "background-in-focus": (
+        EVERY_VIEW,
+        Optics(ViewOffset(0.3, 0.0), focus_disparity=-4.0, aperture_diameter=4.0, exposure_stops=-0.5),
+    ),
+    "small-aperture": (EVERY_VIEW, Optics(ViewOffset(0.5, 0.5), focus_disparity=-4.0, aperture_diameter=1.4)),
     "half-filled": ([12, 0, 4, 20, 24], Optics(focus_disparity=3.0, aperture_diameter=4.0)),
 }
 

@@ -90,8 +90,12 @@ def test_far_outside_the_grid_stays_finite_and_close(renderer: Renderer) -> None
     eye = ViewOffset(0.0, 4.0)
     assert rms(picture(renderer, eye=eye), SCENE.view(eye)[0], border=14) < 0.06
     picture(renderer, eye=ViewOffset(1e4, -1e4))
-    through_lens = picture(renderer, eye=eye, aperture_diameter=3.0)
-    assert np.array_equal(through_lens, picture(renderer, eye=ViewOffset(0.0, 2.0), aperture_diameter=3.0))
+    samples = aperture_samples(eye, 3.0, GRID, np.ones(GRID, bool))
+    offsets, weights = [sample.wanted for sample in samples], [sample.weight for sample in samples]
+    assert max(offset.s for offset in offsets) == 5.0, "the lens is not cut off where the stored views end"
+    focused = through_aperture(SCENE, offsets, weights, eye, 2.0)
+    through_lens = picture(renderer, eye=eye, focus_disparity=2.0, aperture_diameter=3.0)
+    assert rms(through_lens, focused, border=14) < 0.04
 
 
 @pytest.mark.parametrize("focus", [-1.0, 2.0, 3.0])
@@ -120,7 +124,7 @@ def test_constant_photo_stays_constant(renderer: Renderer, with_disparity: bool,
         renderer.upload_view(index // 5, index % 5, colors, disparity if with_disparity else None)
     for diameter in (0.0, 0.3, 1.0, 1.5, 3.0, 50.0):
         for focus in (-6.0, 0.0, 4.0, 40.0):
-            optics = Optics(ViewOffset(0.4, -0.7), focus, diameter)
+            optics = Optics(ViewOffset(0.4, -0.7), focus_disparity=focus, aperture_diameter=diameter)
             renderer.render(optics, (64, 48))
             error = np.abs(renderer.read_image().astype(int) - (10, 130, 250)).max()
             assert error <= 1, optics
@@ -172,9 +176,9 @@ def test_smoothing_leaves_what_is_in_focus_alone(renderer: Renderer, tmp_path: P
     "optics",
     [
         Optics(ViewOffset(1.2, -0.6)),
-        Optics(ViewOffset(0.0, 0.0), 2.0, 3.0),
-        Optics(ViewOffset(0.4, 0.3), -1.0, 5.0),
-        Optics(ViewOffset(0.0, 0.5), 0.5, 0.8),
+        Optics(ViewOffset(0.0, 0.0), focus_disparity=2.0, aperture_diameter=3.0),
+        Optics(ViewOffset(0.4, 0.3), focus_disparity=-1.0, aperture_diameter=5.0),
+        Optics(ViewOffset(0.0, 0.5), focus_disparity=0.5, aperture_diameter=0.8),
     ],
 )
 def test_error_never_grows_while_the_field_fills(renderer: Renderer, optics: Optics) -> None:
@@ -251,7 +255,7 @@ def test_other_sizes_and_fields_follow_each_other(renderer: Renderer) -> None:
         scene = TwoPlanes(*size)
         scene.fill(renderer, grid)
         for out in ((33, 17), (1, 1), (200, 3)):
-            renderer.render(Optics(ViewOffset(0.2, 0.1), 0.5, 2.0), out)
+            renderer.render(Optics(ViewOffset(0.2, 0.1), focus_disparity=0.5, aperture_diameter=2.0), out)
             assert renderer.read_image().shape == (out[1], out[0], 3)
             assert renderer.ctx.error == "GL_NO_ERROR"
 

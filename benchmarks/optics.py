@@ -1,0 +1,262 @@
+"""Figures of the optics: speed against error for every switch, bokeh from few samples, aliasing, pinhole, memory.
+
+    python -m benchmarks.optics --data FOLDER [--out docs/optics.md] [--rounds 5] [--switches 1000]
+
+FOLDER holds hci_antinous and blender_shop_9x9 (views/vVV_uUU.* and the centre view's disparity as *.npy). Errors are
+against the converged picture of all views, or a plain numpy sum where that is said.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import psutil
+from flip_evaluator import evaluate
+from numpy.typing import NDArray
+
+from benchmarks.light_fields import StoredField, read_field
+from benchmarks.refocus import plain_pass
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.types import GridShape, ViewOffset
+from viewer.gpu.context import GLContext, create_headless
+from viewer.gpu.renderer import Renderer
+from viewer.gpu.view_choice import aperture_samples
+from viewer.state import Optics
+
+Image = NDArray[np.uint8]
+SIZE_PX = 768, 512
+BORDER_PX = 16
+FIVE = ((4, 4), (0, 0), (0, 8), (8, 0), (8, 8))
+EVERY_SECOND = tuple((v, u) for v in range(0, 9, 2) for u in range(0, 9, 2))
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to draw the same picture."""
+
+    name: str
+    stride: int = 1
+    prefilter: bool = True
+    adaptive: bool = True
+    stored: tuple[tuple[int, int], ...] | None = None
+    hdr: bool = False
+    is_converged: bool = False
+
+
+PLAIN = Variant("every view of the aperture")
+VARIANTS = (
+    PLAIN,
+    Variant("every 2nd view across and down", stride=2),
+    Variant("every 3rd view", stride=3),
+    Variant("until converged", is_converged=True),
+    Variant("prefilter off", prefilter=False),
+    Variant("prefilter off, every 2nd view", stride=2, prefilter=False),
+    Variant("tiles skip nothing", adaptive=False),
+    Variant("5x5 views stored", stored=EVERY_SECOND),
+    Variant("5x5 views stored, until converged", stored=EVERY_SECOND, is_converged=True),
+    Variant("5 views stored (centre and corners)", stored=FIVE),
+    Variant("5 views stored, until converged", stored=FIVE, is_converged=True),
+    Variant("textures RGBA16F instead of RGBA8", hdr=True),
+)
+
+
+def psnr_db(image: NDArray[np.float64] | Image, reference: NDArray[np.float64] | Image, border: int = 0) -> float:
+    """Of values 0..255, inside the border."""
+    inside = slice(border, -border or None)
+    difference = image[inside, inside].astype(float) - reference[inside, inside]
+    return float(10 * np.log10(255**2 / max(np.mean(difference**2), 1e-12)))
+
+
+def mean_flip(reference: Image, image: Image) -> float:
+    """Mean FLIP of two sRGB pictures."""
+    pair = [picture.astype(np.float32) / 255 for picture in (reference, image)]
+    return float(evaluate(*pair, "LDR", applyMagma=False)[1])
+
+
+def drawn(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: Variant) -> Image:
+    """The picture of a variant whose views are uploaded."""
+    renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
+    renderer.render(optics, size_px, stride=variant.stride)
+    if variant.is_converged:
+        renderer.refine()
+    return renderer.read_image()
+
+
+def switch_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> list[str]:
+    """Rows of speed against error, one a variant; times in alternation with the plain shader."""
+    renderer = Renderer(gl)
+    flat = field.views.reshape(-1, *field.views.shape[2:])
+    plain = plain_pass(gl.ctx, field.grid, flat, SIZE_PX, optics.aperture_diameter / 2, optics.focus_disparity)
+    field.upload(renderer, field.every)
+    reference = drawn(renderer, optics, SIZE_PX, replace(PLAIN, is_converged=True))
+    rows, uploaded = [], None
+    for variant in VARIANTS:
+        if (variant.stored, variant.hdr) != uploaded:
+            field.upload(renderer, variant.stored or field.every, variant.hdr)
+            uploaded = variant.stored, variant.hdr
+        image = drawn(renderer, optics, SIZE_PX, variant)
+        samples = renderer.samples_drawn
+        count = 1 if variant.is_converged else rounds
+        pairs = [(_seconds(gl, lambda: plain(0.0)), _seconds(gl, lambda v=variant: drawn_only(renderer, optics, v)))
+                 for _ in range(count)]  # fmt: skip
+        ours, ratio = min(own for _, own in pairs), min(own for _, own in pairs) / min(other for other, _ in pairs)
+        rows.append(
+            f"| {variant.name} | {samples} | {1e3 * ours:.0f} | {ratio:.2f} | "
+            f"{psnr_db(image, reference):.1f} | {mean_flip(reference, image):.4f} |"
+        )
+    renderer.release()
+    return rows
+
+
+def drawn_only(renderer: Renderer, optics: Optics, variant: Variant) -> None:
+    """Draw without reading back."""
+    renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
+    renderer.render(optics, SIZE_PX, stride=variant.stride)
+    if variant.is_converged:
+        renderer.refine()
+
+
+def _seconds(gl: GLContext, draw: Callable[[], None]) -> float:
+    gl.ctx.finish()
+    start = time.perf_counter()
+    draw()
+    gl.ctx.finish()
+    return time.perf_counter() - start
+
+
+def bokeh_from_a_quarter(gl: GLContext, field: StoredField, optics: Optics) -> float:
+    """FLIP of the picture from at most a quarter of its samples against the converged one."""
+    renderer = Renderer(gl)
+    field.upload(renderer, field.every)
+    renderer.render(optics, field.size_px)
+    quarter = renderer.read_image()
+    while not renderer.is_converged:
+        if 4 * renderer.samples_drawn <= renderer.samples_converged:
+            quarter = renderer.read_image()
+        renderer.refine(0.0)
+    flip = mean_flip(renderer.read_image(), quarter)
+    renderer.release()
+    return flip
+
+
+def aliasing(gl: GLContext, field: StoredField, optics: Optics) -> tuple[float, float]:
+    """PSNR of refocusing 5x5 stored views, and all 81, against the numpy sum of all 81."""
+    reference = numpy_refocus(field, optics)
+    renderer = Renderer(gl)
+    results = []
+    for stored in (EVERY_SECOND, field.every):
+        field.upload(renderer, stored)
+        image = drawn(renderer, optics, field.size_px, PLAIN)
+        results.append(psnr_db(image, reference, BORDER_PX))
+    renderer.release()
+    return results[0], results[1]
+
+
+def numpy_refocus(field: StoredField, optics: Optics) -> NDArray[np.float64]:
+    """(H, W, 3), 0..255: the weighted mean of the views in linear light, sheared by Catmull-Rom interpolation."""
+    samples = aperture_samples(optics.eye, optics.aperture_diameter, field.grid, np.ones(field.grid, bool))
+    total = np.zeros(field.views.shape[2:])
+    for wanted, row, column, weight in samples:
+        light = linear_from_srgb(field.views[row, column] / 255)
+        by = optics.focus_disparity * (wanted.t - optics.eye.t), optics.focus_disparity * (wanted.s - optics.eye.s)
+        total += weight * shifted(shifted(light, by[0], 0), by[1], 1)
+    return np.clip(srgb_from_linear(total / sum(sample.weight for sample in samples)), 0, 1) * 255.0
+
+
+def shifted(image: NDArray[np.float32], by_px: float, axis: int) -> NDArray[np.float32]:
+    """The image moved along an axis, borders repeated."""
+    whole = int(np.floor(by_px))
+    x = by_px - whole
+    taps = {0: 1 - 2.5 * x**2 + 1.5 * x**3, 1: 0.5 * x + 2 * x**2 - 1.5 * x**3}
+    taps |= {-1: -0.5 * x + x**2 - 0.5 * x**3, 2: -0.5 * x**2 + 0.5 * x**3}
+    index = np.arange(image.shape[axis])
+    places = {k: np.clip(index - whole - k, 0, len(index) - 1) for k in taps}
+    return sum(weight * np.take(image, places[k], axis) for k, weight in taps.items())  # type: ignore[return-value]
+
+
+def pinhole_from_five(gl: GLContext, field: StoredField) -> tuple[float, float]:
+    """Mean and least PSNR over the views that are not stored."""
+    renderer = Renderer(gl)
+    field.upload(renderer, FIVE)
+    values = []
+    for at in field.every:
+        if at not in FIVE:
+            renderer.render(Optics(eye=field.grid.offset(*at)), field.size_px)
+            renderer.refine()
+            values.append(psnr_db(renderer.read_image(), field.views[at]))
+    renderer.release()
+    return float(np.mean(values)), min(values)
+
+
+def memory_mib(gl: GLContext, switches: int) -> Iterator[tuple[int, float]]:
+    """Resident memory after so many switches of photo, size and aperture. Software GL keeps its textures there too."""
+    renderer, rng, process = Renderer(gl), np.random.default_rng(0), psutil.Process(os.getpid())
+    for done in range(1, switches + 1):
+        width, height = (96, 64) if done % 2 else (80, 120)
+        grid = GridShape(3, 3)
+        renderer.open_field(grid, width, height, hdr=done % 3 == 0, with_disparity=done % 5 > 0)
+        colors = rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
+        stored = (colors / 255).astype(np.float16) if done % 3 == 0 else colors
+        for at in np.ndindex(*grid):
+            renderer.upload_view(*at, stored, rng.normal(0, 3, (height, width)).astype(np.float32))
+        size_px = 200 + 40 * (done % 7), 160 + 20 * (done % 4)
+        optics = Optics(ViewOffset(0.1, 0.2), focus_disparity=0.5, aperture_diameter=float(done % 4))
+        renderer.render_in_time(optics, size_px, 0.01)
+        renderer.refine(0.01)
+        if done in (switches // 10, switches // 2, switches):
+            yield done, process.memory_info().rss / 2**20
+    renderer.release()
+
+
+def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[str]:
+    """Lines of Markdown."""
+    antinous, shop = read_field(data / "hci_antinous"), read_field(data / "blender_shop_9x9")
+    bokeh = {
+        antinous.name: Optics(focus_disparity=2.4, aperture_diameter=8.0),
+        shop.name: Optics(focus_disparity=4.8, aperture_diameter=4.0),
+    }
+    yield "# Optics: speed against error\n"
+    yield f"Made by `python -m benchmarks.optics`. {gl.renderer}, {os.cpu_count()} cores.\n"
+    yield f"## Switches\n\n{shop.name}, {SIZE_PX[0]}x{SIZE_PX[1]}, aperture of 4 view steps, focus at 4.8 px. Times are"
+    yield "the least of several, in alternation with a plain shift-and-sum shader (25 fetches a pixel, no prefilter);"
+    yield "errors are against the converged picture of all 81 views.\n"
+    yield "| variant | samples | ms | x plain | PSNR dB | FLIP |\n| --- | --- | --- | --- | --- | --- |"
+    yield from switch_table(gl, shop, bokeh[shop.name], rounds)
+    yield "\n## Figures\n\n| what | figure | measured |\n| --- | --- | --- |"
+    for field in (antinous, shop):
+        flip = bokeh_from_a_quarter(gl, field, replace(bokeh[field.name], aperture_diameter=8.0))
+        yield f"| bokeh at 1/4 of the samples against converged, {field.name} | FLIP <= 0.02 | {flip:.4f} |"
+    for field in (antinous, shop):
+        sparse, dense = aliasing(gl, field, replace(bokeh[field.name], aperture_diameter=8.0))
+        measured = f"{sparse:.2f} dB against {dense:.2f} dB: {dense - sparse:+.2f} dB"
+        yield f"| refocus from 5x5 stored views against all 81, {field.name} | within 0.5 dB | {measured} |"
+    mean, least = pinhole_from_five(gl, antinous)
+    yield f"| pinhole from 5 stored views, {antinous.name} | >= 44 dB | mean {mean:.2f}, least {least:.2f} dB |"
+    memory = ", ".join(f"{mib:.0f} MiB after {done}" for done, mib in memory_mib(gl, switches))
+    yield f"| memory over {switches} switches of photo, size and aperture | flat | {memory} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--switches", type=int, default=1000)
+    args = parser.parse_args()
+    gl = create_headless()
+    lines = []
+    for line in report(gl, args.data, args.rounds, args.switches):
+        lines.append(line)
+        print(line, flush=True)
+    if args.out:
+        args.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

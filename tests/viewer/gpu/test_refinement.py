@@ -1,0 +1,206 @@
+"""A picture drawn in a hurry becomes better while it stands still, ends at one result, and tells how far it is."""
+
+from __future__ import annotations
+
+import gc
+import math
+import shutil
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+
+from iibr_core.resources import resource_folder
+from iibr_core.types import GridShape, InputError, ViewOffset
+from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
+from viewer.gpu.context import GLContext
+from viewer.gpu.error_estimate import ErrorEstimate
+from viewer.gpu.programs import ProgramCache, ShaderError
+from viewer.gpu.renderer import Renderer
+from viewer.gpu.summation import EDGE_ROUNDS, even_places
+from viewer.state import CENTRE, Optics
+
+GRID = GridShape(5, 5)
+SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=0.0, radius_px=25.0)
+SIZE = SCENE.width, SCENE.height
+WIDE = Optics(aperture_diameter=4.0)
+
+
+def converged(renderer: Renderer, optics: Optics) -> np.ndarray:
+    renderer.render(optics, SIZE)
+    renderer.refine()
+    return renderer.read_image()
+
+
+def test_refining_comes_nearer_to_a_dense_aperture(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    dense = np.arange(-2.45, 2.5, 0.1)
+    offsets = [ViewOffset(t, s) for t in dense for s in dense if math.hypot(t, s) < 2.5]
+    weights = [min(2.5 - math.hypot(*offset), 1.0) for offset in offsets]
+    truth = through_aperture(SCENE, offsets, weights, CENTRE, 0.0)
+    errors = []
+    for stride in (3, 2, 1):
+        renderer.render(WIDE, SIZE, stride=stride)
+        errors.append(rms(renderer.read_image(), truth, border=20))
+    renderer.refine()
+    errors.append(rms(renderer.read_image(), truth, border=20))
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 0.005
+
+
+def test_small_steps_end_at_the_same_picture_as_one_large(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    at_once = converged(renderer, WIDE)
+    renderer.render_in_time(WIDE, SIZE, 1e-6)
+    samples = [renderer.report.samples]
+    while not renderer.is_converged:
+        renderer.refine(1e-6)
+        samples.append(renderer.report.samples)
+    assert samples[0] < 16
+    assert len(samples) > 10
+    assert samples[1:] == sorted(samples[1:])
+    assert renderer.report.samples_converged == samples[-1]
+    assert np.abs(renderer.read_image().astype(int) - at_once).max() <= 1
+    renderer.refine()
+    assert renderer.report.samples == samples[-1], "nothing is drawn once it has converged"
+
+
+def test_more_time_takes_more_samples(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    drawn = []
+    for budget_s in (1e-9, 60.0):
+        renderer.render_in_time(WIDE, SIZE, budget_s)
+        drawn.append(renderer.report.samples)
+    assert drawn[0] < drawn[1] == 21
+
+
+def test_the_error_estimate_is_near_the_error(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    renderer.render_in_time(WIDE, SIZE, 1e-9)
+    assert renderer.report.error is None, "nothing is known before the first refinement"
+    hurried = renderer.read_image()
+    renderer.refine()
+    assert renderer.report.error is not None
+    true_error = rms(hurried, renderer.read_image(), border=1)
+    renderer.render_in_time(WIDE, SIZE, 1e-9)
+    assert renderer.report.error == pytest.approx(true_error, rel=0.3)
+
+
+def test_error_estimate_of_means_of_noise() -> None:
+    """The mean of n pictures of noise is off by sigma / sqrt(n)."""
+    noise = np.random.default_rng(0).normal(0, 20, (16, 40, 40, 3))
+    estimate = ErrorEstimate()
+    estimate.begin(2)
+    assert estimate.is_new
+    estimate.add((128 + noise[0]).astype(np.uint8), 0)
+    for count in (1, 2, 4, 8, 16):
+        estimate.add(np.clip(128 + noise[:count].mean(0), 0, 255).astype(np.uint8), count)
+    assert estimate.estimate == pytest.approx(20 / 255 / 4, rel=0.2)
+    estimate.begin(2)
+    assert estimate.estimate == pytest.approx(20 / 255, rel=0.2), "of the hurried picture"
+
+
+def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Renderer) -> None:
+    """A hard edge between two colours takes colours in between, as in a finely sampled picture."""
+    scene = TwoPlanes(contrast=0.0)
+    scene.fill(renderer, GRID)
+    size = scene.width, scene.height
+    renderer.render(Optics(ViewOffset(0.5, 0.3)), size)
+    tones = len(np.unique(renderer.read_image().reshape(-1, 3), axis=0))
+    renderer.refine()
+    assert renderer.report.samples == EDGE_ROUNDS
+    assert len(np.unique(renderer.read_image().reshape(-1, 3), axis=0)) >= tones + EDGE_ROUNDS - 3
+    renderer.render(Optics(ViewOffset(1.0, -2.0)), size)
+    assert renderer.is_converged
+    assert np.abs(renderer.read_image().astype(int) - scene.view(ViewOffset(1.0, -2.0))[0]).max() <= 1
+
+
+def test_places_are_even_and_start_in_the_middle() -> None:
+    places = np.array(even_places(64))
+    assert tuple(places[0]) == (0, 0)
+    assert np.abs(places).max() <= 0.5
+    counts, _, _ = np.histogram2d(*places.T, bins=4, range=[[-0.5, 0.5]] * 2)
+    assert counts.min() >= 2
+    assert counts.max() <= 5
+
+
+@pytest.mark.parametrize("optics", [Optics(), WIDE, Optics(aperture_diameter=1.5), Optics(dolly=1.0)])
+def test_an_empty_field_is_black_and_done(renderer: Renderer, optics: Optics) -> None:
+    SCENE.open(renderer, GRID)
+    renderer.render_in_time(optics, SIZE, 0.01)
+    assert renderer.is_converged
+    assert renderer.read_image().max() == 0
+
+
+def live_objects() -> int:
+    """GL objects that Python still holds."""
+    kinds = moderngl.Texture, moderngl.TextureArray, moderngl.Framebuffer, moderngl.Buffer, moderngl.Program
+    held = (thing for thing in gc.get_objects() if type(thing) in kinds)
+    return sum(not isinstance(thing.mglo, moderngl.mgl.InvalidObject) for thing in held)
+
+
+def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer: Renderer) -> None:
+    ctx, counts = renderer.ctx, []
+    ctx.gc_mode = "context_gc"  # what is dropped without being released is kept in a list
+    for k in range(30):
+        scene = TwoPlanes(48 + 16 * (k % 2), 40)
+        scene.fill(renderer, GridShape(2 + k % 3, 3), with_disparity=k % 5 > 0)
+        optics = Optics(ViewOffset(0.1, 0.0), dolly=0.5 * (k % 2), aperture_diameter=float(k % 4))
+        renderer.render_in_time(optics, (60 + 20 * (k % 4), 50), 0.01)
+        renderer.refine(0.0)
+        counts.append(live_objects() - len(renderer.programs))
+    gc.collect()
+    assert all(isinstance(thing, moderngl.mgl.InvalidObject) for thing in ctx.objects), "dropped, but not released"
+    assert max(counts[10:]) <= max(counts[:10])
+    ctx.gc_mode = None
+
+
+def test_fewer_views_are_kept_where_not_all_fit_and_the_picture_still_comes(
+    renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(gl.ctx.info, "GL_MAX_ARRAY_TEXTURE_LAYERS", 10)
+    SCENE.fill(renderer, GRID)
+    assert renderer.field is not None
+    assert renderer.field.present.sum() == 9
+    assert renderer.note.startswith("showing every 2nd view across and down: a grid of 5x5 needs 25 texture layers")
+    for optics in (WIDE, Optics(dolly=1.0, aperture_diameter=2.0)):
+        kept = converged(renderer, optics)
+        monkeypatch.undo()
+        SCENE.fill(renderer, GRID)
+        assert renderer.note == ""
+        assert rms(kept, converged(renderer, optics), border=8) < 0.03
+        monkeypatch.setitem(gl.ctx.info, "GL_MAX_ARRAY_TEXTURE_LAYERS", 10)
+        SCENE.fill(renderer, GRID)
+
+
+def test_views_too_large_for_the_driver_leave_the_old_field(renderer: Renderer, gl: GLContext) -> None:
+    SCENE.fill(renderer, GRID)
+    before = converged(renderer, WIDE)
+    with pytest.raises(InputError, match=r"px exceed"):
+        renderer.open_field(GRID, gl.max_texture_size + 1, 4, hdr=False, with_disparity=False)
+    assert np.array_equal(converged(renderer, WIDE), before)
+
+
+def test_a_broken_shader_keeps_the_last_good_program_until_it_is_mended(gl: GLContext, tmp_path: Path) -> None:
+    folder = tmp_path / "shaders"
+    shutil.copytree(resource_folder("shaders"), folder)
+    programs = ProgramCache(gl.ctx, folder)
+    good = programs.get("present.frag")
+    assert programs.reload() == [], "nothing changed"
+    assert programs.get("present.frag") is good
+    text = (folder / "present.frag").read_text()
+    (folder / "present.frag").write_text(text.replace("void main() {", "void main() { nonsense;"))
+    problems = programs.reload()
+    assert len(problems) == 1
+    assert problems[0].startswith("present.frag:")
+    assert "nonsense" in problems[0]
+    assert programs.get("present.frag") is good
+    (folder / "present.frag").write_text(text + "// mended\n")
+    assert programs.reload() == []
+    mended = programs.get("present.frag")
+    assert mended is not good
+    (folder / "smooth.frag").write_text("#version 330 core\n")
+    with pytest.raises(ShaderError, match=r"smooth\.frag"):
+        programs.get("smooth.frag")  # never compiled before: there is no good one
+    programs.release()

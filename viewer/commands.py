@@ -1,0 +1,101 @@
+"""Everything that can be done by name or key: what the keyboard, the map on F1 and the command palette read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from viewer.actions import (
+    Action,
+    ApplyPreset,
+    AskToSave,
+    DoTask,
+    PauseMotion,
+    Quit,
+    Redo,
+    ResetOptics,
+    ReturnHome,
+    SetFontScale,
+    SetLoop,
+    SetTheme,
+    ShowPrompt,
+    ShowTiltHandles,
+    StopWork,
+    Undo,
+)
+from viewer.presets import PRESETS
+from viewer.state import LOOPS, AppState, ChooseTask, LoopKind, PalettePrompt
+
+FONT_STEP = 1.1
+LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
+
+
+@dataclass(frozen=True)
+class Chord:
+    """A key by ImGui's name for it, and what is held down with it."""
+
+    key: str
+    ctrl: bool = False
+    shift: bool = False
+
+    @property
+    def words(self) -> str:
+        """As people write it: "Ctrl+Shift+Z"."""
+        key = {"equal": "+", "minus": "−", "_0": "0", "space": "Space"}.get(self.key, self.key.upper())
+        return "Ctrl+" * self.ctrl + "Shift+" * self.shift + key
+
+
+@dataclass(frozen=True)
+class Command:
+    """One thing that can be done. action: of the state in which it was asked for."""
+
+    name: str
+    action: Callable[[AppState], Action]
+    chords: tuple[Chord, ...] = ()
+
+
+def _always(action: Action) -> Callable[[AppState], Action]:
+    return lambda state: action
+
+
+def _scaled(factor: float) -> Callable[[AppState], Action]:
+    return lambda state: SetFontScale(state.preferences.font_scale * factor)
+
+
+def _help_toggled(state: AppState) -> Action:
+    return ShowPrompt(None if state.prompt == "help" else "help")
+
+
+def _palette_toggled(state: AppState) -> Action:
+    return ShowPrompt(None if isinstance(state.prompt, PalettePrompt) else PalettePrompt())
+
+
+COMMANDS: tuple[Command, ...] = (
+    Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
+    Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
+    Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
+    Command("Undo", _always(Undo()), (Chord("z", ctrl=True),)),
+    Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True))),
+    Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),
+    Command("Viewpoint back to the middle", _always(ReturnHome()), (Chord("c"),)),
+    *(Command(f"Preset: {name}", _always(ApplyPreset(name))) for name in PRESETS),
+    *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
+    Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
+    Command("Motion: stop", _always(SetLoop(None))),
+    Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
+    Command("Stop making views", _always(StopWork())),
+    Command("Light or dark", lambda s: SetTheme("dark" if s.preferences.theme == "light" else "light")),
+    Command("Larger text", _scaled(FONT_STEP), (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True))),
+    Command("Smaller text", _scaled(1 / FONT_STEP), (Chord("minus", ctrl=True),)),
+    Command("Usual text size", _always(SetFontScale(1.0)), (Chord("_0", ctrl=True),)),
+    Command("All commands", _palette_toggled, (Chord("p", ctrl=True),)),
+    Command("Mouse and keys", _help_toggled, (Chord("f1"),)),
+    Command("Quit", _always(Quit()), (Chord("q", ctrl=True),)),
+)
+BY_NAME = {command.name: command for command in COMMANDS}
+
+
+def commands_matching(text: str) -> tuple[Command, ...]:
+    """Commands whose names hold every word typed."""
+    words = text.lower().split()
+    return tuple(command for command in COMMANDS if all(word in command.name.lower() for word in words))

@@ -1,0 +1,64 @@
+"""Writing the picture with its settings inside, so that it can be taken again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.types import InputError
+from viewer.saved_settings import ATTRIBUTE, settings_text
+from viewer.stage import Stage
+from viewer.state import AppState, SavedSettings, SaveTask
+
+SUFFIXES = (".png", ".exr")
+
+
+class AlreadyThereError(InputError):
+    """A file of this name exists, and nobody said that it may go."""
+
+
+def settings_of(state: AppState, size_px: tuple[int, int]) -> SavedSettings:
+    """What it takes to take the present picture again. size_px: (width, height)."""
+    assert state.source is not None
+    source = replace(state.source, path="", disparity_path=None)
+    return SavedSettings(state.optics, state.depth_strength, source, size_px)
+
+
+def save_picture(stage: Stage, state: AppState, task: SaveTask) -> Path:
+    """Draw the picture in the size asked for and write it; returns the path written.
+
+    Raises AlreadyThereError, and InputError for other endings, sizes beyond the graphics card, and unwritable places.
+    """
+    path = Path(task.path.strip()).expanduser()
+    if not path.name:
+        raise InputError("no file name was given: write one that ends in .png or .exr")
+    if not path.suffix:
+        path = path.with_name(f"{path.name}.png")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: can be written as .png or .exr only")
+    if path.exists() and not task.may_replace:
+        raise AlreadyThereError(f"{path}: there is a file of this name already")
+    write_picture(path, drawn_pixels(stage, state, task.size_px), state, task.size_px)
+    return path
+
+
+def write_picture(path: Path, pixels: NDArray[np.uint8], state: AppState, size_px: tuple[int, int]) -> None:
+    """Write pixels with the settings of the state inside. Raises InputError."""
+    from iibr_core.formats.photo import write_image
+
+    write_image(path, pixels, {ATTRIBUTE: settings_text(settings_of(state, size_px))})
+
+
+def drawn_pixels(stage: Stage, state: AppState, size_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """The picture with every sample it will get, (height, width, 3), sRGB-encoded.
+
+    Raises InputError where the graphics driver cannot draw that size.
+    """
+    largest = int(stage.renderer.ctx.info["GL_MAX_TEXTURE_SIZE"])
+    if max(size_px) > largest:
+        raise InputError(f"{size_px[0]}x{size_px[1]} px: this graphics driver draws at most {largest} px a side")
+    stage.converge(state, size_px)
+    return stage.renderer.read_image()

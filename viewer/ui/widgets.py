@@ -1,0 +1,116 @@
+"""The few widgets the panel is made of, all in one rhythm: a label at the left, the control beside it, a tooltip."""
+
+from __future__ import annotations
+
+from imgui_bundle import icons_fontawesome_6 as icons
+from imgui_bundle import imgui
+
+from viewer.layout import Layout
+
+LABEL_WIDTH = 92.0
+
+
+def label(text: str, layout: Layout, tip: str = "") -> None:
+    """A row's label; what comes next stands beside it."""
+    imgui.align_text_to_frame_padding()
+    imgui.text(text)
+    tooltip(tip, layout)
+    imgui.same_line(LABEL_WIDTH * layout.ui_scale + imgui.get_style().window_padding.x)
+    imgui.set_next_item_width(-1)
+
+
+def slider(
+    text: str,
+    value: float,
+    limits: tuple[float, float],
+    form: str,
+    layout: Layout,
+    tip: str = "",
+    is_logarithmic: bool = False,
+) -> float | None:
+    """A row with a slider; the new value where the user changed it. form: printf-like. Ctrl+click types a value."""
+    label(text, layout, tip)
+    flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if is_logarithmic else 0)
+    changed, new = imgui.slider_float(f"##{text}", value, *limits, form, flags)
+    tooltip(tip, layout)
+    return new if changed else None
+
+
+def whole_slider(text: str, value: int, limits: tuple[int, int], layout: Layout, tip: str = "") -> int | None:
+    """A row with a slider over whole numbers."""
+    label(text, layout, tip)
+    changed, new = imgui.slider_int(f"##{text}", value, *limits, "%d", imgui.SliderFlags_.always_clamp)
+    tooltip(tip, layout)
+    return new if changed else None
+
+
+def checkbox(text: str, is_on: bool, layout: Layout, tip: str = "") -> bool | None:
+    """A box to tick; the new value where the user changed it."""
+    changed, new = imgui.checkbox(text, is_on)
+    tooltip(tip, layout)
+    return new if changed else None
+
+
+def button(text: str, layout: Layout, tip: str = "", is_enabled: bool = True, width: float = 0.0) -> bool:
+    """A button; True when it was pressed."""
+    imgui.begin_disabled(not is_enabled)
+    pressed = imgui.button(text, imgui.ImVec2(width, 0))
+    imgui.end_disabled()
+    tooltip(tip, layout)
+    return bool(pressed)
+
+
+def choice(text: str, is_chosen: bool, layout: Layout, size: tuple[float, float], tip: str = "") -> bool:
+    """A button that stays lit while it is chosen; True when it was pressed."""
+    if is_chosen:
+        for color in (imgui.Col_.button, imgui.Col_.button_hovered):
+            imgui.push_style_color(color, imgui.get_style().color_(imgui.Col_.slider_grab))
+    pressed = imgui.button(text, imgui.ImVec2(*size))
+    if is_chosen:
+        imgui.pop_style_color(2)
+    tooltip(tip, layout)
+    return bool(pressed)
+
+
+def heading(text: str, is_open: bool, layout: Layout) -> bool:
+    """A section's heading over the whole width; True when it was pressed, to open or close the section."""
+    icon = icons.ICON_FA_CHEVRON_DOWN if is_open else icons.ICON_FA_CHEVRON_RIGHT
+    style = imgui.get_style()
+    corner = imgui.get_cursor_screen_pos()
+    width, height = imgui.get_content_region_avail().x, imgui.get_frame_height()
+    pressed = imgui.invisible_button(f"section {text}", imgui.ImVec2(width, height))
+    draw = imgui.get_window_draw_list()
+    if imgui.is_item_hovered():
+        far = imgui.ImVec2(corner.x + width, corner.y + height)
+        draw.add_rect_filled(corner, far, imgui.get_color_u32(imgui.Col_.frame_bg), style.frame_rounding)
+    y = corner.y + style.frame_padding.y
+    small, middle = 0.65 * imgui.get_font_size(), 0.2 * imgui.get_font_size()
+    quiet_color = imgui.get_color_u32(imgui.Col_.text_disabled)
+    draw.add_text(imgui.get_font(), small, imgui.ImVec2(corner.x, y + middle), quiet_color, icon)
+    indent = round(20 * layout.ui_scale)
+    draw.add_text(imgui.ImVec2(corner.x + indent, y), imgui.get_color_u32(imgui.Col_.text), text)
+    return bool(pressed)
+
+
+def quiet(text: str) -> None:
+    """Words that do not ask for attention."""
+    imgui.push_style_color(imgui.Col_.text, imgui.get_style().color_(imgui.Col_.text_disabled))
+    imgui.text_wrapped(text)
+    imgui.pop_style_color()
+
+
+def gap(layout: Layout, units: float = 4.0) -> None:
+    """A little room."""
+    imgui.dummy(imgui.ImVec2(0, units * layout.ui_scale))
+
+
+def tooltip(text: str, layout: Layout) -> None:
+    """Words that come up while the pointer rests on the last item, beside the panel: they must not hide its widgets."""
+    if text and imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
+        corner = imgui.ImVec2(layout.panel.x - 4 * layout.ui_scale, imgui.get_item_rect_min().y)
+        imgui.set_next_window_pos(corner, 0, imgui.ImVec2(1, 0))
+        imgui.begin_tooltip()
+        imgui.push_text_wrap_pos(260 * layout.ui_scale)
+        imgui.text(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
