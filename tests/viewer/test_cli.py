@@ -83,7 +83,7 @@ def test_quality_says_where_the_transformer_runs(
     from iibr_core.formats.photo import read_photo
 
     disparity = photo_path.with_name("scene_disparity.npy")
-    slope = 0.15 * np.abs(np.arange(WIDTH) % 24 - 12)
+    slope = 0.5 * np.abs(np.arange(WIDTH) % 24 - 12)
     np.save(disparity, np.load(disparity) + slope)  # enough for hypotheses to differ, too little to be contested
     made, shown = {}, {}
     for quality in ("fast", "balanced", "exact"):
