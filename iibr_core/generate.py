@@ -13,6 +13,7 @@ import numpy as np
 from iibr_core.color import stored_from_encoded
 from iibr_core.contested import Contested
 from iibr_core.plan import ScenePlan
+from iibr_core.rays import RaySet
 from iibr_core.resources import resource_folder
 from iibr_core.synthesis import Cancelled, RenderedView, ViewSynthesis, rays_of_photo
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo, Quality, ViewOffset, ViewUpdate
@@ -48,28 +49,49 @@ def generate(
     remaining = [(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
     if not remaining:
         return
-    farthest = max(max(map(abs, grid.offset(v, u))) for v, u in remaining)
     try:
         transformer = transformer_for(quality)
-        first = _farthest_views(grid) if plan.has_disocclusion else []
-        rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(first))
-        with ViewSynthesis(should_stop) as synthesis:
-            for index in first:
-                offset = grid.offset(*index)
-                view = synthesis.render(rays, offset)
-                if view.occluded.any():
-                    rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
-                if transformer is None:
-                    remaining.remove(index)
-                    yield _update(index, view, photo.is_hdr)
+        rays, farthest_views = ray_set(photo, disparity, plan, should_stop)
+        for index, view in farthest_views:
+            if transformer is None:
+                remaining.remove(index)
+                yield _update(index, view, photo.is_hdr)
         # At every quality the ray set is the closed form's: its disparity is smoother, and so is what is inpainted.
         with ViewSynthesis(should_stop, transformer, quality == "exact") as synthesis:
-            while remaining:
-                index = _nearest(grid, remaining, nearest_to())
-                remaining.remove(index)
-                yield _update(index, synthesis.render(rays, grid.offset(*index)), photo.is_hdr)
+
+            def made(index: tuple[int, int]) -> ViewUpdate:
+                return _update(index, synthesis.render_alone(rays, grid.offset(*index)), photo.is_hdr)
+
+            yield from synthesis.side_by_side(made, _in_order(grid, remaining, nearest_to))
     except Cancelled:
         return
+
+
+def ray_set(
+    photo: Photo, disparity: Disparity, plan: ScenePlan, should_stop: Callable[[], bool] = lambda: False
+) -> tuple[RaySet, Iterator[tuple[tuple[int, int], RenderedView]]]:
+    """The rays that every view of `plan.grid` is made of, and the farthest views by their indices.
+
+    The set is final once the farthest views have been taken: each adds what it disoccluded. Taking one raises Cancelled
+    once should_stop is true.
+    """
+    grid = plan.grid
+    farthest = max(*map(abs, grid.offset(0, 0)), *map(abs, grid.offset(grid.rows - 1, grid.columns - 1)), 1.0)
+    indices = _farthest_views(grid) if plan.has_disocclusion else []
+    rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(indices))
+    return rays, _completing(rays, grid, indices, should_stop)
+
+
+def _completing(
+    rays: RaySet, grid: GridShape, indices: list[tuple[int, int]], should_stop: Callable[[], bool]
+) -> Iterator[tuple[tuple[int, int], RenderedView]]:
+    with ViewSynthesis(should_stop) as synthesis:
+        for index in indices:
+            offset = grid.offset(*index)
+            view = synthesis.render(rays, offset)
+            if view.occluded.any():
+                rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
+            yield index, view
 
 
 def transformer_for(quality: Quality) -> Callable[[Contested], FloatImage] | None:
@@ -95,14 +117,20 @@ def _farthest_views(grid: GridShape) -> list[tuple[int, int]]:
     return [index for index in dict.fromkeys(indices) if index != grid.centre]
 
 
-def _nearest(grid: GridShape, indices: list[tuple[int, int]], eye: ViewOffset) -> tuple[int, int]:
-    """The index whose view is nearest to the eye; the first of equals."""
+def _in_order(
+    grid: GridShape, remaining: list[tuple[int, int]], nearest_to: Callable[[], ViewOffset]
+) -> Iterator[tuple[int, int]]:
+    """Each time the index whose view is nearest to where the user looks then; the first of equals."""
 
     def distance(index: tuple[int, int]) -> float:
         offset = grid.offset(*index)
         return (offset.t - eye.t) ** 2 + (offset.s - eye.s) ** 2
 
-    return min(indices, key=distance)
+    while remaining:
+        eye = nearest_to()
+        index = min(remaining, key=distance)
+        remaining.remove(index)
+        yield index
 
 
 def _update(index: tuple[int, int], view: RenderedView, is_hdr: bool) -> ViewUpdate:

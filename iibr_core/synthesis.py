@@ -1,11 +1,13 @@
-"""One view from the ray set: candidates, weights, colours, occlusion mask, fill. Row bands run side by side."""
+"""One view from the ray set: candidates, weights, colours, occlusion mask, fill. Row bands, or views, side by side."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -17,18 +19,19 @@ from iibr_core.contested import REACH_PX, Contested, decide, find_contested
 from iibr_core.inpaint.background import fill_background
 from iibr_core.lookup import OWN_SURFACE_PX, look_up_colors
 from iibr_core.mixed_pixels import split_mixed_pixels
-from iibr_core.occlusion import occlusion_mask
+from iibr_core.occlusion import entropy, occlusion_mask
 from iibr_core.rays import RaySet
 from iibr_core.types import FloatImage, ViewOffset
 from iibr_core.weights import closed_form_weights
 
-MOST_BAND_PIXELS = 1 << 18
+MOST_BAND_PIXELS = 1 << 17
 """Of a row band: a cancelled view stops after one, within some 30 ms."""
 EDGE_PX = 2.0
 """A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
 
 THREADS = os.cpu_count() or 1
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -42,12 +45,14 @@ class RenderedView:
 
     colors: (H, W, 3) sRGB-encoded. disparity: (H, W). occluded: (H, W), True where no source showed anything, so that
     it was filled here. inpainted: (H, W), True where the photo showed nothing: filled here or in an earlier view.
+    entropy: (H, W) in [0, 1], of the closed form's weights, or None where it was not asked for.
     """
 
     colors: FloatImage
     disparity: FloatImage
     occluded: NDArray[np.bool_]
     inpainted: NDArray[np.bool_]
+    entropy: FloatImage | None = None
 
 
 def rays_of_photo(colors: FloatImage, disparity: FloatImage, farthest_views: float, more: int) -> RaySet:
@@ -73,11 +78,14 @@ class ViewSynthesis:
         transformer: Callable[[Contested], FloatImage] | None = None,
         every: bool = False,
         slots: int = 5,
+        keeps_entropy: bool = False,
     ) -> None:
-        """transformer: gives the weights (N, K) of contested rays; None: closed form. every: of all rays."""
+        """transformer: gives the weights (N, K) of contested rays; None: closed form. every: of all rays.
+        keeps_entropy: whether views bring the entropy of their weights.
+        """
         self._should_stop = should_stop
         self._transformer, self._every = transformer, every
-        self._slots = slots
+        self._slots, self._keeps_entropy = slots, keeps_entropy
         self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rows")
 
     def __enter__(self) -> ViewSynthesis:
@@ -89,25 +97,29 @@ class ViewSynthesis:
         self._threads.shutdown(cancel_futures=True)
 
     def render(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
-        """The view at an offset, its holes filled.
+        """The view at an offset, its holes filled; row bands run side by side.
 
         Raises Cancelled once should_stop is true.
         """
-        height, width = rays.size
-        if self._transformer:
-            rays.surroundings  # noqa: B018 - made before the threads ask for it
+        return self._filled(rays, offset, self._threads.map(self._band(rays, offset), self._rows(rays, THREADS)))
 
-        def seen(rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
-            return self._seen(rays, offset, rows)
+    def render_alone(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
+        """The same view, its row bands one after the other in the calling thread: the way for many views."""
+        return self._filled(rays, offset, map(self._band(rays, offset), self._rows(rays, 1)))
 
-        parts = zip(*self._bands(seen, height, width))
-        colors, disparity, source, occluded = (np.concatenate(part) for part in parts)
-        if occluded.any():
-            fill_background(colors, disparity, occluded, rays.photo_disparity, offset)
-        return RenderedView(colors, disparity, occluded, occluded | (source >= rays.photo_images))
+    def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """The results of work on all items, in their order. An item is only taken when a thread is free for it."""
+        items, running = iter(items), deque[Future[Result]]()
+        while True:
+            running.extend(self._threads.submit(work, item) for item in islice(items, THREADS - len(running)))
+            if not running:
+                return
+            yield running.popleft().result()
 
     def _seen(self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
-        """Colours, disparity, source and occlusion of rows [first, last) of the view, holes not filled yet."""
+        """Colours, disparity, source and occlusion of rows [first, last) of the view, holes not filled yet; then the
+        entropy if it is kept.
+        """
         around = REACH_PX if self._transformer else 0
         above = min(rows[0], around)
         candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + around, rays.size[0])), self._slots)
@@ -121,15 +133,31 @@ class ViewSynthesis:
             at = contested.pixel[:, 0] - candidates.first_row, contested.pixel[:, 1]
             decided = self._transformer(contested)
             colors[at], disparity[at], source[at] = decide(rays, contested, decided)
-        return colors[inner], disparity[inner], source[inner], occluded[inner]
+        kept = (entropy(weights)[inner],) if self._keeps_entropy else ()
+        return colors[inner], disparity[inner], source[inner], occluded[inner], *kept
 
-    def _bands(self, work: Callable[[tuple[int, int]], Result], height: int, width: int) -> list[Result]:
-        """The results of `work` on row bands from top to bottom."""
-        rows = max(min(MOST_BAND_PIXELS // width, -(-height // THREADS)), 1)
+    def _band(self, rays: RaySet, offset: ViewOffset) -> Callable[[tuple[int, int]], tuple[NDArray[Any], ...]]:
+        """What renders rows [first, last) of this view."""
+        if self._transformer:
+            rays.surroundings  # noqa: B018 - made before the threads ask for it
 
-        def unless_stopped(first: int) -> Result:
+        def band(rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
             if self._should_stop():
                 raise Cancelled
-            return work((first, min(first + rows, height)))
+            return self._seen(rays, offset, rows)
 
-        return list(self._threads.map(unless_stopped, range(0, height, rows)))
+        return band
+
+    @staticmethod
+    def _rows(rays: RaySet, least_bands: int) -> Iterator[tuple[int, int]]:
+        height, width = rays.size
+        rows = max(min(MOST_BAND_PIXELS // width, -(-height // least_bands)), 1)
+        return ((first, min(first + rows, height)) for first in range(0, height, rows))
+
+    @staticmethod
+    def _filled(rays: RaySet, offset: ViewOffset, bands: Iterable[tuple[NDArray[Any], ...]]) -> RenderedView:
+        colors, disparity, source, occluded, *entropies = (np.concatenate(part) for part in zip(*bands))
+        if occluded.any():
+            fill_background(colors, disparity, occluded, rays.photo_disparity, offset)
+        inpainted = occluded | (source >= rays.photo_images)
+        return RenderedView(colors, disparity, occluded, inpainted, entropies[0] if entropies else None)
