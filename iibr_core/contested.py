@@ -33,10 +33,12 @@ AROUND = np.array(
 )  # fmt: skip
 """Where, in pixels down and right: this is enough to meet every surface that is not a sliver."""
 AROUND_SHARP = 12
-SOFT = 0.7
-"""Where depth edges are at least this soft, all of AROUND is looked at, else the first AROUND_SHARP."""
+SOFT = 0.5
+"""Where depth edges are softer than this, all of AROUND is looked at, else the first AROUND_SHARP."""
 CONTESTED_PX = 0.75
 """A step of disparity that moves its sides apart by less than this does not contest a ray."""
+CONTESTED_AROUND_PX = 1.5
+"""Where edges are soft there are no steps: there a surface within REACH_PX contests a ray if it is this far off."""
 DISTINCT_PX = 0.3
 """Hypotheses closer than this are one."""
 LEAST_WEIGHT = 0.02
@@ -91,10 +93,11 @@ def find_contested(
     around = rays.surroundings
     from_sources = np.array(candidates.offset) - offsets
     parallax = max(*map(abs, candidates.offset), 1e-9)
-    looks = len(AROUND) if around.softness > SOFT else AROUND_SHARP
+    is_soft = around.softness > SOFT
+    looks = len(AROUND) if is_soft else AROUND_SHARP
     count = _lay_out(
         candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step, from_sources,
-        rays.photo_images, parallax, looks, candidates.first_row, first, last, every,
+        rays.photo_images, parallax, is_soft, looks, candidates.first_row, first, last, every,
         pixel, number, disparity, source, share,
     )  # fmt: skip
     pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
@@ -173,7 +176,7 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
 @kernel
 def _lay_out(  # type: ignore[no-untyped-def]
     count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
-    photo_images, parallax, looks, first_row, first, last, every,
+    photo_images, parallax, is_soft, looks, first_row, first, last, every,
     pixel, number, disparity, source, share,
 ):  # fmt: skip
     """Select contested rays; pick the surfaces on each, then again and again the one around it farthest from those."""
@@ -189,7 +192,13 @@ def _lay_out(  # type: ignore[no-untyped-def]
                 heavy += weights[k, y, x] > LEAST_WEIGHT
                 covered += weights[k, y, x]
             is_contested = every or heavy != 1 or covered < 1.0 - LEAST_WEIGHT
-            if not is_contested:
+            if not is_contested and is_soft:
+                for i in range(looks):
+                    v, u = y + AROUND[i, 0], x + AROUND[i, 1]
+                    if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
+                        apart = abs(shown_disparity[v, u] - shown_disparity[y, x]) * parallax
+                        is_contested |= apart > CONTESTED_AROUND_PX
+            elif not is_contested:
                 d, origin_here = shown_disparity[y, x], np.int64(shown_source[y, x])
                 t, s = offsets[origin_here, 0], offsets[origin_here, 1]
                 u = min(max(nearest_pixel(x + d * s), 0), width - 1)
