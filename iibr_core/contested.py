@@ -21,6 +21,7 @@ from iibr_core.rays import RaySet
 from iibr_core.types import FloatImage, ViewOffset
 
 HYPOTHESES = 6
+"""K: the paper's 5 surfaces and the plain look-up. More cost time and gain little (docs/transformer.md)."""
 PLAIN = 128
 """Added to the source of the hypothesis that the ray shows the front-most surface as the photo mixed it at its edge."""
 REACH_PX = 6
@@ -79,14 +80,15 @@ def find_contested(
     shown: tuple[FloatImage, NDArray[np.uint8]],
     rows: tuple[int, int],
     every: bool = False,
+    hypotheses: int = HYPOTHESES,
 ) -> Contested:
     """The contested rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
 
     shown: disparity and source (N, W) of the heaviest candidates, as `look_up_colors` gives them. every: take all rays
-    near which anything lands, contested or not.
+    near which anything lands, contested or not. hypotheses: K, at least 2.
     """
     first, last = rows
-    shape = (last - first) * candidates.count.shape[1], HYPOTHESES
+    shape = (last - first) * candidates.count.shape[1], hypotheses
     pixel, number = np.empty((shape[0], 2), np.int64), np.zeros(shape[0], np.int64)
     disparity, source, share = np.empty(shape, np.float32), np.empty(shape, np.uint8), np.empty(shape, np.float32)
     offsets, _, surfaces, coverage, _, _, _ = rays.arrays
@@ -101,22 +103,22 @@ def find_contested(
         pixel, number, disparity, source, share,
     )  # fmt: skip
     pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
-    features = np.zeros((count, HYPOTHESES, FEATURES), np.float32)
+    features = np.zeros((count, hypotheses, FEATURES), np.float32)
     _describe(
         surfaces, coverage, around.low, around.high, around.step, around.softness, from_sources, rays.photo_images,
         candidates.count, *shown, weights, candidates.first_row, parallax, looks,
         pixel, number, disparity, source, share[:count], features,
     )  # fmt: skip
     pixel[:, 0] += candidates.first_row
-    mask = np.arange(HYPOTHESES) < number[:, None]
+    mask = np.arange(hypotheses) < number[:, None]
     return Contested(candidates.offset, pixel, mask, disparity, source, features)
 
 
 def votes(rays: RaySet, contested: Contested) -> FloatImage:
     """What each hypothesis would show: colours (N, K, 3), sRGB-encoded; black in unused slots."""
     colors = np.zeros((*contested.mask.shape, 3), np.float32)
-    one = np.eye(HYPOTHESES, dtype=np.float32)
-    for a in range(HYPOTHESES):
+    one = np.eye(contested.mask.shape[1], dtype=np.float32)
+    for a in range(len(one)):
         weights = np.where(contested.mask, one[a], 0.0).astype(np.float32)
         colors[:, a] = np.where(contested.mask[:, a, None], decide(rays, contested, weights)[0], 0.0)
     return colors

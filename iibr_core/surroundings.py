@@ -50,12 +50,12 @@ def edge_softness(disparity: FloatImage, least_edge: float) -> float:
     """
     left = total = 0.0
     for values in (disparity, disparity.T):
-        steps = np.abs(np.diff(values, axis=1))
-        if steps.shape[1] < EDGE_WINDOW_PX:
+        if values.shape[1] <= EDGE_WINDOW_PX:
             continue
-        change = np.abs(values[:, EDGE_WINDOW_PX:] - values[:, :-EDGE_WINDOW_PX])
-        largest = np.lib.stride_tricks.sliding_window_view(steps, EDGE_WINDOW_PX, axis=1).max(axis=-1)
         with np.errstate(invalid="ignore"):
+            steps = np.abs(np.diff(values, axis=1))
+            change = np.abs(values[:, EDGE_WINDOW_PX:] - values[:, :-EDGE_WINDOW_PX])
+            largest = np.lib.stride_tricks.sliding_window_view(steps, EDGE_WINDOW_PX, axis=1).max(axis=-1)
             is_edge = change >= least_edge
         left += float(np.maximum(change - largest, 0)[is_edge].sum(dtype=np.float64))
         total += float(change[is_edge].sum(dtype=np.float64))
@@ -67,10 +67,10 @@ def _around(disparity, low, high, step):  # type: ignore[no-untyped-def]
     """Rows first, then columns: the range, and the largest step, within a square."""
     height, width = disparity.shape
     row_low, row_high = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
-    row_step = np.empty((height, width), np.float32)
+    row_step, row_rise = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
     for y in range(height):
         for x in range(width):
-            least, most, widest = np.inf, -np.inf, 0.0
+            least, most, widest, steepest = np.inf, -np.inf, 0.0, 0.0
             for u in range(max(x - STEP_AROUND_PX, 0), min(x + STEP_AROUND_PX + 1, width)):
                 d = disparity[y, u]
                 if abs(u - x) <= AROUND_PX:
@@ -81,9 +81,9 @@ def _around(disparity, low, high, step):  # type: ignore[no-untyped-def]
                         widest = change
                 if y > 0:
                     change = abs(d - disparity[y - 1, u])
-                    if change > widest:
-                        widest = change
-            row_low[y, x], row_high[y, x], row_step[y, x] = least, most, widest
+                    if change > steepest:
+                        steepest = change
+            row_low[y, x], row_high[y, x], row_step[y, x], row_rise[y, x] = least, most, widest, steepest
     for y in range(height):
         for x in range(width):
             least, most, widest = np.inf, -np.inf, 0.0
@@ -92,6 +92,8 @@ def _around(disparity, low, high, step):  # type: ignore[no-untyped-def]
                     least, most = min(least, row_low[v, x]), max(most, row_high[v, x])
                 if row_step[v, x] > widest:
                     widest = row_step[v, x]
+                if v > y - STEP_AROUND_PX and row_rise[v, x] > widest:
+                    widest = row_rise[v, x]
             if least <= most:
                 low[y, x], high[y, x] = least, most
             step[y, x] = widest
