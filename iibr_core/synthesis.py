@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.candidates import find_candidates
-from iibr_core.contested import REACH_PX, Contested, decide, find_contested
+from iibr_core.contested import HYPOTHESES, REACH_PX, Contested, decide, find_contested
 from iibr_core.inpaint.background import fill_background
 from iibr_core.lookup import OWN_SURFACE_PX, look_up_colors
 from iibr_core.mixed_pixels import split_mixed_pixels
@@ -79,13 +79,16 @@ class ViewSynthesis:
         every: bool = False,
         slots: int = 5,
         keeps_entropy: bool = False,
+        hypotheses: int = HYPOTHESES,
     ) -> None:
         """transformer: gives the weights (N, K) of contested rays; None: closed form. every: of all rays.
-        keeps_entropy: whether views bring the entropy of their weights.
+
+        slots: candidates kept a ray. keeps_entropy: whether views bring the entropy of their weights. hypotheses: the
+        transformer's K.
         """
         self._should_stop = should_stop
         self._transformer, self._every = transformer, every
-        self._slots, self._keeps_entropy = slots, keeps_entropy
+        self._slots, self._hypotheses, self._keeps_entropy = slots, hypotheses, keeps_entropy
         self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rows")
 
     def __enter__(self) -> ViewSynthesis:
@@ -129,7 +132,9 @@ class ViewSynthesis:
         inner = slice(above, above + rows[1] - rows[0])
         if self._transformer:
             shown = disparity, source
-            contested = find_contested(rays, candidates, weights, shown, (inner.start, inner.stop), self._every)
+            contested = find_contested(
+                rays, candidates, weights, shown, (inner.start, inner.stop), self._every, self._hypotheses
+            )
             at = contested.pixel[:, 0] - candidates.first_row, contested.pixel[:, 1]
             decided = self._transformer(contested)
             colors[at], disparity[at], source[at] = decide(rays, contested, decided)

@@ -26,7 +26,7 @@ from iibr_core.formats.files import temporary_sibling
 from iibr_core.formats.pfm import MAX_FILE_PIXELS, write_pfm
 from iibr_core.formats.photo import focal_px_from_fov, read_photo, write_image
 from iibr_core.formats.raster import read_size
-from iibr_core.types import FloatImage, GridShape, InputError, ViewUpdate
+from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewUpdate
 
 VIEW_EXTENSIONS = (".png", ".jpg", ".jpeg", ".exr")
 CAM_NAME = re.compile(r"input_Cam(\d{2,6})$")
@@ -172,6 +172,17 @@ def read_light_field(folder: Path) -> tuple[LightFieldHeader, Iterator[ViewUpdat
         folder.resolve().name, grid, size[1], size[0], focal_px, _disparity_range(folder, parameters), is_hdr
     )
     return header, _iterate_views(folder, header, paths)
+
+
+def read_view(folder: Path, row: int, column: int) -> StoredColors:
+    """Colours (H, W, 3) of one view of a light-field folder, read alone. Raises InputError like `read_light_field`."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder")
+    paths, grid = _as_grid(folder, _find_views(folder), _read_parameters(folder / "parameters.cfg"))
+    if not (0 <= row < grid.rows and 0 <= column < grid.columns):
+        raise InputError(f"{folder}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")
+    path = paths[row * grid.columns + column]
+    return stored_from_encoded(read_photo(path, MAX_FILE_PIXELS).pixels, path.suffix.lower() == ".exr")
 
 
 def _iterate_views(folder: Path, header: LightFieldHeader, paths: list[Path]) -> Iterator[ViewUpdate]:

@@ -15,7 +15,8 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.formats.files import written_whole
+from iibr_core.formats.files import require_file, written_whole
+from iibr_core.formats.heic import is_heic, read_heic
 from iibr_core.formats.raster import Raster, read_raster
 from iibr_core.kernels import kernel
 from iibr_core.types import FloatImage, InputError, Photo
@@ -30,8 +31,8 @@ BAND_ROWS = 32
 
 
 def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float = DEFAULT_FOV_DEG) -> Photo:
-    """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads) as a photo, upright, max_pixels large at
-    most.
+    """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads) or HEIC as a photo, upright, max_pixels
+    large at most.
 
     fov_deg: horizontal field of view where the file gives no focal length. Raises InputError, naming the file, if it
     is missing, no picture, cut off, or absurdly large.
@@ -39,7 +40,8 @@ def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float 
     path = Path(path)
     if max_pixels < 1:
         raise InputError(f"--max-pixels {max_pixels}: must be 1 or more")
-    raster = read_raster(path)
+    require_file(path)
+    raster = read_heic(path) if is_heic(path) else read_raster(path)
     notes = _color_notes(raster.spec) + _alpha_notes(raster)
     raster, finite_notes = _finite(raster)
     stored_size = raster.pixels.shape[:2]

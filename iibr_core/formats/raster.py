@@ -40,6 +40,15 @@ def read_size(path: Path) -> tuple[int, int]:
     return spec.height, spec.width
 
 
+def read_orientation(path: Path) -> int:
+    """Exif's Orientation, 1..8, from a picture file's header; 1 where it tells none or cannot be read."""
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        oiio.geterror()
+        return 1
+    return int(source.spec().get_int_attribute("Orientation", 1))
+
+
 def read_raster(path: Path) -> Raster:
     """Decode the first picture of a file, as it is stored: no colour conversion, no orientation.
 

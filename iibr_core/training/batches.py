@@ -5,7 +5,8 @@ Step n of a seed always gives the same batch. Contested rays of a few views come
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from torch import Tensor
 
 from iibr_core.candidates import find_candidates
 from iibr_core.color import linear_from_srgb
-from iibr_core.contested import REACH_PX, SHARE, Contested, find_contested, votes
+from iibr_core.contested import HYPOTHESES, REACH_PX, SHARE, Contested, find_contested, votes
 from iibr_core.lookup import look_up_colors
 from iibr_core.rays import RaySet
 from iibr_core.synthesis import ViewSynthesis, rays_of_photo
@@ -46,24 +47,46 @@ class Rays(NamedTuple):
     truth: FloatImage
 
 
-def training_batch(step: int, seed: int) -> Batch:
+def _as_found(rays: RaySet, contested: Contested) -> Contested:
+    return contested
+
+
+@dataclass(frozen=True)
+class RayChoice:
+    """What rays are given to T; other than the default for ablations only.
+
+    hypotheses: K. inpainted: whether the ray set has what corner views inpaint. described: (rays, contested) ->
+    contested, with the features T shall see.
+    """
+
+    hypotheses: int = HYPOTHESES
+    inpainted: bool = True
+    described: Callable[[RaySet, Contested], Contested] = _as_found
+
+
+AS_RENDERED = RayChoice()
+
+
+def training_batch(step: int, seed: int, choice: RayChoice = AS_RENDERED) -> Batch:
     """The batch of a step: one EPI, then contested rays of VIEWS views, of one random scene."""
     rng = np.random.default_rng((seed, step))
     radius = int(rng.choice([LIGHT_FIELD, STEREO], p=[0.75, 0.25]))
     largest = float(np.exp(rng.uniform(*np.log(PARALLAX_PX)))) / radius
     scene = random_scene(rng, SIZE, largest)
     colors, disparity = render(scene, SIZE, ViewOffset(0.0, 0.0))
-    rays = _ray_set(colors, degrade(disparity, rng, radius), radius)
-    epi = _epi(scene, rays, radius, rng)
+    rays = _ray_set(colors, degrade(disparity, rng, radius), radius, choice.inpainted)
+    epi = _epi(scene, rays, radius, rng, choice)
     parts = list(epi or [])
-    parts += [_contested(scene, rays, _random_offset(radius, rng), rng) for _ in range(VIEWS)]
+    parts += [_contested(scene, rays, _random_offset(radius, rng), rng, choice) for _ in range(VIEWS)]
     return _batch(parts, (1, EPI_VIEWS, EPI_WIDTH) if epi else None)
 
 
-def _ray_set(colors: FloatImage, disparity: FloatImage, radius: int) -> RaySet:
-    """The photo's rays and those inpainted in the corner views, as `generate` makes them."""
+def _ray_set(colors: FloatImage, disparity: FloatImage, radius: int, inpainted: bool) -> RaySet:
+    """The photo's rays and, if inpainted, those that the corner views add, as `generate` makes them."""
     corners = [ViewOffset(float(t), float(s)) for t, s in ((-radius, -radius), (radius, radius))]
     rays = rays_of_photo(colors, disparity, radius, len(corners))
+    if not inpainted:
+        return rays
     with ViewSynthesis() as synthesis:
         for offset in corners:
             view = synthesis.render(rays, offset)
@@ -80,39 +103,42 @@ def _random_offset(radius: int, rng: np.random.Generator) -> ViewOffset:
             return ViewOffset(float(t), float(s))
 
 
-def _contested(scene: Scene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator) -> Rays:
+def _contested(scene: Scene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator, choice: RayChoice) -> Rays:
     """Contested rays of a view, also those whose true surface the photo does not show: background is right there."""
-    contested = _contested_rays(rays, offset, (0, SIZE[0]), every=False)
+    contested = contested_rays(rays, offset, (0, SIZE[0]), False, choice.hypotheses)
     contested = _subset(contested, rng.permutation(len(contested.pixel))[:RAYS_A_VIEW])
-    return _seen(scene, rays, contested)
+    return _seen(scene, rays, contested, choice)
 
 
-def _contested_rays(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool) -> Contested:
-    """As `ViewSynthesis` finds them."""
+def contested_rays(
+    rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool, hypotheses: int = HYPOTHESES
+) -> Contested:
+    """Those of rows [first, last) of the view at an offset, as `ViewSynthesis` finds them."""
     above = min(rows[0], REACH_PX)
-    candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + REACH_PX, SIZE[0])))
+    candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + REACH_PX, rays.size[0])))
     weights = closed_form_weights(candidates)
     _, disparity, source = look_up_colors(rays, candidates, weights)
-    return find_contested(rays, candidates, weights, (disparity, source), (above, above + rows[1] - rows[0]), every)
+    inner = above, above + rows[1] - rows[0]
+    return find_contested(rays, candidates, weights, (disparity, source), inner, every, hypotheses)
 
 
-def _seen(scene: Scene, rays: RaySet, contested: Contested) -> Rays:
+def _seen(scene: Scene, rays: RaySet, contested: Contested, choice: RayChoice) -> Rays:
     y, x = contested.pixel.T
-    return Rays(contested, votes(rays, contested), cast(scene, x, y, contested.offset)[0])
+    return Rays(choice.described(rays, contested), votes(rays, contested), cast(scene, x, y, contested.offset)[0])
 
 
-def _epi(scene: Scene, rays: RaySet, radius: int, rng: np.random.Generator) -> list[Rays] | None:
+def _epi(scene: Scene, rays: RaySet, radius: int, rng: np.random.Generator, choice: RayChoice) -> list[Rays] | None:
     """Every ray of a piece of one row in EPI_VIEWS views from left to right; None where one has no hypothesis."""
     row = int(rng.integers(REACH_PX, SIZE[0] - REACH_PX))
     first = int(rng.integers(0, SIZE[1] - EPI_WIDTH + 1))
     columns = np.arange(first, first + EPI_WIDTH)
     parts = []
     for s in np.linspace(-radius, radius, EPI_VIEWS):
-        contested = _contested_rays(rays, ViewOffset(0.0, float(s)), (row, row + 1), every=True)
+        contested = contested_rays(rays, ViewOffset(0.0, float(s)), (row, row + 1), True, choice.hypotheses)
         chosen = np.flatnonzero(np.isin(contested.pixel[:, 1], columns))
         if len(chosen) < EPI_WIDTH:
             return None
-        parts.append(_seen(scene, rays, _subset(contested, chosen)))
+        parts.append(_seen(scene, rays, _subset(contested, chosen), choice))
     return parts
 
 

@@ -1,0 +1,309 @@
+"""What each part of the ray transformer is worth, and how well its entropy tells disocclusions. Minutes on 2 cores.
+
+    python -m benchmarks.transformer --data DATA --out docs/transformer.md [--scenes 200] [--steps 1000]
+
+Every variant is trained anew on the same procedural scenes, for a fraction of the shipped weights' steps, and judged on
+others and on the light fields of DATA (see ground_truth).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from benchmarks.ground_truth import SCENES, GroundTruth, offset_of, psnr, read_ground_truth
+from iibr_core import geometry
+from iibr_core.candidates import find_candidates
+from iibr_core.contested import HYPOTHESES, PLAIN, SHARE, Contested
+from iibr_core.formats.weights_file import load_weights
+from iibr_core.generate import generate, transformer_for
+from iibr_core.occlusion import entropy, occlusion_mask
+from iibr_core.plan import plan_literal
+from iibr_core.ray_transformer import RayTransformer
+from iibr_core.rays import RaySet
+from iibr_core.resources import resource_folder
+from iibr_core.synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.training import degrade as faults
+from iibr_core.training.batches import AS_RENDERED, RayChoice, contested_rays, training_batch
+from iibr_core.training.loop import Batch
+from iibr_core.training.losses import LossWeights, color_loss, perceived, total_loss
+from iibr_core.training.scenes import random_scene, render, seen_from
+from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.weights import closed_form_weights
+from viewer.train_command import LAMBDAS
+
+HELD_OUT_SEED = 1_000_003
+HELD_OUT = 40
+LEARNING_RATE = 3e-3
+COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
+"""The features of `contested._describe` that know nothing of disparity."""
+MASK_SIZE = 160, 192
+MASK_SCENES = 24
+THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+
+Weigh = Callable[[Contested], FloatImage]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One row of the ablations."""
+
+    name: str
+    choice: RayChoice = AS_RENDERED
+    lambdas: LossWeights = LAMBDAS
+
+
+def without_disparity(rays: RaySet, contested: Contested) -> Contested:
+    """The features without those made of disparity."""
+    features = np.zeros_like(contested.features)
+    features[..., COORDINATES_ONLY] = contested.features[..., COORDINATES_ONLY]
+    return replace(contested, features=features)
+
+
+def raw_coordinates(rays: RaySet, contested: Contested) -> Contested:
+    """The paper's features: Pluecker coordinates of target and source ray, and disparity; lengths in widths."""
+    height, width = rays.size
+    offsets = rays.arrays[0][contested.source % PLAIN]
+    moved = np.array(contested.offset) - offsets
+    y, x = (contested.pixel[:, i, None] for i in (0, 1))
+    x, y = np.broadcast_to(x - width / 2, offsets.shape[:2]), np.broadcast_to(y - height / 2, offsets.shape[:2])
+    target = geometry.line_of_pixel(x, y, contested.offset)
+    d = contested.disparity
+    source = geometry.line_of(
+        np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * geometry.VIEW_STEP_PX,
+        np.stack([x + d * moved[..., 1], y + d * moved[..., 0], np.ones_like(d)], -1)
+        - np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * geometry.VIEW_STEP_PX,
+    )
+    scale = np.r_[1, 1, 1, np.full(3, 1 / width)]
+    features = np.zeros_like(contested.features)
+    features[..., SHARE + 1 : SHARE + 14] = np.concatenate([target * scale, source * scale, d[..., None]], -1)
+    return replace(contested, features=features)
+
+
+VARIANTS = [
+    Variant("as shipped: K = 6"),
+    Variant("K = 3", RayChoice(hypotheses=3)),
+    Variant("K = 5", RayChoice(hypotheses=5)),
+    Variant("K = 9", RayChoice(hypotheses=9)),
+    Variant("without inpainting", RayChoice(inpainted=False)),
+    Variant("without disparity encoding", RayChoice(described=without_disparity)),
+    Variant("raw Pluecker coordinates", RayChoice(described=raw_coordinates)),
+    Variant("without entropy loss", lambdas=replace(LAMBDAS, entropy=0.0)),
+    Variant("with the paper's entropy loss (1)", lambdas=replace(LAMBDAS, entropy=1.0)),
+    Variant("without EPI loss", lambdas=replace(LAMBDAS, epi=0.0)),
+]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True, help="folder of evaluation scenes")
+    parser.add_argument("--out", type=Path, required=True, help="Markdown file to write")
+    parser.add_argument("--scenes", type=int, default=200, help="procedural scenes to train on")
+    parser.add_argument("--steps", type=int, default=1000, help="training steps of each variant")
+    options = parser.parse_args()
+    lines = [
+        "# The ray transformer, measured",
+        "",
+        f"Made by `python -m benchmarks.transformer --scenes {options.scenes} --steps {options.steps}`.",
+        "",
+        *ablations(options.data, options.scenes, options.steps),
+        *masks(),
+        *qualities(options.data),
+    ]
+    options.out.write_text("\n".join(lines) + "\n")
+
+
+def ablations(data: Path, scenes: int, steps: int) -> list[str]:
+    """The table of variants: gain over the closed form on held-out contested rays, PSNR on ground truth."""
+    truths = [read_ground_truth(data, name) for name in SCENES]
+    cached: dict[RayChoice, tuple[list[Batch], list[Batch]]] = {}
+    rows = [("closed form", 0.0, [scene_psnr(truth, None, AS_RENDERED) for truth in truths])]
+    for variant in VARIANTS:
+        if variant.choice not in cached:
+            cached.clear()  # variants of one choice stand together, but for the shipped one's
+            cached[variant.choice] = batches_of(variant.choice, scenes)
+        train_on, held_out = cached[variant.choice]
+        model = trained(train_on, variant.lambdas, steps)
+        weigh = weigher(model)
+        rows.append(
+            (variant.name, held_out_gain(model, held_out), [scene_psnr(t, weigh, variant.choice) for t in truths])
+        )
+        print(rows[-1], flush=True)
+    return [
+        "## Ablations",
+        "",
+        "Held out: gain over the closed form, dB, mean over procedural scenes, contested rays only. Others: full",
+        "frame, PSNR in dB (12 outer views of antinous, the right views of the Middlebury pairs).",
+        "",
+        "| variant | held out | " + " | ".join(SCENES) + " |",
+        "| --- | " + " --- |" * (1 + len(SCENES)),
+        *(f"| {name} | {gain:+.2f} | " + " | ".join(f"{v:.2f}" for v in values) + " |" for name, gain, values in rows),
+        "",
+    ]
+
+
+def batches_of(choice: RayChoice, scenes: int) -> tuple[list[Batch], list[Batch]]:
+    """Batches to train on and batches held out."""
+    train_on = [training_batch(step, 0, choice) for step in range(1, scenes + 1)]
+    return train_on, [training_batch(step, HELD_OUT_SEED, choice) for step in range(HELD_OUT)]
+
+
+def trained(batches: Sequence[Batch], lambdas: LossWeights, steps: int) -> RayTransformer:
+    """A model after `steps` steps on random ones of these batches."""
+    torch.manual_seed(0)
+    model = RayTransformer()
+    optimizer = torch.optim.Adam(model.parameters(), LEARNING_RATE, betas=(0.9, 0.99))
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
+    for index in torch.randint(len(batches), (steps,)).tolist():
+        batch = batches[index]
+        weights = model(batch.features, batch.mask)
+        gained = replace(lambdas, color=lambdas.color * batch.color_gain)
+        shown, truth = perceived((weights[..., None] * batch.colors).sum(dim=1)), perceived(batch.truth)
+        optimizer.zero_grad()
+        total_loss(shown, truth, weights, batch.epi_shape, gained).total.backward()
+        optimizer.step()
+        schedule.step()
+    return model.eval()
+
+
+@torch.no_grad()
+def held_out_gain(model: RayTransformer, batches: Sequence[Batch]) -> float:
+    """Mean over batches of the gain over the closed form, dB."""
+    gains = []
+    for batch in batches:
+        closed = (batch.features[..., SHARE] + 1e-6) * batch.mask
+        errors = [
+            color_loss(perceived((weights[..., None] * batch.colors).sum(dim=1)), perceived(batch.truth))
+            for weights in (closed / closed.sum(dim=1, keepdim=True), model(batch.features, batch.mask))
+        ]
+        gains.append(10 * float(torch.log10(errors[0] / errors[1])))
+    return float(np.mean(gains))
+
+
+def weigher(model: RayTransformer) -> Weigh:
+    """The model as ViewSynthesis calls it."""
+
+    @torch.no_grad()
+    def weigh(contested: Contested) -> FloatImage:
+        if not len(contested.pixel):
+            return contested.mask.astype(np.float32)
+        weights: FloatImage = model(torch.from_numpy(contested.features), torch.from_numpy(contested.mask)).numpy()
+        return weights
+
+    return weigh
+
+
+def scene_psnr(truth: GroundTruth, weigh: Weigh | None, choice: RayChoice) -> float:
+    """Mean PSNR of the views of a scene, rendered as `generate` does, with these weights and rays."""
+    offsets = [ViewOffset(float(t * truth.farthest), float(s * truth.farthest)) for t in (-1, 1) for s in (-1, 1)]
+    rays = rays_of_photo(truth.photo.pixels, truth.disparity.values, truth.farthest, len(offsets))
+    with ViewSynthesis() as synthesis:
+        for offset in offsets if choice.inpainted else []:
+            view = synthesis.render(rays, offset)
+            rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
+    described = None if weigh is None else lambda contested: weigh(choice.described(rays, contested))
+    with ViewSynthesis(transformer=described, hypotheses=choice.hypotheses) as synthesis:
+        views = ((synthesis.render(rays, offset_of(at)).colors, image) for at, image in truth.truth.items())
+        return float(np.mean([psnr(colors, image) for colors, image in views]))
+
+
+def masks() -> list[str]:
+    """Precision and recall of disocclusion, by the entropy of the closed form's weights and by that of T's."""
+    lines = [
+        "## Entropy as the occlusion mask",
+        "",
+        f"{MASK_SCENES} held-out procedural scenes, corner views, rays of the photo alone. Truth: what the photo",
+        "does not see. T: its normalised entropy where T runs, the closed form's elsewhere. Precision / recall.",
+        "",
+        "| threshold | exact maps: closed form | T | degraded maps: closed form | T |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    measured = [mask_rays(degraded) for degraded in (False, True)]
+    for threshold in THRESHOLDS:
+        cells = [
+            precision_recall(by > threshold, hidden)
+            for closed, learned, _, hidden in measured
+            for by in (closed, learned)
+        ]
+        lines.append(f"| {threshold} | " + " | ".join(cells) + " |")
+    used = [precision_recall(mask, hidden) for _, _, mask, hidden in measured]
+    return [*lines, f"| in use (occlusion.py) | {used[0]} | | {used[1]} | |", ""]
+
+
+def precision_recall(found: NDArray[np.bool_], true: NDArray[np.bool_]) -> str:
+    """As percentages."""
+    hits = float((found & true).sum())
+    return f"{hits / max(found.sum(), 1):.0%} / {hits / max(true.sum(), 1):.0%}"
+
+
+def mask_rays(degraded: bool) -> list[NDArray[np.float32]]:
+    """Over all rays: closed form's entropy, T's, the mask in use, whether the photo does not see what is there."""
+    rng = np.random.default_rng(HELD_OUT_SEED)
+    model = RayTransformer()
+    load_weights(model, resource_folder("assets") / "weights" / "ray_transformer.safetensors")
+    weigh = weigher(model)
+    parts = []
+    for _ in range(MASK_SCENES):
+        scene = random_scene(rng, MASK_SIZE, 2.0)
+        colors, exact = render(scene, MASK_SIZE, ViewOffset(0.0, 0.0))
+        given = faults.noisy(faults.blurred(exact, 1.0), rng, 0.05) if degraded else exact
+        rays = rays_of_photo(colors, given, 4, 0)
+        offset = ViewOffset(*(float(v) for v in rng.choice([-4, 4], 2)))
+        weights = closed_form_weights(find_candidates(rays, offset, (0, MASK_SIZE[0])))
+        closed = entropy(weights)
+        contested = contested_rays(rays, offset, (0, MASK_SIZE[0]), False)
+        learned = closed.copy()
+        learned[contested.pixel[:, 0], contested.pixel[:, 1]] = normalised_entropy(weigh(contested), contested.mask)
+        y, x = np.indices(MASK_SIZE)
+        true = render(scene, MASK_SIZE, offset)[1]
+        source_x, source_y = x + true * offset.s, y + true * offset.t
+        inside = (source_x >= 0) & (source_x < MASK_SIZE[1]) & (source_y >= 0) & (source_y < MASK_SIZE[0])
+        seen = seen_from(scene, x.ravel(), y.ravel(), true.ravel(), offset).reshape(MASK_SIZE)
+        parts.append((closed, learned, occlusion_mask(weights), ~(inside & seen)))
+    return [np.concatenate(part) for part in zip(*parts)]
+
+
+def normalised_entropy(weights: FloatImage, mask: NDArray[np.bool_]) -> FloatImage:
+    """(N,) of weights (N, K): 0 where one hypothesis has all, 1 where those in use share alike."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        nats = -np.where(weights > 0, weights * np.log(weights), 0).sum(axis=1)
+    return (nats / np.log(np.maximum(mask.sum(axis=1), 2))).astype(np.float32)
+
+
+def qualities(data: Path) -> list[str]:
+    """The shipped weights: PSNR and time of fast, balanced and exact."""
+    lines = [
+        f"## Qualities (shipped weights, K = {HYPOTHESES})",
+        "",
+        "Full frame, PSNR in dB, and ms a view; 12 outer views of antinous, its disparity also blurred (sigma 2 px).",
+        "",
+        "| scene | fast | balanced | exact |",
+        "| --- | --- | --- | --- |",
+    ]
+    truths = [read_ground_truth(data, name) for name in SCENES]
+    blurred = replace(truths[0].disparity, values=faults.blurred(truths[0].disparity.values, 2.0))
+    for truth in [*truths, replace(truths[0], name="antinous, edges blurred", disparity=blurred)]:
+        cells = []
+        for quality in ("fast", "balanced", "exact"):
+            transformer_for(quality)
+            plan = plan_literal(truth.photo, truth.disparity, truth.grid)
+            start = time.perf_counter()
+            updates = list(generate(truth.photo, truth.disparity, plan, quality=quality))
+            ms = (time.perf_counter() - start) * 1e3 / len(updates)
+            half = truth.farthest
+            found = {(u.row - half, u.column - half): u.colors / np.float32(255) for u in updates}
+            cells.append(f"{np.mean([psnr(found[at], image) for at, image in truth.truth.items()]):.2f}, {ms:.0f} ms")
+        lines.append(f"| {truth.name} | " + " | ".join(cells) + " |")
+        print(lines[-1], flush=True)
+    return lines
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,44 @@
+"""What is known of a photo's depth before it is disparity for a grid of views. The three kinds differ by type, so that
+none is ever taken for another. In all of them NaN is unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from iibr_core.types import FloatImage
+
+
+@dataclass(frozen=True, eq=False)
+class RelativeInverseDepth:
+    """Inverse depth up to an unknown scale (> 0) and offset: larger is closer, nothing else is said.
+
+    values: (H, W) float32.
+    """
+
+    values: FloatImage
+
+
+@dataclass(frozen=True, eq=False)
+class MetricDepth:
+    """Distance from the camera.
+
+    metres: (H, W) float32, positive. focal_px: the focal length that the estimate goes with, in pixels of a picture
+    this large (W x H), or None where it says nothing about it.
+    """
+
+    metres: FloatImage
+    focal_px: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class DisparityMap:
+    """Disparity that counts as it is: pixels per view step of a picture this large, larger is closer.
+
+    px_per_view: (H, W) float32.
+    """
+
+    px_per_view: FloatImage
+
+
+Estimate = RelativeInverseDepth | MetricDepth | DisparityMap

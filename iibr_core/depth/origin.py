@@ -1,0 +1,63 @@
+"""Where a photo's depth came from, in words for people, and where to begin looking for it. Light: no heavy imports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+DepthKind = Literal["file", "embedded", "model", "rough", "flat"]
+"""Where depth can come from, best first: a map beside the photo, the photo's own, a trained model, an estimate without
+one, none.
+"""
+
+DepthStart = Literal["auto", "embedded", "model", "rough", "flat"]
+"""With what kind the search begins; "auto" is with a file. What fails is followed by the next."""
+
+Tell = Callable[[str, float], None]
+"""Told what is being done, and which share of it is: 0 to 1."""
+
+BETTER_WAYS = (
+    "Better: give a depth map with --disparity FILE, or a trained model with --depth-model "
+    "(`iibr models` lists what is there)."
+)
+
+
+@dataclass(frozen=True)
+class DepthOrigin:
+    """Where the depth of a scene came from.
+
+    words: a name for it ("scene.pfm", "the photo itself (Google GDepth)"). failures: what was tried before and why it
+    was not used, a sentence each. advice: how to get better depth, "" where there is none to give.
+    """
+
+    kind: DepthKind
+    words: str
+    failures: tuple[str, ...] = ()
+    advice: str = ""
+
+    @property
+    def line(self) -> str:
+        """The same in one line."""
+        return f"Depth: {self.words}."
+
+
+@dataclass(frozen=True)
+class DepthChoice:
+    """What the user decided about depth.
+
+    start: where the search begins. file: a map that must be used (a bad one is an error), times file_scale. model: a
+    folder or a known model's name, None for the usual one if it is there. refine: how far disparity edges are drawn to
+    the photo's, 0 (not at all) to 1. memory_bytes: what a model may take, None for a share of what there is.
+    """
+
+    start: DepthStart = "auto"
+    file: str | None = None
+    file_scale: float = 1.0
+    model: str | None = None
+    refine: float = 1.0
+    memory_bytes: int | None = None
+
+
+class StoppedError(Exception):
+    """The caller asked to stop."""

@@ -1,0 +1,210 @@
+"""Writes small photos that carry depth, in each container that the parsers read: what the tests know, they wrote."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import struct
+
+import numpy as np
+from PIL import Image
+
+STANDARD, EXTENDED = b"http://ns.adobe.com/xap/1.0/\0", b"http://ns.adobe.com/xmp/extension/\0"
+RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+
+
+def picture(pixels: np.ndarray, kind: str = "JPEG", orientation: int = 1) -> bytes:
+    """A PNG's or JPEG's bytes of (H, W) or (H, W, 3) uint8, or (H, W) uint16."""
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    file = io.BytesIO()
+    options = {"quality": 95, "subsampling": 0} if kind == "JPEG" else {}
+    Image.fromarray(pixels).save(file, kind, **({"exif": exif} if orientation != 1 else {}), **options)
+    return file.getvalue()
+
+
+def grey_photo(size: tuple[int, int], orientation: int = 1) -> bytes:
+    return picture(np.full((*size, 3), 128, np.uint8), orientation=orientation)
+
+
+def with_segments(jpeg: bytes, contents: list[bytes]) -> bytes:
+    """APP1 segments right behind the start of the picture."""
+    segments = b"".join(b"\xff\xe1" + struct.pack(">H", len(content) + 2) + content for content in contents)
+    return jpeg[:2] + segments + jpeg[2:]
+
+
+def packet(attributes: dict[str, str], children: str = "", prolog: str = "") -> bytes:
+    """An XMP packet whose names are "namespace name"."""
+    namespaces = sorted({name.split()[0] for name in attributes})
+    declared = "".join(f' xmlns:n{i}="{namespace}"' for i, namespace in enumerate(namespaces))
+    written = "".join(
+        f' n{namespaces.index(name.split()[0])}:{name.split()[1]}="{value}"' for name, value in attributes.items()
+    )
+    return (
+        f'{prolog}<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="{RDF}"><rdf:Description rdf:about=""'
+        f"{declared}{written}>{children}</rdf:Description></rdf:RDF></x:xmpmeta>"
+    ).encode()
+
+
+def extended_parts(extended: bytes, part_bytes: int) -> tuple[str, list[bytes]]:
+    """The GUID of an extended packet, and the contents of the segments that hold its parts."""
+    guid = hashlib.md5(extended).hexdigest().upper()
+    starts = range(0, len(extended), part_bytes)
+    parts = [
+        EXTENDED + guid.encode() + struct.pack(">II", len(extended), at) + extended[at : at + part_bytes]
+        for at in starts
+    ]
+    return guid, parts
+
+
+GDEPTH, GIMAGE = "http://ns.google.com/photos/1.0/depthmap/", "http://ns.google.com/photos/1.0/image/"
+NOTE = "http://ns.adobe.com/xmp/note/"
+
+
+def gdepth_segments(
+    depth: bytes,
+    *,
+    near: object = 2.0,
+    far: object = 10.0,
+    kind: str = "RangeInverse",
+    confidence: bytes | None = None,
+    sharp: bytes | None = None,
+    units: str = "",
+    part_bytes: int | None = None,
+) -> list[bytes]:
+    """APP1 contents of GDepth: all in one packet, or the data in an extended packet cut into parts."""
+    about = {f"{GDEPTH} Format": kind, f"{GDEPTH} Near": str(near), f"{GDEPTH} Far": str(far)}
+    if units:
+        about[f"{GDEPTH} Units"] = units
+    data = {f"{GDEPTH} Data": base64.b64encode(depth).decode()}
+    if confidence is not None:
+        data[f"{GDEPTH} Confidence"] = base64.b64encode(confidence).decode()
+    if sharp is not None:
+        data[f"{GIMAGE} Data"] = base64.b64encode(sharp).decode()
+    if part_bytes is None:
+        return [STANDARD + packet(about | data)]
+    guid, parts = extended_parts(packet(data), part_bytes)
+    return [STANDARD + packet(about | {f"{NOTE} HasExtendedXMP": guid}), *parts]
+
+
+def dynamic_depth_jpeg(
+    photo: bytes,
+    depth: bytes,
+    *,
+    near: object = 2.0,
+    far: object = 10.0,
+    length: object = None,
+    before: bytes = b"",
+    between: bytes = b"",
+    behind: bytes = b"",
+    shared_container: bool = False,
+    kind: str = "RangeInverse",
+) -> bytes:
+    """A Dynamic Depth 1.0 photo.
+
+    before: another item that precedes the depth map. between: a trailer of somebody else's between photo and items.
+    behind: one behind all.
+    """
+    root = "http://ns.google.com/photos/"
+    container, item = (
+        ("1.0/container/", "1.0/container/item/") if shared_container else ("dd/1.0/container/", "dd/1.0/item/")
+    )
+    entries = [
+        ("image/jpeg", "Primary", 0, "primary"),
+        ("image/png", "Depth", length or len(depth), "android/depthmap"),
+    ]
+    if before:
+        entries.insert(1, ("image/jpeg", "GainMap", len(before), "gain"))
+    listed = "".join(
+        f'<rdf:li rdf:parseType="Resource"><C:Item I:Mime="{mime}" I:Semantic="{semantic}" I:Length="{size}"'
+        f' I:DataURI="{uri}"/></rdf:li>'
+        for mime, semantic, size, uri in entries
+    )
+    xmp = packet(
+        {f"{root}dd/1.0/device/ Name": "test"},
+        f'<C:Directory xmlns:C="{root}{container}" xmlns:I="{root}{item}"><rdf:Seq>{listed}</rdf:Seq></C:Directory>'
+        f'<D:Cameras xmlns:D="{root}dd/1.0/device/" xmlns:K="{root}dd/1.0/camera/" xmlns:M="{root}dd/1.0/depthmap/">'
+        f'<rdf:Seq><rdf:li rdf:parseType="Resource"><D:Camera><K:DepthMap rdf:parseType="Resource">'
+        f"<M:Format>{kind}</M:Format><M:Near>{near}</M:Near><M:Far>{far}</M:Far><M:Units>Meters</M:Units>"
+        f"<M:DepthURI>android/depthmap</M:DepthURI></K:DepthMap></D:Camera></rdf:li></rdf:Seq></D:Cameras>",
+    )
+    return with_segments(photo, [STANDARD + xmp]) + between + before + depth + behind
+
+
+def apple_jpeg(photo: bytes, depth: np.ndarray, low: object, high: object, kind: str = "disparity") -> bytes:
+    """A portrait as iPhones save it as JPEG: depth in a second JPEG behind the photo."""
+    space = "http://ns.apple.com/pixeldatainfo/1.0/"
+    about = {
+        f"{space} AuxiliaryImageType": kind,
+        f"{space} FloatMinValue": str(low),
+        f"{space} FloatMaxValue": str(high),
+    }
+    return photo + with_segments(picture(depth), [STANDARD + packet(about)])
+
+
+def samsung_jpeg(photo: bytes, depth: np.ndarray, size: tuple[int, int] | None = None, audio: bool = False) -> bytes:
+    """A "Live focus" photo with Samsung's trailer; depth (H, W) uint8, dark is near. size: (width, height) as told."""
+    width, height = size or (depth.shape[1], depth.shape[0])
+    extra = bytes(32) + b"\x03\0\xff\xff" + struct.pack("<II", width, height) + bytes(64)
+    blocks = [
+        (0x0A01, b"Image_UTC_Data", b"1234567890123"),
+        (0x0AB1, b"DualShot_DepthMap_1", depth.tobytes()),
+        (0x0AB3, b"DualShot_Extra_Info", extra),
+    ]
+    body, places = b"", []
+    for kind, name, content in blocks:
+        block = struct.pack("<HHI", 0, kind, len(name)) + name + content
+        places.append((kind, len(body), len(block)))
+        body += block
+    directory = b"SEFH" + struct.pack("<II", 101, len(places))
+    for kind, start, length in places:
+        directory += struct.pack("<HHII", 0, kind, len(body) - start, length)
+    trailer = body + directory + struct.pack("<I", len(directory)) + b"SEFT"
+    if audio:
+        trailer += b"QDIO" + bytes(16) + struct.pack("<I", 20) + b"QDIOBS"
+    return photo + trailer
+
+
+def heic(pixels: np.ndarray, depth: np.ndarray | None = None, exif: bytes | None = None) -> bytes:
+    """A HEIC photo, with an auxiliary depth picture if asked: the second picture of a file of two, made one by hand."""
+    import pillow_heif
+
+    file = pillow_heif.from_bytes("RGB", (pixels.shape[1], pixels.shape[0]), pixels.tobytes())
+    if depth is not None:
+        file.add_frombytes("L", (depth.shape[1], depth.shape[0]), depth.tobytes())
+    whole = io.BytesIO()
+    file.save(whole, format="HEIF", quality=-1, **({"exif": exif} if exif else {}))
+    return whole.getvalue() if depth is None else _with_second_as_depth(bytearray(whole.getvalue()))
+
+
+def _with_second_as_depth(data: bytearray) -> bytes:
+    """Adds a reference "auxl" from item 2 to item 1, and the property that says what it is."""
+    auxiliary = _box(b"auxC", bytes(4) + b"urn:mpeg:hevc:2015:auxid:2\0")
+    reference = _box(b"iref", bytes(4) + _box(b"auxl", struct.pack(">HHH", 2, 1, 1)))
+    at = {name: data.index(name) - 4 for name in (b"meta", b"iloc", b"iprp", b"ipco", b"ipma")}
+    size = {name: int.from_bytes(data[start : start + 4], "big") for name, start in at.items()}
+    properties, place = 0, at[b"ipco"] + 8
+    while place < at[b"ipco"] + size[b"ipco"]:
+        properties += 1
+        place += int.from_bytes(data[place : place + 4], "big")
+    # From behind to the front, so that places stay right: the association of item 2 is the last of "ipma".
+    count_at = at[b"ipma"] + 16 + 3 + data[at[b"ipma"] + 18] + 2
+    ipma_end = at[b"ipma"] + size[b"ipma"]
+    data[count_at] += 1
+    data[ipma_end:ipma_end] = bytes([0x80 | (properties + 1)])
+    data[place:place] = auxiliary
+    data[at[b"iprp"] : at[b"iprp"]] = reference
+    added = 1 + len(auxiliary) + len(reference)
+    grown = {b"ipma": 1, b"ipco": len(auxiliary), b"iprp": 1 + len(auxiliary), b"meta": added}
+    for name, more in grown.items():
+        start = data.index(name) - 4
+        data[start : start + 4] = struct.pack(">I", size[name] + more)
+    for item in range(2):
+        base = at[b"iloc"] + 16 + item * 18 + 4
+        data[base : base + 4] = struct.pack(">I", int.from_bytes(data[base : base + 4], "big") + added)
+    return bytes(data)
+
+
+def _box(name: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content) + 8) + name + content
