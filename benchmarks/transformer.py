@@ -22,13 +22,11 @@ from benchmarks.ground_truth import SCENES, GroundTruth, offset_of, psnr, read_g
 from iibr_core import geometry
 from iibr_core.candidates import find_candidates
 from iibr_core.contested import HYPOTHESES, PLAIN, SHARE, Contested
-from iibr_core.formats.weights_file import load_weights
 from iibr_core.generate import generate, transformer_for
 from iibr_core.occlusion import entropy, occlusion_mask
 from iibr_core.plan import plan_literal
 from iibr_core.ray_transformer import RayTransformer
 from iibr_core.rays import RaySet
-from iibr_core.resources import resource_folder
 from iibr_core.synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.training import degrade as faults
 from iibr_core.training.batches import AS_RENDERED, RayChoice, contested_rays, training_batch
@@ -70,17 +68,15 @@ def without_disparity(rays: RaySet, contested: Contested) -> Contested:
 def raw_coordinates(rays: RaySet, contested: Contested) -> Contested:
     """The paper's features: Pluecker coordinates of target and source ray, and disparity; lengths in widths."""
     height, width = rays.size
-    offsets = rays.arrays[0][contested.source % PLAIN]
+    offsets = rays.arrays[0][np.where(contested.mask, contested.source % PLAIN, 0)]
+    d = np.where(contested.mask, contested.disparity, 0)
     moved = np.array(contested.offset) - offsets
     y, x = (contested.pixel[:, i, None] for i in (0, 1))
-    x, y = np.broadcast_to(x - width / 2, offsets.shape[:2]), np.broadcast_to(y - height / 2, offsets.shape[:2])
+    x, y = np.broadcast_to(x - width / 2, d.shape), np.broadcast_to(y - height / 2, d.shape)
     target = geometry.line_of_pixel(x, y, contested.offset)
-    d = contested.disparity
-    source = geometry.line_of(
-        np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * geometry.VIEW_STEP_PX,
-        np.stack([x + d * moved[..., 1], y + d * moved[..., 0], np.ones_like(d)], -1)
-        - np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * geometry.VIEW_STEP_PX,
-    )
+    eye = np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * geometry.VIEW_STEP_PX
+    pixel = np.stack([x + d * moved[..., 1], y + d * moved[..., 0], np.ones_like(d)], -1)
+    source = geometry.line_of(eye, pixel - eye)
     scale = np.r_[1, 1, 1, np.full(3, 1 / width)]
     features = np.zeros_like(contested.features)
     features[..., SHARE + 1 : SHARE + 14] = np.concatenate([target * scale, source * scale, d[..., None]], -1)
@@ -246,9 +242,8 @@ def precision_recall(found: NDArray[np.bool_], true: NDArray[np.bool_]) -> str:
 def mask_rays(degraded: bool) -> list[NDArray[np.float32]]:
     """Over all rays: closed form's entropy, T's, the mask in use, whether the photo does not see what is there."""
     rng = np.random.default_rng(HELD_OUT_SEED)
-    model = RayTransformer()
-    load_weights(model, resource_folder("assets") / "weights" / "ray_transformer.safetensors")
-    weigh = weigher(model)
+    weigh = transformer_for("balanced")
+    assert weigh is not None
     parts = []
     for _ in range(MASK_SCENES):
         scene = random_scene(rng, MASK_SIZE, 2.0)

@@ -1,4 +1,4 @@
-"""Light slab <-> Pluecker: target and source rays as lines in space (paper, section 3.1), also for cameras off the plane.
+"""Light slab <-> Pluecker: rays as lines in space (paper, section 3.1), also those of cameras off the plane.
 
 World axes: x right, y down, z away from the cameras, in pixels of the plane z = 1, where disparity is 0. View (t, s)
 stands at (s, t) * VIEW_STEP_PX on the plane z = 0 and sees the world point (X, Y, 1) at pixel (X, Y): a light slab.
@@ -61,7 +61,7 @@ def distance_between(one: Lines, other: Lines) -> NDArray[np.float64]:
 
 
 def depth_of(disparity: ArrayLike) -> NDArray[np.float64]:
-    """z of points of a disparity (px per view step): 1 for 0; infinite where the sight lines are parallel."""
+    """Depth z of points of a disparity (px per view step): 1 for 0; infinite where the sight lines are parallel."""
     with np.errstate(divide="ignore"):
         return VIEW_STEP_PX / (VIEW_STEP_PX + np.asarray(disparity, np.float64))
 

@@ -42,6 +42,7 @@ def train_weights(
         checkpoint_every=checkpoint_every,
     )
     command = shlex.join(["iibr", *sys.argv[1:]])
+    published = command.replace(str(out), out.name)  # the folder is nobody's business
     torch.manual_seed(seed)
     model = RayTransformer()
 
@@ -50,7 +51,7 @@ def train_weights(
 
     try:
         with _bar_shown() as show:
-            loop.train(model, batches, config, out, resume=resume, metadata={"command": command}, progress=show)
+            loop.train(model, batches, config, out, resume=resume, metadata={"command": published}, progress=show)
     except KeyboardInterrupt:
         if not loop.checkpoint_path(out).is_file():
             return _ended("interrupted before the first step was done", EXIT_INTERRUPTED)

@@ -162,10 +162,10 @@ def _uphill(values, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _walk(values, x, y, across, down, sign, reach, pace):  # type: ignore[no-untyped-def]
+def _walk(values, x, y, across, down, sign, reach, pace, beyond):  # type: ignore[no-untyped-def]
     """From (x, y) up (sign 1) or down (-1) the ramp: (length, value at its end, slope there, steepest slope, where).
 
-    reach: at most so many steps; pace: of so many pixels.
+    reach: at most so many steps; pace: of so many pixels; beyond: no farther than that past the steepest place, px.
     """
     before, steepest, slope, last, steepest_at = _at(values, x, y), 0.0, 0.0, 0.0, 0.0
     for k in range(1, reach + 1):
@@ -173,7 +173,7 @@ def _walk(values, x, y, across, down, sign, reach, pace):  # type: ignore[no-unt
         value = _at(values, x + far * across, y + far * down)
         slope = (value - before) * sign / pace
         levelled = slope < 0.5 * steepest and slope > 0.85 * last
-        if slope <= FLATNESS * steepest or slope <= 0 or levelled:
+        if slope <= FLATNESS * steepest or slope <= 0 or levelled or (k - 1) * pace > steepest_at + beyond:
             return (k - 1) * pace, before, slope, steepest, steepest_at
         if slope > steepest:
             steepest, steepest_at = slope, (k - 0.5) * pace
@@ -196,8 +196,8 @@ def _measure_edges(values, least_edge, reach, step, sigmas, heights):  # type: i
             if not slope * 2 * reach > least_edge:
                 continue
             across, down = across / slope, down / slope
-            _, top, end_up, steepest_up, at_up = _walk(values, x, y, across, down, 1.0, reach, 1.0)
-            _, bottom, end_down, steepest_down, at_down = _walk(values, x, y, across, down, -1.0, reach, 1.0)
+            _, top, end_up, steepest_up, at_up = _walk(values, x, y, across, down, 1.0, reach, 1.0, np.inf)
+            _, bottom, end_down, steepest_down, at_down = _walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
             steepest = max(steepest_up, steepest_down)
             nearest = at_up if steepest_up >= steepest_down else at_down
             if top - bottom > least_edge and nearest < 1 and max(end_up, end_down) <= STEEPEST_PLATEAU * steepest:
@@ -241,8 +241,10 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
             if not slope * 4 * reach * pace > least_edge:
                 continue
             across, down = across / slope, down / slope
-            up, top, _, steepest_up, at_up = _walk(values, x, y, across, down, 1.0, reach, pace)
-            back, bottom, _, steepest_down, at_down = _walk(values, x, y, across, down, -1.0, reach, pace)
+            up, top, _, steepest_up, at_up = _walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
+            back, bottom, _, steepest_down, at_down = _walk(
+                values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
+            )
             steepest = max(steepest_up, steepest_down)
             if top - bottom < least_edge:
                 continue

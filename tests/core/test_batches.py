@@ -6,7 +6,7 @@ from iibr_core.contested import FEATURES, HYPOTHESES
 from iibr_core.ray_transformer import RayTransformer
 from iibr_core.ray_weights import TrainedWeights
 from iibr_core.training import batches
-from iibr_core.training.batches import training_batch
+from iibr_core.training.batches import RayChoice, training_batch
 from iibr_core.training.loop import TrainConfig, train
 from iibr_core.training.losses import LossWeights, color_loss, perceived
 
@@ -61,3 +61,13 @@ def test_training_lowers_the_loss_of_the_real_model(tmp_path):
     train(model, lambda step: few[step % len(few)], config, out)
     assert loss() < 0.97 * before
     assert TrainedWeights(out) is not None
+
+
+@pytest.mark.parametrize("choice", [RayChoice(hypotheses=3), RayChoice(hypotheses=9), RayChoice(inpainted=False)])
+def test_other_rays_for_ablations_are_finite_and_whole_too(choice):
+    batch = training_batch(3, 0, choice)
+    assert batch.mask.shape[1] == choice.hypotheses
+    assert batch.mask.any(dim=1).all()
+    assert all(torch.isfinite(tensor).all() for tensor in (batch.features, batch.colors, batch.truth))
+    is_inpainted = batch.features[..., 8] > 0
+    assert choice.inpainted or not is_inpainted.any()
