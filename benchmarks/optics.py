@@ -1,18 +1,23 @@
-"""Figures of the optics: speed against error for every switch, bokeh from few samples, aliasing, pinhole, memory.
+"""Figures of the optics: speed against error for every switch and every haste, bokeh from few samples, aliasing,
+pinhole, the field while it fills, dragging, memory.
 
     python -m benchmarks.optics --data FOLDER [--out docs/optics.md] [--rounds 5] [--switches 1000]
 
 FOLDER holds hci_antinous and blender_shop_9x9 (views/vVV_uUU.* and the centre view's disparity as *.npy). Errors are
-against the converged picture of all views, or a plain numpy sum where that is said.
+against the converged picture of all views, or a plain numpy sum where that is said. On software GL, times are processor
+time over the number of cores, which other programs disturb less.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,13 +30,15 @@ from benchmarks.refocus import plain_pass
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.context import GLContext, create_headless
-from viewer.gpu.renderer import Renderer
+from viewer.gpu.haste import HASTES, NO_HASTE, Haste, stretched
+from viewer.gpu.renderer import Renderer, scaled
 from viewer.gpu.view_choice import aperture_samples
 from viewer.state import Optics
 
 Image = NDArray[np.uint8]
 SIZE_PX = 768, 512
 BORDER_PX = 16
+BETWEEN = ViewOffset(0.2, 0.37)
 FIVE = ((4, 4), (0, 0), (0, 8), (8, 0), (8, 8))
 EVERY_SECOND = tuple((v, u) for v in range(0, 9, 2) for u in range(0, 9, 2))
 
@@ -41,7 +48,7 @@ class Variant:
     """One way to draw the same picture."""
 
     name: str
-    stride: int = 1
+    haste: Haste = NO_HASTE
     prefilter: bool = True
     adaptive: bool = True
     stored: tuple[tuple[int, int], ...] | None = None
@@ -52,11 +59,10 @@ class Variant:
 PLAIN = Variant("every view of the aperture")
 VARIANTS = (
     PLAIN,
-    Variant("every 2nd view across and down", stride=2),
-    Variant("every 3rd view", stride=3),
+    Variant("every 2nd view across and down", Haste(2)),
     Variant("until converged", is_converged=True),
     Variant("prefilter off", prefilter=False),
-    Variant("prefilter off, every 2nd view", stride=2, prefilter=False),
+    Variant("prefilter off, every 2nd view", Haste(2), prefilter=False),
     Variant("tiles skip nothing", adaptive=False),
     Variant("5x5 views stored", stored=EVERY_SECOND),
     Variant("5x5 views stored, until converged", stored=EVERY_SECOND, is_converged=True),
@@ -64,6 +70,8 @@ VARIANTS = (
     Variant("5 views stored, until converged", stored=FIVE, is_converged=True),
     Variant("textures RGBA16F instead of RGBA8", hdr=True),
 )
+HASTE_APERTURES = 0.0, 4.0, 8.0
+"""View steps: a drag chooses another haste for each."""
 
 
 def psnr_db(image: NDArray[np.float64] | Image, reference: NDArray[np.float64] | Image, border: int = 0) -> float:
@@ -79,23 +87,52 @@ def mean_flip(reference: Image, image: Image) -> float:
     return float(evaluate(*pair, "LDR", applyMagma=False)[1])
 
 
-def drawn(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: Variant) -> Image:
-    """The picture of a variant whose views are uploaded."""
+def draw(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: Variant) -> None:
+    """Draw a variant whose views are uploaded."""
     renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
-    renderer.render(optics, size_px, stride=variant.stride)
+    renderer.render(optics, scaled(size_px, variant.haste.scale), haste=variant.haste)
     if variant.is_converged:
         renderer.refine()
-    return renderer.read_image()
 
 
-def switch_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> list[str]:
-    """Rows of speed against error, one a variant; times in alternation with the plain shader."""
-    renderer = Renderer(gl)
-    flat = field.views.reshape(-1, *field.views.shape[2:])
-    plain = plain_pass(gl.ctx, field.grid, flat, SIZE_PX, optics.aperture_diameter / 2, optics.focus_disparity)
+def drawn(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: Variant) -> Image:
+    """The picture of a variant whose views are uploaded."""
+    draw(renderer, optics, size_px, variant)
+    return stretched(renderer.read_image(), size_px)
+
+
+class Stopwatch:
+    """Times pictures in alternation with the plain shader."""
+
+    def __init__(self, gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> None:
+        flat = field.views.reshape(-1, *field.views.shape[2:])
+        radius = optics.aperture_diameter / 2
+        self._plain = plain_pass(gl.ctx, field.grid, flat, SIZE_PX, radius, optics.focus_disparity)
+        self._gl, self._rounds = gl, rounds
+
+    def milliseconds(self, draw_it: Callable[[], None], rounds: int | None = None) -> tuple[float, float]:
+        """Median time of a drawing, and that over the plain shader's."""
+        own, plain = [], []
+        for _ in range(rounds or self._rounds):
+            plain.append(self._seconds(lambda: self._plain(0.0)))
+            own.append(self._seconds(draw_it))
+        return 1e3 * float(np.median(own)), float(np.median(own) / np.median(plain))
+
+    def _seconds(self, draw_it: Callable[[], None]) -> float:
+        clock = time.process_time if self._gl.is_software else time.perf_counter
+        self._gl.ctx.finish()
+        start = clock()
+        draw_it()
+        self._gl.ctx.finish()
+        return (clock() - start) / ((os.cpu_count() or 1) if self._gl.is_software else 1)
+
+
+def switch_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
+    """Rows of speed against error, one a variant."""
+    renderer, watch = Renderer(gl), Stopwatch(gl, field, optics, rounds)
     field.upload(renderer, field.every)
     reference = drawn(renderer, optics, SIZE_PX, replace(PLAIN, is_converged=True))
-    rows, uploaded = [], None
+    uploaded = None
     for variant in VARIANTS:
         if (variant.stored, variant.hdr) != uploaded:
             field.upload(renderer, variant.stored or field.every, variant.hdr)
@@ -103,31 +140,65 @@ def switch_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int)
         image = drawn(renderer, optics, SIZE_PX, variant)
         samples = renderer.samples_drawn
         count = 1 if variant.is_converged else rounds
-        pairs = [(_seconds(gl, lambda: plain(0.0)), _seconds(gl, lambda v=variant: drawn_only(renderer, optics, v)))
-                 for _ in range(count)]  # fmt: skip
-        ours, ratio = min(own for _, own in pairs), min(own for _, own in pairs) / min(other for other, _ in pairs)
-        rows.append(
-            f"| {variant.name} | {samples} | {1e3 * ours:.0f} | {ratio:.2f} | "
+        own, ratio = watch.milliseconds(partial(draw, renderer, optics, SIZE_PX, variant), count)
+        yield (
+            f"| {variant.name} | {samples} | {own:.0f} | {ratio:.2f} | "
             f"{psnr_db(image, reference):.1f} | {mean_flip(reference, image):.4f} |"
         )
     renderer.release()
-    return rows
 
 
-def drawn_only(renderer: Renderer, optics: Optics, variant: Variant) -> None:
-    """Draw without reading back."""
-    renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
-    renderer.render(optics, SIZE_PX, stride=variant.stride)
-    if variant.is_converged:
-        renderer.refine()
+def haste_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
+    """Rows of speed against error, one a haste; for each aperture milliseconds and FLIP."""
+    renderer, watch = Renderer(gl), Stopwatch(gl, field, optics, rounds)
+    field.upload(renderer, field.every)
+    chosen = [replace(optics, eye=BETWEEN, aperture_diameter=diameter) for diameter in HASTE_APERTURES]
+    references = [drawn(renderer, each, SIZE_PX, replace(PLAIN, is_converged=True)) for each in chosen]
+    for haste in HASTES:
+        row = f"| {haste.stride} | {haste.sources} | {haste.scale:g} |"
+        for each, reference in zip(chosen, references):
+            variant = Variant("", haste)
+            image = drawn(renderer, each, SIZE_PX, variant)
+            own, _ = watch.milliseconds(partial(draw, renderer, each, SIZE_PX, variant))
+            row += f" {own:.0f} | {mean_flip(reference, image):.4f} |"
+        yield row
+    renderer.release()
 
 
-def _seconds(gl: GLContext, draw: Callable[[], None]) -> float:
-    gl.ctx.finish()
-    start = time.perf_counter()
-    draw()
-    gl.ctx.finish()
-    return time.perf_counter() - start
+def refocus_figures(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
+    """Rows about the refocus pass of two apertures against the plain shader."""
+    renderer = Renderer(gl)
+    field.upload(renderer, field.every)
+    for radius, milliseconds in ((2.0, 20), (6.0, 60)):
+        wide = replace(optics, aperture_diameter=2 * radius)
+        watch = Stopwatch(gl, field, wide, 4 * rounds)
+        own, ratio = watch.milliseconds(partial(draw, renderer, wide, SIZE_PX, PLAIN))
+        figure = f"<= {milliseconds} ms, <= 1.25 x plain"
+        measured = f"{own:.0f} ms, {ratio:.2f} x plain ({own / ratio:.0f} ms)"
+        yield f"| refocus, {field.name}, radius {radius:g} | {figure} | {measured} |"
+    renderer.release()
+
+
+def growth_while_filling(gl: GLContext, field: StoredField, optics: Optics) -> float:
+    """The most by which a view that arrives makes the picture worse (rms to the full field's, 1 = white)."""
+    renderer = Renderer(gl)
+    field.upload(renderer, field.every)
+    final = drawn(renderer, optics, field.size_px, PLAIN).astype(float)
+    order = sorted(field.every, key=lambda at: (at != field.grid.centre, -sum((np.array(at) - field.grid.centre) ** 2)))
+    renderer.open_field(field.grid, *field.size_px, hdr=False, with_disparity=True)
+    errors: list[float] = []
+    for at in order:
+        renderer.upload_view(*at, field.views[at], field.disparities[at])
+        difference = drawn(renderer, optics, field.size_px, PLAIN) - final
+        errors.append(float(np.sqrt(np.mean(difference**2)) / 255))
+    renderer.release()
+    return max(after - min(errors[: k + 1]) for k, after in enumerate(errors))
+
+
+def dragging() -> list[str]:
+    """Rows about the window, in a process of its own; none where there is no private X server."""
+    command = [sys.executable, "-m", "benchmarks.dragging"]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
 
 
 def bokeh_from_a_quarter(gl: GLContext, field: StoredField, optics: Optics) -> float:
@@ -224,11 +295,18 @@ def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[st
     yield "# Optics: speed against error\n"
     yield f"Made by `python -m benchmarks.optics`. {gl.renderer}, {os.cpu_count()} cores.\n"
     yield f"## Switches\n\n{shop.name}, {SIZE_PX[0]}x{SIZE_PX[1]}, aperture of 4 view steps, focus at 4.8 px. Times are"
-    yield "the least of several, in alternation with a plain shift-and-sum shader (25 fetches a pixel, no prefilter);"
-    yield "errors are against the converged picture of all 81 views.\n"
+    yield "medians, in alternation with a plain shift-and-sum shader (25 fetches a pixel, no prefilter); on software"
+    yield "GL, processor time over the number of cores. Errors are against the converged picture of all 81 views.\n"
     yield "| variant | samples | ms | x plain | PSNR dB | FLIP |\n| --- | --- | --- | --- | --- | --- |"
     yield from switch_table(gl, shop, bokeh[shop.name], rounds)
+    yield "\n## Haste\n\nWhat a drag leaves out, from the best picture to the quickest: view steps between samples,"
+    yield "stored views that a pinhole view is made of, scale of the picture. Milliseconds and FLIP for an eye between"
+    yield "views and apertures of 0, 4 and 8 view steps.\n"
+    yield "| stride | sources | scale | 0: ms | FLIP | 4: ms | FLIP | 8: ms | FLIP |"
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield from haste_table(gl, shop, bokeh[shop.name], rounds)
     yield "\n## Figures\n\n| what | figure | measured |\n| --- | --- | --- |"
+    yield from refocus_figures(gl, shop, bokeh[shop.name], rounds)
     for field in (antinous, shop):
         flip = bokeh_from_a_quarter(gl, field, replace(bokeh[field.name], aperture_diameter=8.0))
         yield f"| bokeh at 1/4 of the samples against converged, {field.name} | FLIP <= 0.02 | {flip:.4f} |"
@@ -236,8 +314,15 @@ def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[st
         sparse, dense = aliasing(gl, field, replace(bokeh[field.name], aperture_diameter=8.0))
         measured = f"{sparse:.2f} dB against {dense:.2f} dB: {dense - sparse:+.2f} dB"
         yield f"| refocus from 5x5 stored views against all 81, {field.name} | within 0.5 dB | {measured} |"
+    for diameter in (0.0, 8.0):
+        growth = growth_while_filling(
+            gl, antinous, replace(bokeh[antinous.name], eye=BETWEEN, aperture_diameter=diameter)
+        )
+        what = f"error while the field fills, {antinous.name}, aperture {diameter:g}"
+        yield f"| {what} | never grows | by at most {growth:.4f} rms of white |"
     mean, least = pinhole_from_five(gl, antinous)
     yield f"| pinhole from 5 stored views, {antinous.name} | >= 44 dB | mean {mean:.2f}, least {least:.2f} dB |"
+    yield from dragging()
     memory = ", ".join(f"{mib:.0f} MiB after {done}" for done, mib in memory_mib(gl, switches))
     yield f"| memory over {switches} switches of photo, size and aperture | flat | {memory} |"
 

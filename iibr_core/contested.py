@@ -41,7 +41,7 @@ CONTESTED_PX = 0.75
 CONTESTED_AROUND_PX = 1.5
 """Where edges are soft there are no steps: there a surface within REACH_PX contests a ray if it is this far off."""
 DISTINCT_PX = 0.3
-"""Hypotheses closer than this are one."""
+"""Hypotheses closer than this are one; a ray whose surfaces all are has nothing to decide."""
 LEAST_WEIGHT = 0.02
 LEAST_VOTE = 0.004
 """Weights below this change no colour by a visible step."""
@@ -241,7 +241,10 @@ def _lay_out(  # type: ignore[no-untyped-def]
                 disparity[found, picked], source[found, picked] = near_d[best], near_k[best]
                 share[found, picked] = 0.0
                 picked += 1
-            if picked > (0 if every else 1):
+            apart = 0.0
+            for j in range(picked):
+                apart = max(apart, abs(disparity[found, j] - disparity[found, 0]) * parallax)
+            if picked > 0 and (every or apart > DISTINCT_PX):
                 mixed = 0
                 for j in range(own_picked):
                     if disparity[found, j] > disparity[found, mixed]:

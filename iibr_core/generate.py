@@ -16,7 +16,17 @@ from iibr_core.plan import ScenePlan
 from iibr_core.rays import RaySet
 from iibr_core.resources import resource_folder
 from iibr_core.synthesis import Cancelled, RenderedView, ViewSynthesis, rays_of_photo
-from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo, Quality, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    DEFAULT_QUALITY,
+    Disparity,
+    FloatImage,
+    GridShape,
+    InputError,
+    Photo,
+    Quality,
+    ViewOffset,
+    ViewUpdate,
+)
 
 
 def generate(
@@ -25,7 +35,7 @@ def generate(
     plan: ScenePlan,
     should_stop: Callable[[], bool] = lambda: False,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
-    quality: Quality = "fast",
+    quality: Quality = DEFAULT_QUALITY,
 ) -> Iterator[ViewUpdate]:
     """Yield every view of `plan.grid` once: the photo's own first, then the farthest, then those nearest to
     `nearest_to()`.

@@ -57,7 +57,7 @@ def edge_softness(disparity: FloatImage, least_edge: float) -> float:
             change = np.abs(values[:, EDGE_WINDOW_PX:] - values[:, :-EDGE_WINDOW_PX])
             largest = np.lib.stride_tricks.sliding_window_view(steps, EDGE_WINDOW_PX, axis=1).max(axis=-1)
             is_edge = change >= least_edge
-        left += float(np.maximum(change - largest, 0)[is_edge].sum(dtype=np.float64))
+        left += float(np.fmax(change - largest, 0)[is_edge].sum(dtype=np.float64))
         total += float(change[is_edge].sum(dtype=np.float64))
     return left / total if 0 < total < np.inf else 0.0
 

@@ -102,7 +102,7 @@ class ViewSynthesis:
     def render(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
         """The view at an offset, its holes filled; row bands run side by side.
 
-        Raises Cancelled once should_stop is true.
+        Raises Cancelled once should_stop is true, ValueError for an offset that is not finite.
         """
         return self._filled(rays, offset, self._threads.map(self._band(rays, offset), self._rows(rays, THREADS)))
 
@@ -117,6 +117,8 @@ class ViewSynthesis:
             running.extend(self._threads.submit(work, item) for item in islice(items, THREADS - len(running)))
             if not running:
                 return
+            if self._should_stop():
+                raise Cancelled
             yield running.popleft().result()
 
     def _seen(self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
@@ -143,6 +145,8 @@ class ViewSynthesis:
 
     def _band(self, rays: RaySet, offset: ViewOffset) -> Callable[[tuple[int, int]], tuple[NDArray[Any], ...]]:
         """What renders rows [first, last) of this view."""
+        if not np.isfinite(offset).all():
+            raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
         if self._transformer:
             rays.surroundings  # noqa: B018 - made before the threads ask for it
 

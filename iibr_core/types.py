@@ -29,6 +29,8 @@ StoredColors = NDArray[np.uint8] | NDArray[np.float16]
 Quality = Literal["fast", "balanced", "exact"]
 """Where the ray transformer runs: nowhere, on contested rays, everywhere."""
 
+DEFAULT_QUALITY: Quality = "balanced"
+
 
 class ViewOffset(NamedTuple):
     """Where a view stands relative to the centre view, in view steps: t down, s right."""
@@ -60,6 +62,7 @@ class Photo:
 
     pixels: (H, W, 3) float32, sRGB-encoded, finite, >= 0; `is_hdr` photos exceed 1.
     focal_px: focal length in pixels of this size. notes: what reading it changed, one sentence each, for people.
+    Raises InputError for pixels that are not finite, so that nobody behind has to look.
     """
 
     pixels: FloatImage
@@ -67,6 +70,10 @@ class Photo:
     name: str
     is_hdr: bool = False
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.pixels).all():
+            raise InputError(f"{self.name}: holds colours that are NaN or infinite; give finite ones")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -80,11 +87,16 @@ class Disparity:
 
     values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
     ("scene.pfm", "none").
+    Raises InputError for values that are not finite, so that nobody behind has to look.
     """
 
     values: FloatImage
     source: str
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.values).all():
+            raise InputError(f"{self.source}: holds disparities that are NaN, infinite or too large; fill or scale them")
 
 
 @dataclass(frozen=True, eq=False)

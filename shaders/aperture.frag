@@ -14,7 +14,7 @@ uniform float few_up_to_px;
 #endif
 #endif
 
-in vec2 uv;
+in vec2 uv, target_uv;
 
 // Where sample i reads (xy) in which layer (z), and its weight, next to nothing where it knows nothing.
 vec3 place_of(int i, float focus, inout float weight) {
@@ -27,6 +27,9 @@ vec3 place_of(int i, float focus, inout float weight) {
     weight *= found.z;
 #endif
     weight *= in_picture(place.xy) * barrel_share(wanted.xy, uv);
+#ifdef DETOURS
+    place.xy = mirrored(place.xy);
+#endif
     return place;
 }
 
@@ -38,7 +41,7 @@ void main() {
     float all = 0.0;
     bool is_empty = false;
 #ifdef TILES
-    vec2 widest = texelFetch(tiles, ivec2(uv * vec2(textureSize(tiles, 0))), 0).xy;
+    vec2 widest = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xy;
     is_empty = max(widest.x, widest.y) <= sharp_up_to_px.x;
 #endif
     for (int i = 0; i < (is_empty ? sample_count : 0); i++) {
@@ -65,7 +68,7 @@ void main() {
     float focus = focus_at(uv);
     int count = sample_count;
 #ifdef TILES
-    vec3 tile = texelFetch(tiles, ivec2(uv * vec2(textureSize(tiles, 0))), 0).xyz;
+    vec3 tile = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xyz;
     bool few = max(tile.x, tile.y) < few_up_to_px;
     if (few) count = few_count;
     if (tile.z >= sharp_up_to_px.y) count = 0;

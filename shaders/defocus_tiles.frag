@@ -2,12 +2,13 @@
 // Per tile of the picture: the widest blur in front of the focus plane (x) and behind it (y), and the least of all (z),
 // in output px from one sample to the next.
 // DETOURS: see aperture.frag.
+#include "part.glsl"
 #include "samples.glsl"
 
 uniform sampler2DArray blocks;  // least and greatest disparity of squares of the views
 uniform float block_px;
 uniform float blur_px;          // see layers.glsl
-uniform vec2 tile_uv;           // extent of a tile in texture coordinates
+uniform vec2 tile_uv;           // extent of a tile in the target, texture coordinates
 uniform int taps;               // across a tile, at least 2, so close that no block is left out
 
 out vec4 width_px;
@@ -23,12 +24,12 @@ vec2 disparities_at(int i, vec2 place, float focus) {
 }
 
 void main() {
-    vec2 corner = floor(gl_FragCoord.xy) * tile_uv;
+    vec2 tile = floor(gl_FragCoord.xy);
     vec2 widest = vec2(0.0);
     float least = 1e6;
     for (int y = 0; y < taps; y++)
         for (int x = 0; x < taps; x++) {
-            vec2 place = corner + vec2(x, y) / float(taps - 1) * tile_uv;
+            vec2 place = picture_uv((tile + vec2(x, y) / float(taps - 1)) * tile_uv);
             float focus = focus_at(place);
             for (int i = 0; i < sample_count; i++) {
                 vec2 beside = disparities_at(i, place, focus) - focus;

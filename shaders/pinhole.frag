@@ -1,27 +1,24 @@
 #version 330 core
 // The view from any point: stored views near the eye, each warped by its own disparity, front-most surface first.
 // With one stored view (a photo and its disparity) this is the instant preview.
+// FLAT: only tiles where all sources see one surface without edges. EDGES: only the others, and there only those steps of
+// the search that can find something.
+#include "sources.glsl"
 #include "front_most.glsl"
 #include "layers.glsl"
 
-const int MAX_SOURCES = 4;
-
-uniform int source_count;
-uniform vec4 sources[MAX_SOURCES];      // xy: (s, t) from the eye to the view, view steps; z: layer; w: weight
-uniform int search_steps[MAX_SOURCES];  // 0: this view has no disparity and counts as flat at the focus plane
-uniform vec2 within_pixel;              // from its middle, texture coordinates
+uniform vec2 within_pixel;  // from its middle, texture coordinates
+#if defined(FLAT) || defined(EDGES)
+flat in ivec2 tile;
+uniform sampler2D spans_of_0_and_1, spans_of_2_and_3;  // see search_spans.frag
+#endif
 #ifdef DOLLY
 uniform vec4 cell;                         // part of the picture that is drawn: left, top, right, bottom
 uniform vec4 corner_weights[MAX_SOURCES];  // left top, right top, left bottom, right bottom
 #endif
-uniform float share;                    // of this pass in the picture; the rest comes from the aperture pass
+uniform float share;        // of this pass in the picture; the rest comes from the aperture pass
 
 in vec2 uv;
-
-// Texture coordinates per px of disparity, from the pixel's eye to the view.
-vec2 delta_to(int i) {
-    return (sources[i].xy - dolly * (uv - 0.5)) / view_size_px;
-}
 
 float weight_of(int i) {
 #ifdef DOLLY
@@ -33,37 +30,53 @@ float weight_of(int i) {
 #endif
 }
 
+// First and last step of the search in a source; FLAT: about where the surface is, and -1.
+vec2 span_of(int i) {
+#if defined(FLAT) || defined(EDGES)
+    vec4 spans = i < 2 ? texelFetch(spans_of_0_and_1, tile, 0) : texelFetch(spans_of_2_and_3, tile, 0);
+    return i % 2 == 0 ? spans.xy : spans.zw;
+#else
+    return vec2(0.0, search_steps[i]);
+#endif
+}
+
 // Which surface shows is asked somewhere in the pixel, elsewhere in each round, so that edges become smooth; its colour
 // is that of the pixel's middle, so that nothing else is blurred.
 Surface surface_in(int i) {
+    vec2 delta = delta_to(i, uv);
+#ifdef FLAT
+    float seen = disparity_at(uv - delta * span_of(i).x, sources[i].z);
+    vec2 at = uv - delta * disparity_at(uv - delta * seen, sources[i].z);
+    return Surface(seen, at, in_picture(at) < 1.0);
+#else
     float focus = focus_at(uv);
-    vec2 delta = delta_to(i);
     if (search_steps[i] == 0) return Surface(focus, uv - focus * delta, false);
-    Surface found = front_most(uv + within_pixel, sources[i].z, delta, search_steps[i]);
+    Surface found = front_most(uv + within_pixel, sources[i].z, delta, search_steps[i], ivec2(span_of(i) + 0.5));
     found.at -= within_pixel;
     return found;
+#endif
+}
+
+// A surface in front hides those behind it, the more the nearer its view is to the eye: nothing pops as it moves.
+float share_left(Surface surfaces[MAX_SOURCES], int i) {
+    float own = weight_of(i), weight = own;
+    for (int j = 0; j < source_count; j++) {
+        float in_front_by = surfaces[j].is_hidden ? 0.0 : surfaces[j].disparity - surfaces[i].disparity;
+        float hides = clamp(in_front_by / hiding_tolerance() - 1.0, 0.0, 1.0);
+        weight *= 1.0 - hides * min(weight_of(j) / own, 1.0);
+    }
+    if (surfaces[i].is_hidden) weight *= 1e-3;
+    return max(weight * in_picture(surfaces[i].at), 1e-8 * own);
 }
 
 void main() {
     Surface surfaces[MAX_SOURCES];
     for (int i = 0; i < source_count; i++) surfaces[i] = surface_in(i);
-
-    // A surface in front hides those behind it, the more the nearer its view is to the eye: nothing pops as it moves.
-    float tolerance = 0.04 * (nearest - farthest) + 0.05;
     vec4 sum = vec4(0.0);
     float total = 0.0;
     for (int i = 0; i < source_count; i++) {
-        float own = weight_of(i), weight = own;
-        for (int j = 0; j < source_count; j++) {
-            float in_front_by = surfaces[j].is_hidden ? 0.0 : surfaces[j].disparity - surfaces[i].disparity;
-            float hides = clamp(in_front_by / tolerance - 1.0, 0.0, 1.0);
-            weight *= 1.0 - hides * min(weight_of(j) / own, 1.0);
-        }
-        if (surfaces[i].is_hidden) weight *= 1e-3;
-        weight *= in_picture(surfaces[i].at);
-        weight = max(weight, 1e-8 * own);
-        vec4 light = linear_from_stored(textureLod(colors, vec3(surfaces[i].at, sources[i].z), 0.0));
-        sum += weight * light;
+        float weight = share_left(surfaces, i);
+        sum += weight * linear_from_stored(textureLod(colors, vec3(mirrored(surfaces[i].at), sources[i].z), 0.0));
         total += weight;
     }
     vec4 light = vec4(sum.rgb / total, 1.0) * share;

@@ -1,5 +1,8 @@
 #version 330 core
 // Linear light to the screen: layers put together, exposure, sRGB, and the flip from row 0 first to GL's bottom up.
+// LINEAR: without sRGB, and not cut off at white.
+#include "srgb.glsl"
+
 uniform sampler2D focus_layer;
 #ifdef LAYERS
 uniform sampler2D weights;  // r: of all layers, g: of the foreground
@@ -26,11 +29,6 @@ vec3 composed(vec2 at) {
 }
 #endif
 
-// IEC 61966-2-1
-vec3 srgb_from_linear(vec3 light) {
-    return mix(1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, 12.92 * light, vec3(lessThanEqual(light, vec3(0.0031308))));
-}
-
 void main() {
     vec2 at = vec2(uv.x, 1.0 - uv.y);
 #ifdef LAYERS
@@ -39,5 +37,9 @@ void main() {
     vec4 sum = texelFetch(focus_layer, ivec2(at * vec2(textureSize(focus_layer, 0))), 0);
     vec3 light = sum.rgb / max(sum.a, 1e-12);
 #endif
-    color = vec4(srgb_from_linear(clamp(light * exposure, 0.0, 1.0)), 1.0);
+    light *= exposure;
+#ifndef LINEAR
+    light = srgb_from_linear(clamp(light, 0.0, 1.0));
+#endif
+    color = vec4(light, 1.0);
 }

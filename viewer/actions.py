@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from iibr_core.types import ViewOffset
+from viewer.inspection import InspectionEdit
 from viewer.presets import PresetName
 from viewer.state import (
     ApertureShape,
@@ -364,6 +365,7 @@ Action = (
     | MotionEdit
     | WorkerNews
     | SettingsEdit
+    | InspectionEdit
     | ShowTiltHandles
     | SetDepthStrength
     | TakeSettings

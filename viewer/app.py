@@ -10,6 +10,7 @@ from pathlib import Path
 from iibr_core.types import InputError
 from viewer.actions import (
     Action,
+    DoTask,
     Notify,
     OpenFailed,
     OpenPath,
@@ -35,15 +36,19 @@ from viewer.input import (
     read_keys,
     read_pointer,
 )
+from viewer.inquiry import NO_AIDS, Aids, beside_of, wanted_inquiry
+from viewer.inspection import Probed
 from viewer.kept import keep, with_kept
 from viewer.layout import Layout, layout_of
+from viewer.light_table import LightTable
+from viewer.second_look import SecondLook
 from viewer.stage import VIEW_REFRESH_S, Stage
-from viewer.state import AppState, Notice, Picture
+from viewer.state import AppState, Notice, Picture, ReadTruthTask
 from viewer.ui.host import UiHost
 from viewer.ui.screen import build_screen
 from viewer.ui.style import Look
 from viewer.window import Window, wake
-from viewer.worker import Request, Result, SceneReady, ViewReady, Worker
+from viewer.worker import Doing, Request, Result, SceneReady, ViewReady, Worker
 
 UPLOAD_BUDGET_S = 0.006
 IDLE_WAIT_S = 1.0
@@ -61,9 +66,12 @@ EMPTY = AppState()
 
 @dataclass(frozen=True)
 class Frame:
-    """Everything the window shows: picture, panels (as a digest), where they lie, their look, repairs asked for."""
+    """Everything the window shows: picture and what inspection adds, panels (as a digest), where they lie, their look,
+    repairs asked for.
+    """
 
     picture: Picture | None
+    aids: Aids
     panels: bytes
     layout: Layout
     look: Look
@@ -87,6 +95,8 @@ class App:
             self.window.close()
             raise
         self.stage = Stage(self._gl)
+        self.table = LightTable(self._gl, self.stage)
+        self._second_look = SecondLook(wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._worker = Worker(wake)
         self._errands = Errands(self.stage)
@@ -114,13 +124,15 @@ class App:
         picture = self.stage.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
         if picture and self.stage.report != self.state.report:
             self.do(PictureDrawn(self.stage.report))
+        aids = self.table.draw(self.state, layout) if picture else NO_AIDS
         self._ui.begin(layout, look)
         pointer = read_pointer()
         actions = gesture_start(pointer, self.state)
-        actions += build_screen(self.state, layout, self.stage.texture if picture else None)
+        actions += build_screen(self.state, layout, self.stage.texture if picture else None, aids)
         actions += self._input(pointer, layout)
-        self._show(Frame(picture, self._ui.end(), layout, look, self.window.damages))
+        self._show(Frame(picture, aids, self._ui.end(), layout, look, self.window.damages))
         self.do(*actions)
+        self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self._is_busy |= bool(actions)
         self._direct_worker()
         self._keep_recent()
@@ -140,7 +152,8 @@ class App:
         """Where things lie in the window as it is now."""
         scene = self.state.scene
         size = (scene.width, scene.height) if scene else None
-        return layout_of(self.window.size, size, self.window.pixel_ratio, self.look().ui_scale)
+        beside = beside_of(self.state)
+        return layout_of(self.window.size, size, self.window.pixel_ratio, self.look().ui_scale, beside)
 
     def look(self) -> Look:
         """Theme, and size of text and widgets on this display."""
@@ -150,8 +163,10 @@ class App:
     def close(self) -> None:
         """Stop the worker, keep what is kept, and free everything."""
         self._worker.close()
+        self._second_look.close()
         self._keep()
         self._ui.release()
+        self.table.release()
         self.stage.release()
         self._gl.release()
         self.window.close()
@@ -168,6 +183,8 @@ class App:
         """What neither user nor worker says: the clock, errands done, the window moved, the worker lost."""
         self._stepped_at = time.perf_counter()
         actions = self._errands.run(self.state)
+        for seen in self._second_look.found():
+            actions += self.table.take(seen)
         if self.state.motion.is_running:
             actions.append(Tick(self._stepped_at))
         place = self.window.place
@@ -188,12 +205,16 @@ class App:
         try:
             if isinstance(result, SceneReady):
                 self.stage.open(result)
+                self.table.open()
                 self.window.set_title(f"{result.scene.name} - iibr")
                 return [SceneOpened(result.generation, result.scene)]
             if isinstance(result, ViewReady):
                 self.stage.add(result.view)
+                self.table.add(result.view)
                 view = result.view.row, result.view.column
                 return [ProgressMade(result.generation, result.progress, view)]
+            if isinstance(result, Doing):
+                return [ProgressMade(result.generation, result.progress)]
         except InputError as error:  # no room on the graphics card: there is no use in more views
             self._worker.cancel()
             return [OpenFailed(result.generation, str(error))]
@@ -201,7 +222,9 @@ class App:
 
     def _dropped(self) -> list[Action]:
         paths = self.window.take_dropped()
-        return actions_from_drop(paths, self.state) if paths else []
+        is_inspecting = "inspect" in self.state.preferences.open_sections
+        on_panel = self.layout().panel.contains(*self.window.pointer)
+        return actions_from_drop(paths, self.state, is_inspecting and on_panel) if paths else []
 
     def _input(self, pointer: Pointer, layout: Layout) -> list[Action]:
         pick = partial(self.stage.pick, self.state.optics.eye)
@@ -210,6 +233,16 @@ class App:
         actions += actions_from_keys(read_keys(), self.state)
         actions += gesture_end(pointer)
         return [*actions, Quit()] if self.window.should_close else actions
+
+    def _inspect(self, is_moving: bool) -> None:
+        """Tell what is under the pointer, and have worked out what else is looked at."""
+        probe = self.table.probe(self.state)
+        if probe != self.state.inspection.probe:
+            self.do(Probed(probe))
+        before = self._second_look.wanted
+        inquiry = wanted_inquiry(self.state, is_moving, before)
+        if inquiry != before:
+            self._second_look.want(inquiry, self.table.inputs(inquiry, self.state))
 
     def _direct_worker(self) -> None:
         """A new generation is a new job, a stopped one is cancelled. The photo is read again only if one was opened."""
@@ -257,6 +290,7 @@ def run(state: AppState, kept_in: Path | None = None) -> None:
         app.close()
 
 
-def opening(action: OpenPath, depth_strength: float = 1.0) -> AppState:
-    """The state to start with: nothing open yet, this asked for."""
-    return apply(AppState(depth_strength=depth_strength), action)
+def opening(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
+    """The state to start with: nothing open yet, this asked for, and this light field to compare with."""
+    state = apply(AppState(depth_strength=depth_strength), action)
+    return apply(state, DoTask(ReadTruthTask(ground_truth))) if ground_truth else state

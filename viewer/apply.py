@@ -47,6 +47,8 @@ from viewer.actions import (
     WorkerNews,
 )
 from viewer.history import gesture_ended, recorded, redone, undone
+from viewer.inspection import InspectionEdit
+from viewer.inspection_edits import divider_released, inspected, pointed_at
 from viewer.limits import DEPTH_STRENGTH_LIMIT, FONT_SCALE_LIMITS, SPEED_LIMITS, clamped, clamped_optics, is_finite
 from viewer.motion import begun, homeward, stepped
 from viewer.optics_edits import optics_edited
@@ -80,6 +82,8 @@ def apply(state: AppState, action: Action) -> AppState:
         return _moved(state, action)
     if isinstance(action, WorkerNews):
         return heard(state, action)
+    if isinstance(action, InspectionEdit):
+        return inspected(state, action)
     if isinstance(action, SettingsEdit):
         return replace(state, preferences=_preferences_edited(state.preferences, action))
     match action:
@@ -88,7 +92,7 @@ def apply(state: AppState, action: Action) -> AppState:
         case TakeSettings(settings):
             return recorded(state, _settings_taken(state, settings), "TakeSettings")
         case EndGesture():
-            return gesture_ended(state)
+            return divider_released(gesture_ended(state))
         case Undo():
             return undone(state)
         case Redo():
@@ -123,7 +127,7 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case PictureDrawn(report):
             return replace(state, report=report)
         case SetHover(hover):
-            return replace(state, hover=hover)
+            return pointed_at(state, hover)
         case Notify(notice):
             return noticed(state, notice)
         case DismissNotice(notice):

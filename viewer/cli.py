@@ -4,25 +4,39 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from iibr_core.types import GridShape, InputError, Quality, ViewOffset
+from iibr_core.depth.origin import DepthChoice
+from iibr_core.types import DEFAULT_QUALITY, GridShape, InputError, Quality, ViewOffset
+from viewer.bench_command import bench
+from viewer.evaluate_command import evaluate
+from viewer.models_command import models
 from viewer.options import (
+    DepthFrom,
+    DepthModel,
+    DepthStrength,
+    DisparityFile,
+    DisparityScale,
+    FocusDisparity,
+    Grid,
+    MaxPixels,
+    Memory,
+    PhotoPath,
+    QualityChoice,
+    Refine,
+    ScenePath,
     Size,
-    finite_from_text,
     given_options,
     grid_from_text,
-    memory_from_text,
-    quality_from_text,
+    number_option,
     size_from_text,
     view_from_text,
 )
+from viewer.terminal import print_depth, print_notes, progress_shown
 
 if TYPE_CHECKING:
     from viewer.state import Source
@@ -38,6 +52,9 @@ DEMO_SIZE = (1280, 800)
 app = typer.Typer(
     name="iibr", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich"
 )
+app.add_typer(models, name="models")
+app.command()(evaluate)
+app.command()(bench)
 
 
 class Backend(StrEnum):
@@ -52,40 +69,6 @@ class Format(StrEnum):
     """Layouts of a light field on disk."""
 
     hci = "hci"
-
-
-def _number(help_text: str) -> Any:
-    return typer.Option(parser=finite_from_text, metavar="X", help=help_text)
-
-
-Photo = Annotated[Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP).", show_default=False)]
-Scene = Annotated[Path, typer.Argument(help="A photo or a light-field folder.", show_default=False)]
-DisparityFile = Annotated[
-    Path | None,
-    typer.Option("--disparity", metavar="FILE", help="Disparity map: PFM, EXR, NPY or 16-bit PNG.", show_default=False),
-]
-DisparityScale = Annotated[float, _number("Multiply the disparity file's values by this (a 16-bit PNG needs it).")]
-DepthStrength = Annotated[float, _number("Multiply the parallax the plan chose.")]
-FocusDisparity = Annotated[float | None, _number("The disparity (as given) of the plane that stays still.")]
-Grid = Annotated[
-    GridShape | None,
-    typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.", show_default="the plan's"),
-]
-MaxPixels = Annotated[int | None, typer.Option(min=1, help="Larger photos are made smaller.", show_default="2000000")]
-Memory = Annotated[
-    int | None,
-    typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
-]
-
-QualityChoice = Annotated[
-    Quality,
-    typer.Option(
-        "--quality",
-        parser=quality_from_text,
-        metavar="fast|balanced|exact",
-        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere.",
-    ),
-]
 
 
 def main() -> None:
@@ -127,39 +110,53 @@ def view(
     path: Annotated[Path | None, typer.Argument(help="A photo or a light-field folder.", show_default="a demo")] = None,
     disparity: DisparityFile = None,
     disparity_scale: DisparityScale = 1.0,
+    depth: DepthFrom = "auto",
+    depth_model: DepthModel = None,
+    refine: Refine = 1.0,
     depth_strength: DepthStrength = 1.0,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
-    quality: QualityChoice = "fast",
+    quality: QualityChoice = DEFAULT_QUALITY,
+    ground_truth: Annotated[
+        Path | None,
+        typer.Option("--ground-truth", metavar="FOLDER", help="A light field to compare with.", show_default=False),
+    ] = None,
 ) -> None:
     """Open the viewer.
 
     Example: iibr view holiday.jpg --disparity holiday.pfm
     """
     path = path.absolute() if path else _demo_photo()
-    source = _source(path, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory, quality)
+    ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
+    source = _source(path, ways, grid, focus_disparity, max_pixels, quality)
     _require_existing(source)
+    if ground_truth is not None and not ground_truth.is_dir():
+        raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
     from viewer.actions import OpenPath
     from viewer.app import opening, run
     from viewer.kept import user_folder
 
-    run(opening(OpenPath(source), depth_strength), user_folder())
+    truth = str(ground_truth.absolute()) if ground_truth else None
+    run(opening(OpenPath(source), depth_strength, truth), user_folder())
 
 
 @app.command()
 def generate(
-    photo: Photo,
+    photo: PhotoPath,
     grid: Annotated[GridShape, typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.")],
     disparity: DisparityFile = None,
     disparity_scale: DisparityScale = 1.0,
+    depth: DepthFrom = "auto",
+    depth_model: DepthModel = None,
+    refine: Refine = 1.0,
     format: Annotated[Format, typer.Option(help="Layout of the folder.")] = Format.hci,
     with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
-    quality: QualityChoice = "fast",
+    quality: QualityChoice = DEFAULT_QUALITY,
 ) -> None:
     """Write the light field of a photo; its disparity counts literally, in pixels per view.
 
@@ -170,13 +167,15 @@ def generate(
     from iibr_core.plan import plan_literal
     from viewer.worker import load
 
-    loaded = load(_source(photo, disparity, disparity_scale, grid, None, max_pixels, memory))
-    _print_notes(loaded.photo.notes + loaded.disparity.notes)
+    ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
+    with progress_shown("reading") as show:
+        loaded = load(_source(photo, ways, grid, None, max_pixels), tell=lambda progress: show(0, 0, progress.doing))
+    print_notes(loaded.photo.notes + loaded.disparity.notes)
     plan = plan_literal(loaded.photo, loaded.disparity, grid, memory)
     total = grid.rows * grid.columns
     with (
         HciWriter(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
-        _progress_shown("making views") as show,
+        progress_shown("making views") as show,
     ):
         views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality)
         seconds = 0.0
@@ -186,6 +185,7 @@ def generate(
             seconds += time.perf_counter() - start
             writer.add(update)
             show(done, total)
+    print_depth(loaded.origin)
     height, width = loaded.photo.size
     print(f"{total} views of {width}x{height} in {seconds:.2f} s ({1000 * seconds / total:.1f} ms per view): {out}")
 
@@ -193,7 +193,7 @@ def generate(
 @app.command()
 def screenshot(
     context: typer.Context,
-    path: Scene,
+    path: ScenePath,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Image to write (.png, .exr).")],
     like: Annotated[
         Path | None,
@@ -209,8 +209,10 @@ def screenshot(
             parser=view_from_text, metavar="S,T", help="Viewpoint in view steps, right and down.", show_default="0,0"
         ),
     ] = None,
-    focus: Annotated[float | None, _number("Disparity that is sharp, px per view step (the panel's Focus).")] = None,
-    aperture: Annotated[float | None, _number("Aperture diameter in view steps.")] = None,
+    focus: Annotated[
+        float | None, number_option("Disparity that is sharp, px per view step (the panel's Focus).")
+    ] = None,
+    aperture: Annotated[float | None, number_option("Aperture diameter in view steps.")] = None,
     size: Annotated[
         Size | None,
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
@@ -219,24 +221,28 @@ def screenshot(
     backend: Annotated[Backend, typer.Option(help="Where OpenGL comes from.")] = Backend.auto,
     disparity: DisparityFile = None,
     disparity_scale: DisparityScale = 1.0,
+    depth: DepthFrom = "auto",
+    depth_model: DepthModel = None,
+    refine: Refine = 1.0,
     depth_strength: DepthStrength = 1.0,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
-    quality: QualityChoice = "fast",
+    quality: QualityChoice = DEFAULT_QUALITY,
 ) -> None:
     """Render one picture without a display; its settings are saved in it.
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
-    source = _source(path, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory, quality)
+    ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
+    source = _source(path, ways, grid, focus_disparity, max_pixels, quality)
     _require_existing(source)
     from iibr_core.formats.photo import write_image
     from viewer.actions import Action, MoveEye, SetAperture, SetFocus, TakeSettings
     from viewer.headless import HeadlessViewer
     from viewer.saved_settings import decided_like, read_settings
-    from viewer.saving import write_picture
+    from viewer.saving import is_float, write_picture
 
     actions: list[Action] = []
     if like is not None:
@@ -251,11 +257,13 @@ def screenshot(
     with HeadlessViewer(backend.value) as viewer:
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
-        with _progress_shown("reading") as show:
-            viewer.open(source, depth_strength, lambda progress: show(progress.done, progress.total))
-        _print_notes(viewer.state.scene.notes if viewer.state.scene else ())
+        with progress_shown("reading") as show:
+            viewer.open(source, depth_strength, lambda progress: show(progress.done, progress.total, progress.doing))
+        if viewer.state.scene is not None:
+            print_depth(viewer.state.scene.depth_origin)
+            print_notes(viewer.state.scene.notes)
         viewer.do(*actions)
-        pixels = viewer.screen(size or DEMO_SIZE) if ui else viewer.picture(size)
+        pixels = viewer.screen(size or DEMO_SIZE) if ui else viewer.picture(size, is_float(output))
     if ui:
         write_image(output, pixels)
     else:
@@ -265,9 +273,12 @@ def screenshot(
 
 @app.command()
 def plan(
-    photo: Photo,
+    photo: PhotoPath,
     disparity: DisparityFile = None,
     disparity_scale: DisparityScale = 1.0,
+    depth: DepthFrom = "auto",
+    depth_model: DepthModel = None,
+    refine: Refine = 1.0,
     depth_strength: DepthStrength = 1.0,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
@@ -281,7 +292,8 @@ def plan(
     from iibr_core.plan import PlanOverrides, plan_for_viewing
     from viewer.worker import load
 
-    loaded = load(_source(photo, disparity, disparity_scale, grid, focus_disparity, max_pixels, memory))
+    ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
+    loaded = load(_source(photo, ways, grid, focus_disparity, max_pixels))
     chosen = plan_for_viewing(
         loaded.photo, loaded.disparity, PlanOverrides(grid, depth_strength, focus_disparity, memory)
     )
@@ -303,7 +315,7 @@ def train(
 ) -> None:
     """Train the ray transformer on made-up scenes. Ctrl-C saves, --resume goes on; a log lies beside the weights.
 
-    Example: iibr train --steps 2200 --learning-rate 3e-3 --out weights.safetensors
+    Example: iibr train --steps 3000 --learning-rate 3e-3 --out weights.safetensors
     """
     from viewer.train_command import train_weights
 
@@ -341,8 +353,8 @@ def _demo_pictures(source: Source) -> None:
 
     DEMO_FOLDER.mkdir(exist_ok=True)
     with HeadlessViewer() as viewer:
-        with _progress_shown("reading") as show:
-            viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total))
+        with progress_shown("reading") as show:
+            viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total, progress.doing))
         write_image(DEMO_FOLDER / "demo.png", viewer.screen(DEMO_SIZE) if viewer.has_panels else viewer.picture())
         write_image(DEMO_FOLDER / "demo-views.png", contact_sheet(viewer))
     print(f"{DEMO_FOLDER / 'demo.png'}: the viewer's window")
@@ -351,18 +363,27 @@ def _demo_pictures(source: Source) -> None:
 
 def _source(
     path: Path,
-    disparity: Path | None,
-    disparity_scale: float,
+    ways: DepthChoice,
     grid: GridShape | None,
     focus_disparity: float | None,
     max_pixels: int | None,
-    memory: int | None,
-    quality: Quality = "fast",
+    quality: Quality = DEFAULT_QUALITY,
 ) -> Source:
     from viewer.state import Source
 
-    explicit = str(disparity) if disparity else None
-    return Source(str(path), explicit, disparity_scale, grid, focus_disparity, max_pixels, memory, quality)
+    return Source(
+        str(path),
+        ways.file,
+        ways.file_scale,
+        grid,
+        focus_disparity,
+        max_pixels,
+        ways.memory_bytes,
+        quality,
+        ways.start,
+        ways.model,
+        ways.refine,
+    )
 
 
 def _require_existing(source: Source) -> None:
@@ -376,23 +397,3 @@ def _demo_photo() -> Path:
     from iibr_core.resources import resource_folder
 
     return resource_folder("assets") / "motorcycle" / "motorcycle.png"
-
-
-def _print_notes(notes: tuple[str, ...]) -> None:
-    for note in notes:
-        print(f"note: {note}", file=sys.stderr)
-
-
-@contextmanager
-def _progress_shown(doing: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar on stderr while the block runs; call what is yielded with (done, total)."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(doing, total=None)
-
-        def show(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total or None, description="making views" if total else doing)
-
-        yield show

@@ -23,10 +23,26 @@ from viewer.actions import (
     StopWork,
     Undo,
 )
+from viewer.inspection import (
+    COMPARISONS,
+    OVERLAYS,
+    Compare,
+    Comparison,
+    OverlayKind,
+    SetOverlay,
+    ShowEpis,
+    ShowGrid,
+    ShowValues,
+)
 from viewer.presets import PRESETS
 from viewer.state import LOOPS, AppState, ChooseTask, LoopKind, PalettePrompt
 
 FONT_STEP = 1.1
+COMPARE_WORDS: dict[Comparison, str] = {
+    "photo": "Compare photo and picture",
+    "quality": "Compare fast and exact",
+    "truth": "Compare with ground truth",
+}
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
 
 
@@ -70,6 +86,14 @@ def _palette_toggled(state: AppState) -> Action:
     return ShowPrompt(None if isinstance(state.prompt, PalettePrompt) else PalettePrompt())
 
 
+def _overlay_toggled(kind: OverlayKind) -> Callable[[AppState], Action]:
+    return lambda state: SetOverlay(None if state.inspection.overlay == kind else kind)
+
+
+def _comparison_toggled(kind: Comparison) -> Callable[[AppState], Action]:
+    return lambda state: Compare(None if state.inspection.comparison == kind else kind)
+
+
 COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
     Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
@@ -83,6 +107,18 @@ COMMANDS: tuple[Command, ...] = (
     Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
     Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
+    Command("EPI strips", lambda s: ShowEpis(not s.inspection.shows_epis), (Chord("e"),)),
+    Command("All views", lambda s: ShowGrid(not s.inspection.shows_grid), (Chord("g"),)),
+    Command("Values under the pointer", lambda s: ShowValues(not s.inspection.shows_values), (Chord("v"),)),
+    *(
+        Command(f"Overlay: {kind}", _overlay_toggled(kind), (Chord("d"),) if kind == "disparity" else ())
+        for kind in OVERLAYS
+    ),
+    *(
+        Command(COMPARE_WORDS[kind], _comparison_toggled(kind), (Chord("p"),) if kind == "photo" else ())
+        for kind in COMPARISONS
+    ),
+    Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
     Command("Stop making views", _always(StopWork())),
     Command("Light or dark", lambda s: SetTheme("dark" if s.preferences.theme == "light" else "light")),
     Command("Larger text", _scaled(FONT_STEP), (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True))),

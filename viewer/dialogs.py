@@ -28,8 +28,9 @@ class Dialog:
 
         self.what = what
         self._dialog: Any
-        if what == "folder":
-            self._dialog = dialogs.select_folder("Open a folder of views")
+        if what in ("folder", "truth"):
+            title = "Open a folder of views" if what == "folder" else "Ground truth: a folder of views"
+            self._dialog = dialogs.select_folder(title)
         else:
             title, kinds = ("Open a photo", PHOTO_SUFFIXES) if what == "photo" else ("Aperture image", MASK_SUFFIXES)
             self._dialog = dialogs.open_file(title, filters=["Images", kinds, "All files", "*"])

@@ -8,9 +8,10 @@ from pathlib import Path
 from iibr_core.types import InputError
 from viewer.actions import Action, AskForPath, DoTask, Notify, OpenPath, SetApertureShape, ShowPrompt, TaskTaken
 from viewer.dialogs import Dialog, has_dialogs
+from viewer.inspection import GroundTruth, TruthRead
 from viewer.saving import AlreadyThereError, save_picture
 from viewer.stage import Stage
-from viewer.state import AppState, ChooseTask, Notice, ReadMaskTask, SavePrompt, SaveTask, Source, Task
+from viewer.state import AppState, ChooseTask, Notice, ReadMaskTask, ReadTruthTask, SavePrompt, SaveTask, Source, Task
 
 
 class Errands:
@@ -29,6 +30,8 @@ class Errands:
         """Take up the state's tasks and say what came of them, and of a dialog that was closed."""
         actions = self._answered()
         for task in state.tasks:
+            if isinstance(task, ReadTruthTask) and not is_scene_open(state):
+                continue  # what it must fit is not known yet
             actions += [TaskTaken(task), *self._done(task, state)]
         return actions
 
@@ -41,6 +44,8 @@ class Errands:
                 return []
             case ReadMaskTask(path):
                 return _mask_read(path, state)
+            case ReadTruthTask(path):
+                return _truth_read(path)
             case SaveTask():
                 return self._saved(task, state)
 
@@ -62,7 +67,23 @@ class Errands:
         what, self._dialog = self._dialog.what, None
         if not answer:
             return []
-        return [DoTask(ReadMaskTask(answer)) if what == "mask" else OpenPath(Source(answer))]
+        tasks: dict[str, Task] = {"mask": ReadMaskTask(answer), "truth": ReadTruthTask(answer)}
+        return [DoTask(tasks[what]) if what in tasks else OpenPath(Source(answer))]
+
+
+def is_scene_open(state: AppState) -> bool:
+    """Whether what was asked for last is open."""
+    return state.scene is not None and state.scene.source is state.source
+
+
+def _truth_read(path: str) -> list[Action]:
+    from iibr_core.formats.hci import read_light_field
+
+    try:
+        header, _ = read_light_field(Path(path).expanduser())
+    except InputError as error:
+        return [Notify(Notice(str(error), is_error=True))]
+    return [TruthRead(GroundTruth(path, header.name, header.grid, header.width, header.height))]
 
 
 def _mask_read(path: str, state: AppState) -> list[Action]:

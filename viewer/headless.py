@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,12 @@ from numpy.typing import NDArray
 from viewer.actions import Action, OpenPath, ProgressMade, SceneOpened
 from viewer.apply import apply
 from viewer.gpu.context import Backend, create_headless
+from viewer.inquiry import NO_AIDS, Aids, beside_of, wanted_inquiry
+from viewer.inspection import Probed
 from viewer.layout import Layout, Rect, layout_of, letterboxed
+from viewer.light_table import LightTable
+from viewer.saving import drawn_pixels
+from viewer.second_look import Looker
 from viewer.stage import Stage
 from viewer.state import CENTRE, AppState, Progress, Source
 from viewer.ui.host import UiHost
@@ -31,6 +37,8 @@ class HeadlessViewer:
         self.state = AppState()
         self._gl = create_headless(backend)
         self._stage = Stage(self._gl)
+        self._table = LightTable(self._gl, self._stage)
+        self._looker = Looker()
 
     def __enter__(self) -> HeadlessViewer:
         """Nothing more to do."""
@@ -38,6 +46,7 @@ class HeadlessViewer:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """Free everything."""
+        self._table.release()
         self._stage.release()
         self._gl.release()
 
@@ -51,50 +60,62 @@ class HeadlessViewer:
         self.state = AppState(depth_strength=depth_strength)
         self.do(OpenPath(source))
         on_progress(self.state.progress)
-        for result in results_of(Request(self.state.generation, source, depth_strength), lambda: False, lambda: CENTRE):
+        request = Request(self.state.generation, source, depth_strength)
+        for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
             if isinstance(result, SceneReady):
                 self._stage.open(result)
+                self._table.open()
                 self.do(SceneOpened(result.generation, result.scene))
             else:
                 self._stage.add(result.view)
+                self._table.add(result.view)
                 self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
                 on_progress(result.progress)
             self._stage.upload_all()
+
+    def pick(self, x_px: float, y_px: float) -> float | None:
+        """Disparity seen at a pixel of the picture from the present viewpoint; None where the scene has none."""
+        return self._stage.pick(self.state.optics.eye, x_px, y_px)
 
     def do(self, *actions: Action) -> None:
         """Change the state."""
         for action in actions:
             self.state = apply(self.state, action)
 
-    def picture(self, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-        """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3)."""
+    def picture(self, size: tuple[int, int] | None = None, as_float: bool = False) -> NDArray[Any]:
+        """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3).
+
+        sRGB-encoded, uint8 or float32 with 1 = white. Raises InputError for absurd sizes.
+        """
         scene = self.state.scene
         assert scene is not None
         width, height = size or (scene.width, scene.height)
         box = letterboxed(Rect(0, 0, width, height), (scene.width, scene.height))
         assert box is not None
         layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
-        image = np.empty((height, width, 3), np.uint8)
-        image[:] = np.round(np.array(BACKGROUND[:3]) * 255)
+        image = np.empty((height, width, 3), np.float32 if as_float else np.uint8)
+        image[:] = BACKGROUND[:3] if as_float else np.round(np.array(BACKGROUND[:3]) * 255)
         assert layout.picture_px is not None
         x, y, box_width, box_height = layout.picture_px
-        self._stage.converge(self.state, (box_width, box_height))
-        image[y : y + box_height, x : x + box_width] = self._stage.renderer.read_image()[..., :3]
+        pixels = drawn_pixels(self._stage, self.state, (box_width, box_height), as_float)
+        image[y : y + box_height, x : x + box_width] = pixels
         return image
 
     def screen(self, size: tuple[int, int]) -> NDArray[np.uint8]:
         """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
         scene, preferences = self.state.scene, self.state.preferences
         look = Look(preferences.font_scale, preferences.theme)
-        layout = layout_of(size, (scene.width, scene.height) if scene else None, ui_scale=look.ui_scale)
+        picture_size = (scene.width, scene.height) if scene else None
+        layout = layout_of(size, picture_size, ui_scale=look.ui_scale, beside=beside_of(self.state))
         has_picture = layout.picture_px and self._stage.converge(self.state, layout.picture_px[2:])
         texture = self._stage.texture if has_picture else None
+        aids = self._inspected(layout) if has_picture else NO_AIDS
         target = self._gl.ctx.simple_framebuffer(size, 4)
         ui = UiHost(look)
         try:
             for _ in range(LAYOUT_FRAMES):
                 ui.begin(layout, look)
-                build_screen(self.state, layout, texture)
+                build_screen(self.state, layout, texture, aids)
                 ui.end()
                 target.use()
                 ui.draw()
@@ -103,3 +124,13 @@ class HeadlessViewer:
             ui.release()
             target.release()
         return rows.reshape(size[1], size[0], 3)[::-1]
+
+    def _inspected(self, layout: Layout) -> Aids:
+        """What inspection shows, worked out to the end. The pointer is where the state says."""
+        inquiry = wanted_inquiry(self.state, is_moving=False, before=None)
+        inputs = self._table.inputs(inquiry, self.state)
+        if inquiry is not None and inputs is not None:
+            for seen in self._looker.seen(inquiry, inputs, lambda: False):
+                self.do(*self._table.take(seen))
+        self.do(Probed(self._table.probe(self.state)))
+        return self._table.draw(self.state, layout)

@@ -10,6 +10,7 @@ from pathlib import PurePath
 from iibr_core.types import ViewOffset
 from viewer.actions import (
     Action,
+    DoTask,
     EndGesture,
     FocusOn,
     MoveEye,
@@ -23,9 +24,11 @@ from viewer.actions import (
 )
 from viewer.commands import BY_NAME, COMMANDS, Chord
 from viewer.focal_plane import handle_points, place_of
+from viewer.inquiry import view_at
+from viewer.inspection import MoveDivider, ShowGrid
 from viewer.layout import Layout, Rect, pixel_at
 from viewer.limits import focus_limits
-from viewer.state import CENTRE, AppState, Hover, Scene, Source
+from viewer.state import CENTRE, AppState, Hover, ReadTruthTask, Scene, Source
 
 DRAG_THRESHOLD = 4.0
 """A press that moved farther than this (window units) is a drag, not a click."""
@@ -39,6 +42,9 @@ FOCUS_STEPS = 40
 ARROW_STEP_VIEWS = 0.5
 HANDLE_REACH = 14.0
 """A press this close to a tilt handle (window units at usual size) takes it."""
+
+DIVIDER_REACH = 8.0
+"""A press this close to the divider takes it."""
 
 DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
 
@@ -80,6 +86,8 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     scene, picture = state.scene, layout.picture
     if scene is None or picture is None or pointer.is_over_panel:
         return []
+    if state.inspection.shows_grid:
+        return _on_sheet(pointer, layout, scene, picture)
     if pointer.wheel and picture.contains(pointer.x, pointer.y):
         low, high = focus_limits(scene)
         return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
@@ -88,6 +96,8 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     if pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD:
         return _drag(pointer, layout, state, scene, picture, pick)
     if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
+        if _takes_divider(pointer, layout, state, picture):
+            return []
         if pointer.clicks > 1:
             return [ReturnHome()]
         at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
@@ -110,7 +120,11 @@ def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: 
     """Tell where the pointer is in the picture, if that is news. While it drags it points at nothing."""
     scene, picture = state.scene, layout.picture
     hover = None
-    is_pointing = not pointer.is_over_panel and not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD)
+    is_pointing = (
+        not pointer.is_over_panel
+        and not state.inspection.shows_grid
+        and not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD)
+    )
     if scene is not None and picture is not None and is_pointing and picture.contains(pointer.x, pointer.y):
         x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
         hover = Hover(x_px, y_px, pick(x_px, y_px))
@@ -121,7 +135,7 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     """What the keys ask for. Esc closes what is open in the window first."""
     actions: list[Action] = []
     if keys.is_escape:
-        actions.append(Quit() if state.prompt is None else ShowPrompt(None))
+        actions.append(_closed(state))
     actions += [BY_NAME[name].action(state) for name in keys.commands]
     if any(keys.arrows):
         eye = state.optics.eye
@@ -130,8 +144,20 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     return actions
 
 
-def actions_from_drop(paths: Sequence[str], state: AppState) -> list[Action]:
-    """Open the dropped photo, with a disparity map dropped along; a map alone is for the photo that is open."""
+def _closed(state: AppState) -> Action:
+    """What Esc closes: a prompt, the sheet of views, then the program."""
+    if state.prompt is not None:
+        return ShowPrompt(None)
+    return ShowGrid(False) if state.inspection.shows_grid else Quit()
+
+
+def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bool = False) -> list[Action]:
+    """Open the dropped photo, with a disparity map dropped along; a map alone is for the photo that is open.
+
+    is_ground_truth: it was dropped where ground truth is.
+    """
+    if is_ground_truth and state.scene is not None:
+        return [DoTask(ReadTruthTask(paths[0]))]
     maps = [path for path in paths if PurePath(path).suffix.lower() in DISPARITY_SUFFIXES]
     others = [path for path in paths if path not in maps]
     base = state.source or Source("")
@@ -144,12 +170,30 @@ def actions_from_drop(paths: Sequence[str], state: AppState) -> list[Action]:
 
 
 def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:
-    """A tilt handle where one was taken, else the viewpoint."""
+    """The divider or a tilt handle where one was taken, else the viewpoint."""
+    if _takes_divider(pointer, layout, state, picture):
+        return [MoveDivider((pointer.x - picture.x) / picture.width)]
     index = _taken_handle(pointer, layout, state, picture)
     if index is not None:
         at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
         return [MoveTiltHandle(index, place_of(*at, scene), pick(*at))]
     return _eye_drag(pointer, layout, scene, state.optics.eye)
+
+
+def _takes_divider(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> bool:
+    """Whether the press was close to the divider, or it is dragged already."""
+    inspection = state.inspection
+    if inspection.comparison is None:
+        return False
+    x = picture.x + inspection.divider * picture.width
+    return inspection.divider_taken or abs(pointer.pressed_x - x) <= DIVIDER_REACH * layout.ui_scale
+
+
+def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, picture: Rect) -> list[Action]:
+    """Go to the view that was clicked."""
+    is_click = pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD
+    view = view_at(picture, scene.grid, layout.ui_scale, pointer.x, pointer.y) if is_click else None
+    return [] if view is None else [MoveEye(scene.grid.offset(*view))]
 
 
 def _taken_handle(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> int | None:

@@ -5,7 +5,7 @@ Window units are GLFW's screen coordinates (ImGui's too), y down; a framebuffer 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 PANEL_WIDTH = 300.0
 MARGIN = 12.0
@@ -25,11 +25,31 @@ class Rect:
         return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
 
 
+STRIP_UNITS_PER_VIEW = 9.0
+LEAST_STRIP, MOST_STRIP = 45.0, 130.0
+"""EPI strips are this thick at usual size, however few or many views there are."""
+
+STRIP_GAP = 6.0
+STATUS_HEIGHT = 26.0
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What takes room beside the picture. epi_views: numbers of views in the EPIs (down, across), None without them."""
+
+    epi_views: tuple[int, int] | None = None
+    has_status: bool = False
+
+
+NOTHING_BESIDE = Beside()
+
+
 @dataclass(frozen=True)
 class Layout:
     """Rectangles in window units; pixel_ratio: framebuffer pixels per window unit; ui_scale: size of text and widgets.
 
-    picture is None where no picture is open or no room is left for it.
+    picture is None where no picture is open or no room is left for it. strip_across, strip_down: the EPIs, as wide and
+    as high as the picture; status: a line below. None where they are not shown.
     """
 
     window: Rect
@@ -37,14 +57,19 @@ class Layout:
     picture: Rect | None
     pixel_ratio: float = 1.0
     ui_scale: float = 1.0
+    strip_across: Rect | None = None
+    strip_down: Rect | None = None
+    status: Rect | None = None
 
     @property
     def picture_px(self) -> tuple[int, int, int, int] | None:
         """(x, y, width, height) of the picture in framebuffer pixels, y counted from the top."""
-        if self.picture is None:
-            return None
-        x, y = round(self.picture.x * self.pixel_ratio), round(self.picture.y * self.pixel_ratio)
-        width, height = round(self.picture.width * self.pixel_ratio), round(self.picture.height * self.pixel_ratio)
+        return None if self.picture is None else self.in_pixels(self.picture)
+
+    def in_pixels(self, rect: Rect) -> tuple[int, int, int, int]:
+        """(x, y, width, height) of a rectangle in framebuffer pixels, at least one each way."""
+        x, y = round(rect.x * self.pixel_ratio), round(rect.y * self.pixel_ratio)
+        width, height = round(rect.width * self.pixel_ratio), round(rect.height * self.pixel_ratio)
         return x, y, max(width, 1), max(height, 1)
 
 
@@ -53,19 +78,38 @@ def layout_of(
     picture_size: tuple[int, int] | None,
     pixel_ratio: float = 1.0,
     ui_scale: float = 1.0,
+    beside: Beside = NOTHING_BESIDE,
 ) -> Layout:
-    """Panel at the right, picture as large as it fits beside it. Sizes are (width, height)."""
+    """Panel at the right, picture as large as it fits beside it and what is beside it. Sizes are (width, height)."""
     width, height = window_size
     panel_width = min(PANEL_WIDTH * ui_scale, width)
-    margin = MARGIN * ui_scale
-    room = Rect(margin, margin, width - panel_width - 2 * margin, height - 2 * margin)
-    return Layout(
+    margin, gap = MARGIN * ui_scale, STRIP_GAP * ui_scale
+    down, across = (_thickness(views, ui_scale) for views in beside.epi_views or (0, 0))
+    status_height = STATUS_HEIGHT * ui_scale if beside.has_status else 0.0
+    room_height = height - 2 * margin - (across + gap if across else 0) - status_height
+    room = Rect(margin, margin, width - panel_width - 2 * margin - (down + gap if down else 0), room_height)
+    picture = letterboxed(room, picture_size) if picture_size else None
+    layout = Layout(
         window=Rect(0, 0, width, height),
         panel=Rect(width - panel_width, 0, panel_width, height),
-        picture=letterboxed(room, picture_size) if picture_size else None,
+        picture=picture,
         pixel_ratio=pixel_ratio,
         ui_scale=ui_scale,
     )
+    if picture is None:
+        return layout
+    below = picture.y + picture.height
+    return replace(
+        layout,
+        strip_across=Rect(picture.x, below + gap, picture.width, across) if across else None,
+        strip_down=Rect(picture.x + picture.width + gap, picture.y, down, picture.height) if down else None,
+        status=Rect(margin, height - margin - status_height, room.width, status_height) if status_height else None,
+    )
+
+
+def _thickness(views: int, ui_scale: float) -> float:
+    """Of an EPI strip: every view several pixels, within limits; none without views."""
+    return min(max(views * STRIP_UNITS_PER_VIEW, LEAST_STRIP), MOST_STRIP) * ui_scale if views else 0.0
 
 
 def letterboxed(room: Rect, picture_size: tuple[int, int]) -> Rect | None:

@@ -1,13 +1,15 @@
-"""The values of command-line options: from text, with errors that say what would be right."""
+"""The options that commands share, and their values from text, with errors that say what would be right."""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import NamedTuple, get_args
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, get_args
 
 import typer
 
+from iibr_core.depth.origin import DepthStart
 from iibr_core.types import GridShape, Quality, ViewOffset
 
 MAX_GRID = 99
@@ -83,3 +85,85 @@ def memory_from_text(text: str) -> int:
     if memory < 1:
         raise typer.BadParameter(f"{text!r} is no amount of memory: give bytes, or as 500M or 2G")
     return memory
+
+
+def depth_start_from_text(text: str) -> DepthStart:
+    """Where the search for depth begins, by name. Raises BadParameter."""
+    starts: tuple[DepthStart, ...] = get_args(DepthStart)
+    for start in starts:
+        if text == start:
+            return start
+    raise typer.BadParameter(f"{text!r} is no source of depth: give {', '.join(starts[:-1])} or {starts[-1]}")
+
+
+def refine_from_text(text: str) -> float:
+    """A strength from 0 (off) to 1 (on). Raises BadParameter."""
+    strength = {"on": 1.0, "off": 0.0}.get(str(text).lower())
+    strength = finite_from_text(text) if strength is None else strength
+    if not 0 <= strength <= 1:
+        raise typer.BadParameter(f"{text!r} is no strength: give on, off or a number from 0 to 1")
+    return strength
+
+
+def number_option(help_text: str) -> Any:
+    """An option that is any finite number."""
+    return typer.Option(parser=finite_from_text, metavar="X", help=help_text)
+
+
+PhotoPath = Annotated[Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP, HEIC).", show_default=False)]
+ScenePath = Annotated[Path, typer.Argument(help="A photo or a light-field folder.", show_default=False)]
+DisparityFile = Annotated[
+    Path | None,
+    typer.Option("--disparity", metavar="FILE", help="Disparity map: PFM, EXR, NPY or 16-bit PNG.", show_default=False),
+]
+DisparityScale = Annotated[
+    float, number_option("Multiply the disparity file's values by this (a 16-bit PNG needs it).")
+]
+DepthFrom = Annotated[
+    DepthStart,
+    typer.Option(
+        "--depth",
+        parser=depth_start_from_text,
+        metavar="auto|embedded|model|rough|flat",
+        help="Where the search for depth begins: a file (auto), the photo's own, a model, a guess; flat is none.",
+    ),
+]
+DepthModel = Annotated[
+    str | None,
+    typer.Option(
+        "--depth-model",
+        metavar="FOLDER|NAME",
+        help="Trained model for photos without depth, see `iibr models`.",
+        show_default="the usual one, if it is there",
+    ),
+]
+Refine = Annotated[
+    float,
+    typer.Option(
+        parser=refine_from_text,
+        metavar="on|off|0..1",
+        help="How far disparity edges are drawn to the photo's edges.",
+        show_default="on",
+    ),
+]
+DepthStrength = Annotated[float, number_option("Multiply the parallax the plan chose.")]
+FocusDisparity = Annotated[float | None, number_option("The disparity (as given) of the plane that stays still.")]
+Grid = Annotated[
+    GridShape | None,
+    typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.", show_default="the plan's"),
+]
+MaxPixels = Annotated[int | None, typer.Option(min=1, help="Larger photos are made smaller.", show_default="2000000")]
+Memory = Annotated[
+    int | None,
+    typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
+]
+
+QualityChoice = Annotated[
+    Quality,
+    typer.Option(
+        "--quality",
+        parser=quality_from_text,
+        metavar="fast|balanced|exact",
+        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere.",
+    ),
+]

@@ -72,14 +72,19 @@ def settings_text_in(path: Path) -> str:
     """The text of the settings in a picture's header, "" without. Raises InputError where it is no picture."""
     import OpenImageIO as oiio
 
+    from iibr_core.formats.raster import complaint_of
+
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     source = oiio.ImageInput.open(str(path))
     if source is None:
-        raise InputError(f"{path}: is no picture ({oiio.geterror().strip().splitlines()[:1] or 'no reason given'})")
-    text = source.spec().get_string_attribute(ATTRIBUTE)
-    source.close()
-    return str(text)
+        raise InputError(f"{path}: is no picture ({' '.join(complaint_of(oiio).split())[:120] or 'no reason given'})")
+    try:
+        return str(source.spec().get_string_attribute(ATTRIBUTE))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: its settings are damaged (no text); set them by hand") from error
+    finally:
+        source.close()
 
 
 def decided_like(source: Source, saved: SavedSettings, given: Collection[str]) -> Source:
@@ -88,7 +93,7 @@ def decided_like(source: Source, saved: SavedSettings, given: Collection[str]) -
     return dataclasses.replace(source, **taken)
 
 
-_SOURCE_FIELDS = ("disparity_scale", "grid", "focus_disparity", "max_pixels", "memory_bytes", "quality")
+_SOURCE_FIELDS = ("disparity_scale", "grid", "focus_disparity", "max_pixels", "memory_bytes", "quality", "refine")
 
 
 def _optics(fields: dict[str, Any]) -> Optics:
@@ -129,7 +134,8 @@ def _source(fields: dict[str, Any]) -> Source:
     quality = fields["quality"]
     if quality not in get_args(Quality):
         raise ValueError(f"quality {quality!r}")
-    return Source("", None, _number(fields["disparity_scale"]), grid, focus, most, memory, quality)
+    scale, refine = _number(fields["disparity_scale"]), _number(fields.get("refine", 1.0))
+    return Source("", None, scale, grid, focus, most, memory, quality, refine=refine)
 
 
 def _number(value: Any) -> float:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.color import srgb_from_linear
 from iibr_core.types import InputError
 from viewer.saved_settings import ATTRIBUTE, settings_text
 from viewer.stage import Stage
 from viewer.state import AppState, SavedSettings, SaveTask
 
 SUFFIXES = (".png", ".exr")
+MAX_PIXELS = 100_000_000
+"""Of a picture: as float light it then takes 1.2 GB."""
 
 
 class AlreadyThereError(InputError):
@@ -41,24 +44,29 @@ def save_picture(stage: Stage, state: AppState, task: SaveTask) -> Path:
         raise InputError(f"{path}: can be written as .png or .exr only")
     if path.exists() and not task.may_replace:
         raise AlreadyThereError(f"{path}: there is a file of this name already")
-    write_picture(path, drawn_pixels(stage, state, task.size_px), state, task.size_px)
+    write_picture(path, drawn_pixels(stage, state, task.size_px, is_float(path)), state, task.size_px)
     return path
 
 
-def write_picture(path: Path, pixels: NDArray[np.uint8], state: AppState, size_px: tuple[int, int]) -> None:
-    """Write pixels with the settings of the state inside. Raises InputError."""
+def is_float(path: Path) -> bool:
+    """Whether files of this kind hold more than 8 bits a channel."""
+    return path.suffix.lower() == ".exr"
+
+
+def write_picture(path: Path, pixels: NDArray[Any], state: AppState, size_px: tuple[int, int]) -> None:
+    """Write sRGB-encoded pixels, uint8 or float, with the settings of the state inside. Raises InputError."""
     from iibr_core.formats.photo import write_image
 
     write_image(path, pixels, {ATTRIBUTE: settings_text(settings_of(state, size_px))})
 
 
-def drawn_pixels(stage: Stage, state: AppState, size_px: tuple[int, int]) -> NDArray[np.uint8]:
-    """The picture with every sample it will get, (height, width, 3), sRGB-encoded.
+def drawn_pixels(stage: Stage, state: AppState, size_px: tuple[int, int], as_float: bool = False) -> NDArray[Any]:
+    """The picture with every sample it will get, (height, width, 3), sRGB-encoded: uint8, or float32 with 1 = white.
 
-    Raises InputError where the graphics driver cannot draw that size.
+    Larger pictures than the graphics card can hold are drawn in parts. Raises InputError beyond MAX_PIXELS.
     """
-    largest = int(stage.renderer.ctx.info["GL_MAX_TEXTURE_SIZE"])
-    if max(size_px) > largest:
-        raise InputError(f"{size_px[0]}x{size_px[1]} px: this graphics driver draws at most {largest} px a side")
-    stage.converge(state, size_px)
-    return stage.renderer.read_image()
+    width, height = size_px
+    if min(size_px) < 1 or width * height > MAX_PIXELS:
+        raise InputError(f"{width}x{height} px: a picture may have 1 to {MAX_PIXELS // 10**6} million pixels")
+    pixels = stage.picture(state, size_px, is_linear=as_float)
+    return srgb_from_linear(pixels) if as_float else pixels

@@ -9,6 +9,9 @@ import math
 import time
 from collections import deque
 from dataclasses import replace
+from typing import Any
+
+from numpy.typing import NDArray
 
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
 from viewer.gpu.context import GLContext
@@ -19,6 +22,9 @@ from viewer.worker import Loaded, SceneReady
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
+
+STILL_BUDGET_S = 0.08
+"""For a picture that only new views change: no hand waits for it, and it is seen longer."""
 
 NO_MORE_VIEWS_S = 2.0
 """After so long without a new view none is thought to be on its way."""
@@ -82,6 +88,11 @@ class Stage:
         return len(self._waiting) < WAITING_VIEWS
 
     @property
+    def picture_drawn(self) -> Picture | None:
+        """The record of the picture drawn last, None before the first."""
+        return self._drawn
+
+    @property
     def texture(self) -> int:
         """GL name of the texture that holds the picture, rows bottom-up."""
         return self.renderer.image_texture
@@ -113,7 +124,8 @@ class Stage:
         wanted = Picture(self.generation, self.views_present, state.optics, size_px)
         budget_s = self._gl.frame_budget_s
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
-            self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s)
+            is_still = self._differs_by_views_only(wanted)
+            self.renderer.render_in_time(wanted.optics, wanted.size_px, STILL_BUDGET_S if is_still else budget_s)
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
             self._drawn = replace(wanted, samples=self.report.samples)
@@ -127,6 +139,14 @@ class Stage:
         if self.draw(state, size_px) is not None:
             self.renderer.refine()
         return self._drawn
+
+    def picture(self, state: AppState, size_px: tuple[int, int], is_linear: bool = False) -> NDArray[Any]:
+        """The converged picture of any size, (height, width, 3): uint8, sRGB-encoded, or float32 linear light.
+
+        Before the first view it is black. The window's own picture is drawn anew after this.
+        """
+        self._drawn = None
+        return self.renderer.converged_picture(state.optics, size_px, is_linear)
 
     @property
     def note(self) -> str:
@@ -151,7 +171,10 @@ class Stage:
 
     def _can_wait(self, wanted: Picture) -> bool:
         """Whether only views are new, and the picture is too."""
-        if self._drawn is None or time.perf_counter() - self._drawn_at >= VIEW_REFRESH_S:
+        return time.perf_counter() - self._drawn_at < VIEW_REFRESH_S and self._differs_by_views_only(wanted)
+
+    def _differs_by_views_only(self, wanted: Picture) -> bool:
+        if self._drawn is None:
             return False
         return replace(wanted, views_present=self._drawn.views_present, samples=self._drawn.samples) == self._drawn
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from iibr_core.depth.origin import DepthOrigin, DepthStart
 from iibr_core.plan import ScenePlan
-from iibr_core.types import GridShape, Quality, ViewOffset
+from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
+from viewer.inspection import Inspection
 
 CENTRE = ViewOffset(0.0, 0.0)
 
@@ -72,8 +74,9 @@ class Optics:
 class Source:
     """What to open and what the user decided about it; None leaves the choice to the program.
 
-    path: a photo or a light-field folder. disparity_path, disparity_scale: see `iibr_core.depth.sidecar.disparity_for`.
-    focus_disparity: in the units of the given disparity. quality: where the ray transformer runs.
+    path: a photo or a light-field folder. disparity_path, disparity_scale, depth_start, depth_model, refine: see
+    `iibr_core.depth.origin.DepthChoice`. focus_disparity: in the units of the given disparity. quality: where the ray
+    transformer runs.
     """
 
     path: str
@@ -83,13 +86,17 @@ class Source:
     focus_disparity: float | None = None
     max_pixels: int | None = None
     memory_bytes: int | None = None
-    quality: Quality = "fast"
+    quality: Quality = DEFAULT_QUALITY
+    depth_start: DepthStart = "auto"
+    depth_model: str | None = None
+    refine: float = 1.0
 
 
 @dataclass(frozen=True)
 class Scene:
     """What is open: a photo with its plan, or a light field from disk (plan None).
 
+    depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
     has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
     not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
     file was saved with by this program, "" without.
@@ -109,6 +116,7 @@ class Scene:
     focal_px: float | None = None
     subject_disparity_px: float = 0.0
     settings: str = ""
+    depth_origin: DepthOrigin | None = None
 
 
 @dataclass(frozen=True)
@@ -209,7 +217,7 @@ class TiltHandles:
     taken: int | None = None
 
 
-ChoiceOf = Literal["photo", "folder", "mask"]
+ChoiceOf = Literal["photo", "folder", "mask", "truth"]
 
 
 @dataclass(frozen=True)
@@ -262,12 +270,19 @@ class ReadMaskTask:
     path: str
 
 
-Task = ChooseTask | SaveTask | ReadMaskTask
+@dataclass(frozen=True)
+class ReadTruthTask:
+    """Look what light field this folder holds, to compare with; once a scene is open."""
+
+    path: str
+
+
+Task = ChooseTask | SaveTask | ReadMaskTask | ReadTruthTask
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
 Theme = Literal["dark", "light"]
-Section = Literal["view", "focus", "aperture", "light", "scene"]
-SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "scene")
+Section = Literal["view", "focus", "aperture", "light", "inspect", "scene"]
+SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "inspect", "scene")
 
 
 @dataclass(frozen=True)
@@ -321,6 +336,7 @@ class AppState:
     preferences: Preferences = Preferences()
     recent: tuple[str, ...] = ()
     report: DrawReport | None = None
+    inspection: Inspection = field(default_factory=Inspection)
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,12 @@ class Window:
         """GLFW calls this when files are dropped."""
         self._dropped.extend(paths)
 
+    @property
+    def pointer(self) -> tuple[float, float]:
+        """(x, y) of the pointer in window units; while files are dropped, where they are."""
+        x, y = glfw.get_cursor_pos(self.handle)
+        return float(x), float(y)
+
     def take_dropped(self) -> list[str]:
         """Paths of the files dropped on the window since the last call."""
         dropped, self._dropped = self._dropped, []

@@ -8,6 +8,7 @@ the window comes first.
 from __future__ import annotations
 
 import itertools
+import math
 import queue
 import threading
 import time
@@ -19,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.depth.origin import DepthChoice, DepthOrigin
 from iibr_core.plan import PlanOverrides, ScenePlan, plan_for_viewing
 from iibr_core.types import Disparity, FloatImage, InputError, Photo, ViewOffset, ViewUpdate
 from viewer.saved_settings import settings_text_in
@@ -31,17 +33,20 @@ UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Where to look for the focus in a light field that says nothing about disparity."""
 
 POST_RETRY_S = 0.02
+TELL_EVERY_S = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A photo as read and its disparity as given, kept so that another plan does not read them again.
+    """A photo as read and its disparity as found, kept so that another plan does not read them again.
 
-    settings: text of the settings the photo was saved with by this program, "" without.
+    origin: where the disparity came from. settings: text of the settings the photo was saved with by this program, ""
+    without.
     """
 
     photo: Photo
     disparity: Disparity
+    origin: DepthOrigin
     settings: str = ""
 
 
@@ -75,6 +80,14 @@ class ViewReady:
 
 
 @dataclass(frozen=True, eq=False)
+class Doing:
+    """What the job is busy with before there is a scene."""
+
+    generation: int
+    progress: Progress
+
+
+@dataclass(frozen=True, eq=False)
 class Failed:
     """The job ended early; the message is one line for people."""
 
@@ -82,7 +95,7 @@ class Failed:
     message: str
 
 
-Result = SceneReady | ViewReady | Failed
+Result = SceneReady | ViewReady | Doing | Failed
 Work = Callable[[Request, Callable[[], bool], Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
 """What a job does: (request, should_stop, where the user looks) -> its results, in order. See `results_of`."""
 
@@ -99,7 +112,7 @@ class Worker:
         self.is_lost = False
         """Whether the thread ended unasked. The next request starts another one."""
         self._wake = wake
-        self._work = work or results_of
+        self._work = work or self._results_of
         self._results: queue.Queue[Result] = queue.Queue(QUEUED_RESULTS)
         self._changed = threading.Condition()
         self._wanted: Request | None = None
@@ -176,6 +189,16 @@ class Worker:
         except Exception as error:  # the one place where a job's error can still be shown to the user
             self._post(Failed(request.generation, message_of(error)), should_stop)
 
+    def _results_of(
+        self, request: Request, should_stop: Callable[[], bool], nearest_to: Callable[[], ViewOffset]
+    ) -> Iterator[SceneReady | ViewReady]:
+        """`results_of`, what it is busy with posted as it goes."""
+
+        def tell(progress: Progress) -> None:
+            self._post(Doing(request.generation, progress), should_stop)
+
+        return results_of(request, should_stop, nearest_to, tell)
+
     def _post(self, result: Result, should_stop: Callable[[], bool]) -> None:
         while not should_stop():
             try:
@@ -193,29 +216,62 @@ def message_of(error: Exception) -> str:
 
 
 def results_of(
-    request: Request, should_stop: Callable[[], bool], nearest_to: Callable[[], ViewOffset]
+    request: Request,
+    should_stop: Callable[[], bool],
+    nearest_to: Callable[[], ViewOffset],
+    tell: Callable[[Progress], None] = lambda progress: None,
 ) -> Iterator[SceneReady | ViewReady]:
-    """Everything a job has to say, in order: the scene, then each of its views.
+    """Everything a job has to say, in order: the scene, then each of its views. tell: what it does until then.
 
-    Raises InputError for a file that cannot be opened.
+    Raises InputError for a file that cannot be opened, StoppedError where should_stop says so while it is read.
     """
     from iibr_core.formats.hci import is_light_field_folder
 
     if is_light_field_folder(Path(request.source.path)):
         yield from _results_of_folder(request, should_stop)
     else:
-        yield from _results_of_photo(request, should_stop, nearest_to)
+        yield from _results_of_photo(request, should_stop, nearest_to, tell)
 
 
-def load(source: Source) -> Loaded:
-    """Read a photo and its disparity. Raises InputError."""
-    from iibr_core.depth.sidecar import disparity_for
-    from iibr_core.formats.photo import read_photo
+def load(
+    source: Source,
+    should_stop: Callable[[], bool] = lambda: False,
+    tell: Callable[[Progress], None] = lambda progress: None,
+) -> Loaded:
+    """Read a photo and find its disparity, telling what is going on, not more often than people can see.
+
+    Raises InputError, and StoppedError where should_stop says so.
+    """
+    from iibr_core.depth.source import open_with_depth
+    from iibr_core.formats.heic import is_heic
+    from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
+
+    said_at: dict[str, float] = {}
+
+    def tell_at_times(doing: str, share: float) -> None:
+        now = time.perf_counter()
+        if now - said_at.get(doing, -math.inf) >= TELL_EVERY_S:
+            said_at[doing] = now
+            tell(Progress(doing=f"{doing}, {share:.0%}" if share else doing))
 
     path = Path(source.path)
-    photo = read_photo(path, source.max_pixels) if source.max_pixels else read_photo(path)
-    explicit = Path(source.disparity_path) if source.disparity_path else None
-    return Loaded(photo, disparity_for(photo, path, explicit, source.disparity_scale), settings_text_in(path))
+    found = open_with_depth(
+        path,
+        DepthChoice(
+            source.depth_start,
+            source.disparity_path,
+            source.disparity_scale,
+            source.depth_model,
+            source.refine,
+            source.memory_bytes,
+        ),
+        source.max_pixels or DEFAULT_MAX_PIXELS,
+        source.grid,
+        should_stop,
+        tell_at_times,
+    )
+    # This program saves no HEIC.
+    return Loaded(found.photo, found.disparity, found.origin, "" if is_heic(path) else settings_text_in(path))
 
 
 def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
@@ -235,6 +291,7 @@ def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
         focal_px=_known_focal_px(loaded.photo),
         subject_disparity_px=_middle(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
+        depth_origin=loaded.origin,
     )
 
 
@@ -253,10 +310,13 @@ def _middle(disparity: FloatImage) -> float:
 
 
 def _results_of_photo(
-    request: Request, should_stop: Callable[[], bool], nearest_to: Callable[[], ViewOffset]
+    request: Request,
+    should_stop: Callable[[], bool],
+    nearest_to: Callable[[], ViewOffset],
+    tell: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
-    loaded = request.loaded or load(source)
+    loaded = request.loaded or load(source, should_stop, tell)
     overrides = PlanOverrides(source.grid, request.depth_strength, source.focus_disparity, source.memory_bytes)
     plan = plan_for_viewing(loaded.photo, loaded.disparity, overrides)
     disparity = plan.field_disparity(loaded.disparity)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from iibr_core.types import InputError
 from viewer.actions import OpenFailed, ProgressMade, SceneOpened, WorkerNews
 from viewer.history import mapped
+from viewer.inspection import of_next_scene
 from viewer.optics_edits import carried_optics
 from viewer.saved_settings import settings_from_text
 from viewer.state import AppState, History, Motion, Notice, Progress, Scene
@@ -58,6 +59,7 @@ def _opened(state: AppState, scene: Scene) -> AppState:
         views_there=frozenset({scene.grid.centre}),
         optics=carried_optics(state.optics, old, scene),
         history=mapped(state.history, lambda optics: carried_optics(optics, old, scene)),
+        inspection=replace(state.inspection, pair=None, probe=None),
     )
     if old is not None and old.source is scene.source:
         return opened
@@ -65,9 +67,9 @@ def _opened(state: AppState, scene: Scene) -> AppState:
     notices = (*(Notice(note) for note in scene.notes), *_offers(scene))[-NOTICES_KEPT:]
     motion = Motion(speed=state.motion.speed)
     recent = remembered(state.recent, scene.source.path)
-    return replace(
-        opened, notices=notices, history=History(), motion=motion, tilt_handles=None, hover=None, recent=recent
-    )
+    inspection = of_next_scene(state.inspection)
+    opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
+    return replace(opened, notices=notices, history=History(), motion=motion, recent=recent)
 
 
 def remembered(recent: tuple[str, ...], path: str) -> tuple[str, ...]:

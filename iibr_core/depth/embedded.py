@@ -11,7 +11,7 @@ from iibr_core.depth.estimate import Estimate
 from iibr_core.depth.gdepth import all_in_focus, dynamic_depth_estimate, gdepth_estimate
 from iibr_core.depth.samsung import samsung_estimate
 from iibr_core.depth.xmp import Xmp, is_jpeg, jpeg_layout, xmp_of
-from iibr_core.formats.files import require_file
+from iibr_core.formats.files import opened_file
 from iibr_core.formats.heic import is_heic, read_heic_depth
 from iibr_core.types import InputError
 
@@ -35,7 +35,6 @@ class EmbeddedDepth:
 
 def read_embedded(path: Path) -> EmbeddedDepth | None:
     """The depth within a photo's file, None where it holds none. Raises InputError where it is damaged."""
-    require_file(path)
     try:
         if is_heic(path):
             return _of_heic(path)
@@ -51,12 +50,10 @@ def _of_heic(path: Path) -> EmbeddedDepth | None:
 
 
 def _of_jpeg(path: Path) -> EmbeddedDepth | None:
-    with path.open("rb") as file:
-        if not is_jpeg(file.read(3)):
-            return None
-    if path.stat().st_size > MAX_FILE_BYTES:
-        return None
-    return embedded_in_jpeg(path.read_bytes())
+    with opened_file(path) as file:
+        start = file.read(3)
+        data = start + file.read() if is_jpeg(start) and path.stat().st_size <= MAX_FILE_BYTES else b""
+    return embedded_in_jpeg(data) if data else None
 
 
 def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:

@@ -173,7 +173,9 @@ def _estimate(stored: FloatImage, confidence: FloatImage | None, depth_range: De
     if confidence is not None and confidence.shape == stored.shape and (confidence >= MIN_CONFIDENCE).any():
         inverse[confidence < MIN_CONFIDENCE] = np.nan
     if depth_range.metres_per_unit is None:
-        return RelativeInverseDepth(inverse.astype(np.float32))
+        with np.errstate(over="ignore"):
+            relative = inverse.astype(np.float32)
+        return RelativeInverseDepth(np.where(np.isfinite(relative), relative, np.float32(np.nan)))
     return MetricDepth(
         np.divide(depth_range.metres_per_unit, np.maximum(inverse, depth_range.metres_per_unit / MAX_METRES)).astype(
             np.float32

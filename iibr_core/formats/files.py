@@ -6,9 +6,15 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 from uuid import uuid4
 
 from iibr_core.types import InputError
+
+MOST_INFLATION = 500
+"""Decoded bytes for each byte of a file: pictures reach some tens, zlib at most 1032 where all is of one colour."""
+HARMLESS_BYTES = 256 * 2**20
+"""Whatever the file's size, so much may be decoded from it."""
 
 
 def temporary_sibling(path: Path) -> Path:
@@ -44,3 +50,27 @@ def require_file(path: Path) -> None:
         raise InputError(f"{path}: the file is empty (0 bytes)")
     if not os.access(path, os.R_OK):
         raise InputError(f"{path}: may not be read; change its permissions")
+
+
+@contextmanager
+def opened_file(path: Path) -> Iterator[BinaryIO]:
+    """The file, open for reading bytes.
+
+    Raises InputError as `require_file` does, and where the file goes away or fails while it is read.
+    """
+    require_file(path)
+    try:
+        with path.open("rb") as file:
+            yield file
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); is it still there?") from error
+
+
+def refuse_bomb(path: Path, decoded_bytes: int) -> None:
+    """Raise InputError for a small file that claims to hold a huge picture, before any of it is decoded."""
+    stored = path.stat().st_size
+    if decoded_bytes > max(HARMLESS_BYTES, MOST_INFLATION * stored):
+        raise InputError(
+            f"{path}: its {stored:,} bytes claim to hold {decoded_bytes / 2**20:,.0f} MiB, as no photo does;"
+            " save it anew, smaller"
+        )

@@ -22,7 +22,7 @@ import numpy as np
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.sidecar import read_disparity
-from iibr_core.formats.files import temporary_sibling
+from iibr_core.formats.files import opened_file, temporary_sibling
 from iibr_core.formats.pfm import MAX_FILE_PIXELS, write_pfm
 from iibr_core.formats.photo import focal_px_from_fov, read_photo, write_image
 from iibr_core.formats.raster import read_size
@@ -32,6 +32,7 @@ VIEW_EXTENSIONS = (".png", ".jpg", ".jpeg", ".exr")
 CAM_NAME = re.compile(r"input_Cam(\d{2,6})$")
 GRID_NAME = re.compile(r"v(\d{1,4})_u(\d{1,4})$")
 OWN_FILE = re.compile(r"input_Cam\d+\.(png|exr)|disp_Cam\d+\.pfm|gt_disp_lowres\.pfm|parameters\.cfg")
+MOST_PARAMETER_BYTES = 1 << 20
 SENSOR_SIZE_MM = 36.0
 WRITING_THREADS = 2
 PENDING_VIEWS = 4
@@ -98,7 +99,7 @@ class HciWriter:
         if update.disparity is not None:
             low, high = float(update.disparity.min()), float(update.disparity.max())
             self._range = (min(self._range[0], low), max(self._range[1], high))
-        self._pending.append(self._pool.submit(self._write_view, update))
+        self._pending.append(self._pool.submit(self._write, update))
         while len(self._pending) > PENDING_VIEWS:
             self._pending.pop(0).result()
 
@@ -130,6 +131,12 @@ class HciWriter:
             self._temporary / "parameters.cfg", self.name, self.grid, self._size, self.focal_px, self._range
         )
         _replace_folder(self._temporary, self.folder)
+
+    def _write(self, update: ViewUpdate) -> None:
+        try:
+            self._write_view(update)
+        except InputError as error:  # the temporary folder's name says nothing to people
+            raise InputError(str(error).replace(str(self._temporary), str(self.folder))) from error
 
     def _write_view(self, update: ViewUpdate) -> None:
         index = update.row * self.grid.columns + update.column
@@ -165,11 +172,9 @@ def read_light_field(folder: Path) -> tuple[LightFieldHeader, Iterator[ViewUpdat
     for path in paths:
         if (found := read_size(path)) != size:
             raise InputError(f"{path}: is {found[1]}x{found[0]}, but {paths[0].name} is {size[1]}x{size[0]}")
-    focal_mm, sensor_mm = parameters.get("focal_length_mm", 0.0), parameters.get("sensor_size_mm", 0.0)
-    focal_px = focal_mm / sensor_mm * max(size) if focal_mm > 0 and sensor_mm > 0 else focal_px_from_fov(size[1])
     is_hdr = any(path.suffix.lower() == ".exr" for path in paths)
     header = LightFieldHeader(
-        folder.resolve().name, grid, size[1], size[0], focal_px, _disparity_range(folder, parameters), is_hdr
+        folder.resolve().name, grid, size[1], size[0], _focal_px(parameters, size), _disparity_range(parameters), is_hdr
     )
     return header, _iterate_views(folder, header, paths)
 
@@ -274,11 +279,15 @@ def _require_plausible(folder: Path, grid: GridShape, count: int) -> None:
 
 def _read_parameters(path: Path) -> dict[str, float]:
     """Every number of the file by name, whatever its section; empty if there is no file."""
-    if not path.is_file():
+    if not path.is_file() or path.stat().st_size == 0:
         return {}
+    with opened_file(path) as file:
+        data = file.read(MOST_PARAMETER_BYTES + 1)
+    if len(data) > MOST_PARAMETER_BYTES:
+        raise InputError(f"{path}: more than {MOST_PARAMETER_BYTES:,} bytes are no parameters; correct or remove it")
     parser = configparser.ConfigParser(interpolation=None, strict=False)
     try:
-        parser.read_string(path.read_text("utf-8-sig"))
+        parser.read_string(data.decode("utf-8-sig"))
     except (configparser.Error, UnicodeDecodeError) as error:
         reason = str(error).partition("\n")[0]
         raise InputError(f"{path}: cannot be read as parameters ({reason}); correct or remove it") from error
@@ -325,7 +334,14 @@ def _write_parameters(
         parser.write(file)
 
 
-def _disparity_range(folder: Path, parameters: dict[str, float]) -> tuple[float, float] | None:
+def _focal_px(parameters: dict[str, float], size: tuple[int, int]) -> float:
+    focal_mm, sensor_mm = parameters.get("focal_length_mm", 0.0), parameters.get("sensor_size_mm", 0.0)
+    if focal_mm > 0 and sensor_mm > 0 and math.isfinite(focal_px := focal_mm / sensor_mm * max(size)):
+        return focal_px
+    return focal_px_from_fov(size[1])
+
+
+def _disparity_range(parameters: dict[str, float]) -> tuple[float, float] | None:
     if "disp_min" in parameters and "disp_max" in parameters and parameters["disp_min"] <= parameters["disp_max"]:
         return parameters["disp_min"], parameters["disp_max"]
     return None

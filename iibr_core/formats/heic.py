@@ -11,7 +11,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import require_file
+from iibr_core.formats.files import opened_file, refuse_bomb, require_file
 from iibr_core.formats.pfm import MAX_FILE_PIXELS
 from iibr_core.formats.raster import Raster
 from iibr_core.types import FloatImage, InputError
@@ -37,8 +37,8 @@ class HeicDepth:
 
 
 def is_heic(path: Path) -> bool:
-    """Whether a file begins as HEIF files do, whatever its name."""
-    with path.open("rb") as file:
+    """Whether a file begins as HEIF files do, whatever its name. Raises InputError where it cannot be read."""
+    with opened_file(path) as file:
         start = file.read(12)
     return start[4:8] == b"ftyp" and start[8:12] in BRANDS
 
@@ -81,6 +81,7 @@ def _opened(path: Path) -> Any:
         raise InputError(f"{path}: cannot be read as a HEIC picture ({_line(error)})") from error
     if width < 1 or height < 1 or width * height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {width}x{height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
+    refuse_bomb(path, width * height * 4)
     return file
 
 

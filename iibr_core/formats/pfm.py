@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import require_file, written_whole
+from iibr_core.formats.files import opened_file, written_whole
 from iibr_core.types import FloatImage, InputError
 
 MAX_FILE_PIXELS = 400_000_000
@@ -25,8 +25,7 @@ def read_pfm(path: Path) -> FloatImage:
     that makes no sense, and files that are missing or cut off.
     """
     path = Path(path)
-    require_file(path)
-    with path.open("rb") as file:
+    with opened_file(path) as file:
         match = HEADER.match(file.read(HEADER_BYTES))
         if match is None:
             raise InputError(f"{path}: is not a PFM file (no header 'Pf width height scale')")
@@ -40,7 +39,9 @@ def read_pfm(path: Path) -> FloatImage:
         if missing > 0:
             raise InputError(f"{path}: cut off, {missing} bytes are missing for {width}x{height} values")
         file.seek(match.end())
-        values = np.frombuffer(file.read(4 * width * height), dtype)
+        values = np.fromfile(file, dtype, width * height)
+    if values.size < width * height:
+        raise InputError(f"{path}: became shorter while it was read; try again")
     return np.ascontiguousarray(values.reshape(height, width)[::-1], np.float32)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file, written_whole
 from iibr_core.formats.heic import is_heic, read_heic
-from iibr_core.formats.raster import Raster, read_raster
+from iibr_core.formats.raster import Raster, read_raster, require_whole_png, text_attribute
 from iibr_core.kernels import kernel
 from iibr_core.types import FloatImage, InputError, Photo
 
@@ -82,7 +82,21 @@ def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | i
         # Writing to an output that did not open crashes OpenImageIO.
         if target is None or not (target.open(str(temporary), spec) and target.write_image(stored) and target.close()):
             reason = oiio.geterror() if target is None else target.geterror()
-            raise InputError(f"{path}: cannot be written ({reason.strip()}); choose another place")
+            raise InputError(f"{path}: cannot be written ({_one_line(reason)}); choose another place")
+        if kind == ".png":
+            _require_written(path, temporary)
+
+
+def _require_written(path: Path, temporary: Path) -> None:
+    """OpenImageIO calls a PNG well written that a full disk cut off."""
+    try:
+        require_whole_png(temporary)
+    except InputError as error:
+        raise InputError(f"{path}: cannot be written whole (is the disk full?); choose another place") from error
+
+
+def _one_line(message: str) -> str:
+    return " ".join(message.split()) or "no reason given"
 
 
 def focal_px_from_fov(width: int, fov_deg: float = DEFAULT_FOV_DEG) -> float:
@@ -193,11 +207,11 @@ def _alpha_notes(raster: Raster) -> tuple[str, ...]:
 
 def _color_notes(spec: Any) -> tuple[str, ...]:
     notes: tuple[str, ...] = ()
-    stored_as = spec.get_string_attribute("jpeg:ColorSpace") or spec.get_string_attribute("tiff:ColorSpace")
+    stored_as = text_attribute(spec, "jpeg:ColorSpace") or text_attribute(spec, "tiff:ColorSpace")
     if "CMYK" in stored_as or "YCCK" in stored_as:
         notes += ("CMYK was converted to RGB without its colour profile.",)
     elif spec.getattribute("ICCProfile") is not None:
-        profile = spec.get_string_attribute("ICCProfile:profile_description") or "without a name"
+        profile = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
         if "sRGB" not in profile:
             notes += (f"The colour profile '{profile}' is ignored: colours are taken as sRGB.",)
     return notes
@@ -220,7 +234,10 @@ def _exif_focal_px(spec: Any) -> float | None:
 
 
 def _number(spec: Any, name: str) -> float:
-    value = spec.getattribute(name)
+    try:
+        value = spec.getattribute(name)
+    except UnicodeDecodeError:  # a text where a number belongs
+        return 0.0
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else 0.0
 
 

@@ -12,12 +12,14 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import require_file
+from iibr_core.formats.files import opened_file, refuse_bomb, require_file
+from iibr_core.formats.npy import read_array
 from iibr_core.formats.pfm import MAX_FILE_PIXELS, read_pfm
 from iibr_core.types import FloatImage, InputError
 
 # Some cameras pad their JPEGs; the decoder complains and loses nothing.
 HARMLESS_MESSAGE = "extraneous bytes"
+PNG_START = b"\x89PNG\r\n\x1a\n"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ def read_orientation(path: Path) -> int:
     """Exif's Orientation, 1..8, from a picture file's header; 1 where it tells none or cannot be read."""
     source = oiio.ImageInput.open(str(path))
     if source is None:
-        oiio.geterror()
+        complaint_of(oiio)
         return 1
     return int(source.spec().get_int_attribute("Orientation", 1))
 
@@ -57,13 +59,16 @@ def read_raster(path: Path) -> Raster:
     """
     source = _open(path)
     spec = source.spec()
-    names = [name.upper() for name in spec.channelnames]
+    try:
+        names = [name.upper() for name in spec.channelnames]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: damaged (its channels have no readable names); get the whole file again") from error
     alpha_index = names.index("A") if "A" in names else -1
     color_count = 3 if spec.nchannels - (alpha_index >= 0) >= 3 else 1
     if alpha_index >= 0 and alpha_index < color_count:
         raise InputError(f"{path}: channels {spec.channelnames} are neither grey nor RGB; convert it to RGB")
     pixels = source.read_image(0, 0, 0, max(color_count, alpha_index + 1), _reading_type(spec.format))
-    message = source.geterror()
+    message = complaint_of(source)
     if pixels is None or (message and HARMLESS_MESSAGE not in message):
         raise InputError(f"{path}: damaged or cut off ({_first_line(message)}); get the whole file again")
     alpha = np.ascontiguousarray(pixels[..., alpha_index]) if alpha_index >= 0 else None
@@ -103,25 +108,30 @@ def _others(pixels: NDArray[Any]) -> list[NDArray[Any]]:
 def _open(path: Path) -> Any:
     require_file(path)
     if path.suffix.lower() == ".png":
-        _require_whole_png(path)
+        require_whole_png(path)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), hints)
     if source is None:
-        raise InputError(f"{path}: cannot be read as a picture ({_first_line(oiio.geterror())})")
+        raise InputError(f"{path}: cannot be read as a picture ({_first_line(complaint_of(oiio))})")
     spec = source.spec()
     if spec.width * spec.height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {spec.width}x{spec.height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
     if spec.width < 1 or spec.height < 1 or spec.depth > 1 or spec.deep:
         raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is no flat picture")
+    refuse_bomb(path, spec.image_bytes())
     return source
 
 
-def _require_whole_png(path: Path) -> None:
-    """Walk the chunks to the last one: libpng reports a cut-off file on stderr, where it would spoil our one line."""
-    with path.open("rb") as file:
+def require_whole_png(path: Path) -> None:
+    """Raise InputError where a PNG lacks its end, found by walking its chunks.
+
+    libpng reports a cut-off file on stderr, where it would spoil our one line, and a disk that is full not at all.
+    """
+    with opened_file(path) as file:
         end = path.stat().st_size
-        if file.read(8) != b"\x89PNG\r\n\x1a\n":
+        start = file.read(len(PNG_START))
+        if start != PNG_START[: len(start)]:
             return  # something else under that name: the decoders find out
         kind = b""
         while kind != b"IEND":
@@ -138,17 +148,28 @@ def _reading_type(stored: Any) -> str:
 
 
 def _read_npy(path: Path) -> FloatImage:
-    try:
-        stored = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
-        raise InputError(f"{path}: cannot be read as a NumPy array ({_first_line(str(error))})") from error
-    if not isinstance(stored, np.ndarray) or stored.ndim != 2 or stored.dtype.kind not in "fiu" or stored.size == 0:
-        what = f"{stored.dtype} of shape {stored.shape}" if isinstance(stored, np.ndarray) else "an archive"
+    stored = read_array(path, MAX_FILE_PIXELS)
+    if stored.ndim != 2 or stored.size == 0:
+        what = f"{stored.dtype} of shape {stored.shape}"
         raise InputError(f"{path}: holds {what}; a disparity map is an array of numbers with shape (height, width)")
-    if stored.size > MAX_FILE_PIXELS:
-        raise InputError(f"{path}: {stored.size:,} values are more than {MAX_FILE_PIXELS:,}; make it smaller")
     with np.errstate(over="ignore"):
-        return np.array(stored, np.float32)
+        return np.ascontiguousarray(stored, np.float32)
+
+
+def text_attribute(spec: Any, name: str) -> str:
+    """A text of a picture's header; "" where there is none, or one that is damaged."""
+    try:
+        return str(spec.get_string_attribute(name))
+    except UnicodeDecodeError:
+        return ""
+
+
+def complaint_of(teller: Any) -> str:
+    """What OpenImageIO, or one of its files, complains of, "" of nothing; it may quote bytes that are no text."""
+    try:
+        return str(teller.geterror())
+    except UnicodeDecodeError:
+        return "a name in it is no text"
 
 
 def _first_line(message: str) -> str:

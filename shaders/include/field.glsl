@@ -25,6 +25,11 @@ vec4 linear_from_stored(vec4 stored) {
     return light;
 }
 
+// Where no view has the content asked for, beyond all borders, the views' mirror images stand in: streaks would be seen.
+vec2 mirrored(vec2 at) {
+    return 1.0 - abs(1.0 - abs(at));
+}
+
 // 1 where a view has the content asked for, next to nothing beyond its border: there, other views know better.
 float in_picture(vec2 at) {
     vec2 off_centre = abs(at - 0.5);

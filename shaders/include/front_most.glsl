@@ -21,23 +21,24 @@ vec2 clear_of_seam(vec2 at, float layer, float disparity, float edge_height, vec
 }
 
 // delta: texture coordinates per px of disparity, from the eye to the view. steps: at least one per pixel of parallax.
+// span: the first and the last of them that can tell anything.
 // The search goes from near to far. A step over a depth edge is no surface (accepting it stretches the foreground like a
 // rubber sheet): the search goes on behind it, and where it ends there, the eye sees what the view does not.
-Surface front_most(vec2 uv, float layer, vec2 delta, int steps) {
+Surface front_most(vec2 uv, float layer, vec2 delta, int steps, ivec2 span) {
     float stride = (nearest - farthest) / float(steps);
     vec2 parallax_px = delta * (nearest - farthest) * view_size_px;
     vec2 seam = parallax_px * min(1.0, 2.0 / max(length(parallax_px), 1e-6)) / view_size_px;
     vec2 edge = uv - delta * farthest;
-    for (int k = 0; k <= steps; k++) {
-        float disparity = nearest - stride * float(k);
-        vec2 at = uv - delta * disparity;
-        float seen = disparity_at(at, layer);
-        float depth_below = seen - disparity;
-        if (depth_below < -0.5 * stride) {
-            edge = at;
-            continue;
+    for (int k = span.x; k <= span.y; k++) {
+        float seen;
+        for (; k <= span.y; k++) {
+            float disparity = nearest - stride * float(k);
+            vec2 at = uv - delta * disparity;
+            seen = disparity_at(at, layer);
+            if (seen - disparity < -0.5 * stride) edge = at;
+            else if (seen - disparity <= 1.5 * stride || k == 0) break;
         }
-        if (depth_below > 1.5 * stride && k > 0) continue;
+        if (k > span.y) break;
         float refined = disparity_at(uv - delta * seen, layer);
         if (refined < seen - 1.5 * stride) continue;  // beside the edge of a surface, not on it
         vec2 found = clear_of_seam(uv - delta * refined, layer, refined, 1.5 * stride, seam);

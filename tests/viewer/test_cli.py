@@ -115,7 +115,8 @@ def test_weights_missing_or_damaged_are_one_line_and_fast_still_works(
         (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
         assert line.startswith(f"iibr: {trained}: ")
         assert sorted(tmp_path.rglob("*")) == before
-    assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", tmp_path / "field") == 0
+    words = ("--grid", 3, "--out", tmp_path / "field", "--quality", "fast")
+    assert run(monkeypatch, "generate", photo_path, *words) == 0
 
 
 def test_screenshot_writes_an_image_of_the_size_asked_for(

@@ -30,8 +30,8 @@ def test_progress_in_words(progress: Progress, words: str) -> None:
 @pytest.mark.parametrize(
     ("quality", "is_made", "words"),
     [
-        ("fast", True, "60 × 40 px, 3 × 9 views"),
-        ("balanced", True, "60 × 40 px, 3 × 9 views, balanced"),
+        ("fast", True, "60 × 40 px, 3 × 9 views, fast"),
+        ("balanced", True, "60 × 40 px, 3 × 9 views"),
         ("exact", True, "60 × 40 px, 3 × 9 views, exact"),
         ("exact", False, "60 × 40 px, 3 × 9 views"),
     ],

@@ -72,14 +72,9 @@ class GLContext:
         return 0.033 if self.is_software else 0.016
 
     @property
-    def seconds_per_sample(self) -> float:
-        """First guess at what a sample of the aperture costs per pixel; what is measured then replaces it."""
+    def seconds_per_fetch(self) -> float:
+        """First guess at what reading a texel costs a pixel; what is measured then replaces it."""
         return 3e-9 if self.is_software else 4e-11
-
-    @property
-    def seconds_per_picture(self) -> float:
-        """Guess at what a picture costs per pixel besides its samples."""
-        return 10 * self.seconds_per_sample
 
     def clear_screen(self, red: float = 0.0, green: float = 0.0, blue: float = 0.0) -> None:
         """Fill the window with one colour and leave it bound for drawing."""

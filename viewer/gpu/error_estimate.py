@@ -5,6 +5,8 @@ The mean of 2n independent samples differs from that of the first n by about as 
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,15 +16,15 @@ class ErrorEstimate:
 
     def __init__(self) -> None:
         self.estimate: float | None = None
-        self._stride = 1
+        self._haste: Hashable = None
         self._hurried: NDArray[np.uint8] | None = None
         self._latest: NDArray[np.uint8] | None = None
-        self._by_stride: dict[int, float] = {}
+        self._by_haste: dict[Hashable, float] = {}
 
-    def begin(self, stride: int) -> None:
-        """A hurried picture was drawn with this many view steps between its samples."""
-        self._stride, self._hurried, self._latest = stride, None, None
-        self.estimate = self._by_stride.get(stride)
+    def begin(self, haste: Hashable) -> None:
+        """A picture was drawn in this haste."""
+        self._haste, self._hurried, self._latest = haste, None, None
+        self.estimate = self._by_haste.get(haste)
 
     @property
     def is_new(self) -> bool:
@@ -36,7 +38,7 @@ class ErrorEstimate:
             return
         self.estimate = rms_difference(image, self._latest)
         self._latest = image
-        self._by_stride[self._stride] = rms_difference(image, self._hurried)
+        self._by_haste[self._haste] = rms_difference(image, self._hurried)
 
 
 def rms_difference(image: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
+from viewer.gpu.haste import NO_HASTE, Haste
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.view_choice import UNMOVED, ApertureSample, aperture_samples
 from viewer.state import ApertureShape, Optics
@@ -19,8 +21,42 @@ HIGHLIGHT_GAIN = 15.0
 FADE_FROM_PX, FADE_TO_PX = 4.0, 6.0
 """Over these widths of the whole blur, light moves from the sharp layer to those of half the size."""
 
+LEAST_ACROSS = 2.0
+"""Samples across the aperture, at least, however great the haste."""
+
 FEW_UP_TO_PX = 1.2
 """As long as the whole blur of a tile is narrower, every other sample across and down shows the same."""
+
+
+class Cell(NamedTuple):
+    """A part of the picture in texture coordinates."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+
+WHOLE = Cell(0.0, 0.0, 1.0, 1.0)
+
+
+class Window(NamedTuple):
+    """The part of the picture that the targets hold, in texture coordinates."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+    def seen(self, cell: Cell) -> Cell:
+        """A part of the picture in texture coordinates of the targets, as far as they hold it."""
+        x = ((edge - self.left) / self.width for edge in (cell.left, cell.right))
+        y = ((edge - self.top) / self.height for edge in (cell.top, cell.bottom))
+        (left, right), (top, bottom) = ((min(max(edge, 0.0), 1.0) for edge in edges) for edges in (x, y))
+        return Cell(left, top, right, bottom)
+
+
+WHOLE_PICTURE = Window(0.0, 0.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -31,7 +67,7 @@ class Lens:
     samples. dolly: view steps (s, t) by which the ray crosses the grid elsewhere, per picture size. blur_px: output
     pixels that one px of disparity beside the focus moves from one sample to the next. widest_blur_px: the most that
     comes to in this field. samples_across: the whole blur in units of blur_px. keeps_layers: whether light is kept
-    apart by defocus and smoothed.
+    apart by defocus and smoothed. most_sources: stored views that a pinhole view is made of. part: what is drawn.
     """
 
     eye: ViewOffset
@@ -49,6 +85,8 @@ class Lens:
     keeps_layers: bool
     highlight_gain: float
     exposure: float
+    most_sources: int
+    part: Window = WHOLE_PICTURE
 
     @property
     def sharp_up_to_px(self) -> tuple[float, float]:
@@ -89,9 +127,10 @@ class Lens:
         return aperture_samples(self.eye, diameter, grid, present, self.shape, stride, moved)
 
 
-def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, prefilter: bool, stride: int = 1) -> Lens:
-    """The lens for a picture of that width. stride: view steps between the aperture's samples."""
+def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, prefilter: bool, haste: Haste = NO_HASTE) -> Lens:
+    """The lens for a picture of that width."""
     diameter = max(optics.aperture_diameter, 0.0)
+    stride = min(haste.stride, max(int(diameter / LEAST_ACROSS), 1))
     step = max(min(diameter, float(stride)), 1e-6)
     blur_px = step * width_px / field.width if diameter > 0 else 0.0
     samples_across = max(min(diameter, float(max(field.grid))) / step, 1.0)
@@ -114,6 +153,7 @@ def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, prefilter: 
         keeps_layers=keeps,
         highlight_gain=0.0 if field.hdr else HIGHLIGHT_GAIN * optics.highlight_recovery * min(diameter, 1.0),
         exposure=2.0**optics.exposure_stops,
+        most_sources=haste.sources,
     )
 
 

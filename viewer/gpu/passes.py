@@ -7,13 +7,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import moderngl
 import numpy as np
 
 from iibr_core.types import ViewOffset
-from viewer.gpu.lens import Lens
+from viewer.gpu.lens import WHOLE, WHOLE_PICTURE, Cell, Lens
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.targets import Target, Targets
@@ -25,22 +25,14 @@ MAX_SAMPLES = 512
 MAX_SEARCH_STEPS = 96
 """Of the pinhole pass: one per pixel of parallax as long as that suffices."""
 
+OFF_BORDER_PX = 1 / 256
+"""Halfway between views a look-up may hit the border between two texels: rounding must not decide which one is read."""
+
 TILE_PX = 16
 MAX_TILE_TAPS = 8
 
 UNITS = {"colors": 0, "disparities": 1, "tiles": 2, "stand_ins": 3, "blocks": 4}
-
-
-class Cell(NamedTuple):
-    """A part of the picture in texture coordinates."""
-
-    left: float
-    top: float
-    right: float
-    bottom: float
-
-
-WHOLE = Cell(0.0, 0.0, 1.0, 1.0)
+SPANS = "spans_of_0_and_1", "spans_of_2_and_3"
 
 
 class Passes:
@@ -60,42 +52,81 @@ class Passes:
             self._stand_ins.release()
 
     def draw_pinhole(
-        self, field: LightFieldTexture, lens: Lens, within_px: ViewOffset, target: Target, layer: str
+        self, field: LightFieldTexture, lens: Lens, within_px: ViewOffset, target: Target, targets: Targets, layer: str
     ) -> None:
         """Add the share of the pinhole view. layer: "SHARP", "BLURRED", or "" for all light.
 
         within_px: where in a pixel of the target it is asked which surface shows, from the middle.
         """
-        program, quad = self._programs.get("pinhole.frag", _switches(lens, layer, lens.has_dolly and "DOLLY"))
-        self._set_field(program, field, lens)
-        program.set_uniforms(share=1.0 - lens.aperture_share, nudge=_nudge(target, layer))
-        target.add()
-        width, height = target.framebuffer.size
-        program.set_uniforms(within_pixel=(within_px.s / width, within_px.t / height))
+        kinds = ("FLAT", "EDGES") if self.adaptive and field.has_disparity.any() else ("",)
+        keeps, size_px = target.holds_sum, target.framebuffer.size
         for cell in _cells(field, lens):
-            edges = (round(cell.left * width), round(cell.top * height), round(cell.right * width))
-            bottom = round(cell.bottom * height)
-            target.framebuffer.scissor = edges[0], edges[1], edges[2] - edges[0], bottom - edges[1]
-            self._set_sources(program, field, lens, cell)
-            quad.render(moderngl.TRIANGLES, vertices=3)
-        target.framebuffer.scissor = 0, 0, width, height
+            if "FLAT" in kinds:
+                self._find_spans(field, lens, cell, targets)
+            target.framebuffer.scissor = _pixels_of(lens.part.seen(cell), *size_px)
+            target.add(keeps)
+            for kind in kinds:
+                self._draw_pinhole_tiles(field, lens, cell, within_px, targets, layer, kind)
+        target.framebuffer.scissor = 0, 0, *size_px
+
+    def _draw_pinhole_tiles(
+        self,
+        field: LightFieldTexture,
+        lens: Lens,
+        cell: Cell,
+        within_px: ViewOffset,
+        targets: Targets,
+        layer: str,
+        kind: str,
+    ) -> None:
+        """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES"."""
+        program, quad = self._programs.get("pinhole.frag", _switches(lens, layer, lens.has_dolly and "DOLLY", kind))
+        target = targets.blurred if layer == "BLURRED" else targets.light
+        width, height = target.framebuffer.size
+        self._set_field(program, field, lens)
+        self._set_sources(program, field, lens, cell)
+        program.set_uniforms(share=1.0 - lens.aperture_share, nudge=_nudge(target, layer))
+        pixel_uv = lens.part.width / width, lens.part.height / height
+        within = (within_px.s + OFF_BORDER_PX) * pixel_uv[0], (within_px.t + OFF_BORDER_PX) * pixel_uv[1]
+        program.set_uniforms(within_pixel=within)
+        if kind:
+            for unit, (name, texture) in enumerate(zip(SPANS, targets.spans.textures), start=len(UNITS)):
+                texture.use(unit)
+                program.set_uniform(name, unit)
+        tiles = math.prod(targets.spans.framebuffer.size)
+        quad.render(moderngl.TRIANGLES, vertices=6 * tiles if kind else 3)
+
+    def _find_spans(self, field: LightFieldTexture, lens: Lens, cell: Cell, targets: Targets) -> None:
+        """Fill the tiles of a cell with the steps between which its searches end."""
+        program, quad = self._programs.get("search_spans.frag", _switches(lens, "", lens.has_dolly and "DOLLY"))
+        self._set_field(program, field, lens)
+        self._set_sources(program, field, lens, cell)
+        self._set_blocks(program, field, targets)
+        width, height = targets.blurred.framebuffer.size
+        program.set_uniforms(pixel_uv=(lens.part.width / width, lens.part.height / height))
+        target = targets.spans
+        target.framebuffer.scissor = _touched_by(lens.part.seen(cell), *target.framebuffer.size)
+        self._ctx.disable(moderngl.BLEND)
+        target.use()
+        quad.render(moderngl.TRIANGLES, vertices=3)
 
     def _set_sources(self, program: Program, field: LightFieldTexture, lens: Lens, cell: Cell) -> None:
         """The views that a cell of the picture is made of; with dolly, their weights at its corners."""
         middle = lens.eye_at((cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2)
-        sources = pinhole_sources(middle, field.grid, field.present)
+        sources = pinhole_sources(middle, field.grid, field.present)[: lens.most_sources]
+        in_all = sum(source.weight for source in sources)
         missing = MAX_SOURCES - len(sources)
         rows, steps = [], []
         for row, column, weight in sources:
             there = field.grid.offset(row, column)
-            rows.append((there.s - lens.eye.s, there.t - lens.eye.t, float(field.layer(row, column)), weight))
+            rows.append((there.s - lens.eye.s, there.t - lens.eye.t, float(field.layer(row, column)), weight / in_all))
             steps.append(_search_steps(field, lens, there, cell) if field.has_disparity[row, column] else 0)
         program.set_uniforms(
             source_count=len(sources),
             sources=[*rows, *[(0.0,) * 4] * missing],
             search_steps=[*steps, *[0] * missing],
         )
-        if lens.has_dolly:
+        if "cell" in program.declared and lens.has_dolly:
             corners = [lens.eye_at(u, v) for v in (cell.top, cell.bottom) for u in (cell.left, cell.right)]
             weights = pinhole_weights(sources, corners, field.grid)
             program.set_uniforms(
@@ -146,11 +177,10 @@ class Passes:
         )
         self._set_field(program, field, lens)
         self._set_samples(program, field, lens, samples, {})
+        self._set_blocks(program, field, targets)
         across, down = targets.tiles.framebuffer.size
-        tile_uv = 1 / across, 1 / down
-        taps = 1 + math.ceil(max(tile_uv[0] * field.width, tile_uv[1] * field.height) / BLOCK_PX)
-        field.blocks.use(UNITS["blocks"])
-        program.set_uniforms(blocks=UNITS["blocks"], block_px=float(BLOCK_PX), tile_uv=tile_uv)
+        tile_px = max(lens.part.width * field.width / across, lens.part.height * field.height / down)
+        taps = 1 + math.ceil(tile_px / BLOCK_PX)
         program.set_uniforms(taps=min(taps, MAX_TILE_TAPS))
         targets.tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
@@ -179,10 +209,11 @@ class Passes:
             target.use()
             quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def present(self, lens: Lens, targets: Targets) -> None:
-        """The finished picture, into the framebuffer in use."""
+    def present(self, lens: Lens, targets: Targets, is_linear: bool) -> None:
+        """The finished picture, into the framebuffer in use. is_linear: as light, unbounded, not sRGB-encoded."""
         self._ctx.disable(moderngl.BLEND)
-        program, quad = self._programs.get("present.frag", ("LAYERS",) if lens.keeps_layers else ())
+        switches = lens.keeps_layers and "LAYERS", is_linear and "LINEAR"
+        program, quad = self._programs.get("present.frag", tuple(switch for switch in switches if switch))
         targets.light.textures[0].use(0)
         program.set_uniforms(focus_layer=0, exposure=lens.exposure)
         if lens.keeps_layers:
@@ -227,8 +258,14 @@ class Passes:
             blur_px=lens.blur_px,
             sharp_up_to_px=lens.sharp_up_to_px,
             barrel=lens.barrel(field.height / field.width),
+            part=lens.part,
             sample_width=min(float(lens.stride), lens.diameter),
         )
+
+    def _set_blocks(self, program: Program, field: LightFieldTexture, targets: Targets) -> None:
+        across, down = targets.tiles.framebuffer.size
+        field.blocks.use(UNITS["blocks"])
+        program.set_uniforms(blocks=UNITS["blocks"], block_px=float(BLOCK_PX), tile_uv=(1 / across, 1 / down))
 
     def _set_samples(
         self,
@@ -260,6 +297,7 @@ def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
         "RANGE" if lens.focus_range > 0 else "",
         "HIGHLIGHTS" if lens.highlight_gain > 0 else "",
         "CAT_EYE" if lens.shape.kind == "cat_eye" else "",
+        "PART" if lens.part != WHOLE_PICTURE else "",
     )
     return tuple(str(name) for name in (*names, *by_lens) if name)
 
@@ -299,6 +337,19 @@ def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[Cell]:
     for top, bottom in pairwise(down):
         for left, right in pairwise(across):
             yield Cell(left, top, right, bottom)
+
+
+def _pixels_of(cell: Cell, width: int, height: int) -> tuple[int, int, int, int]:
+    """Scissor: (x, y, width, height) of the pixels whose cell this is."""
+    left, top = round(cell.left * width), round(cell.top * height)
+    return left, top, round(cell.right * width) - left, round(cell.bottom * height) - top
+
+
+def _touched_by(cell: Cell, width: int, height: int) -> tuple[int, int, int, int]:
+    """Scissor: (x, y, width, height) of all pixels (here: tiles) that the cell and its border pixels lie in."""
+    left, top = max(math.ceil(cell.left * width) - 1, 0), max(math.ceil(cell.top * height) - 1, 0)
+    right, bottom = min(math.floor(cell.right * width) + 1, width), min(math.floor(cell.bottom * height) + 1, height)
+    return left, top, right - left, bottom - top
 
 
 def _crossings(eye: float, dolly: float, first: float, last: float) -> list[float]:

@@ -7,36 +7,40 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset
+from iibr_core.types import FloatImage, GridShape, InputError, StoredColors
 from viewer.gpu.context import GLContext
+from viewer.gpu.drawing import Drawing
 from viewer.gpu.error_estimate import ErrorEstimate
-from viewer.gpu.lens import Lens, lens_of
+from viewer.gpu.haste import HASTES, NO_HASTE, Haste, Pace, Work, least_haste, stretched
+from viewer.gpu.lens import Window, lens_of
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.passes import MAX_SAMPLES, TILE_PX, Passes
+from viewer.gpu.passes import TILE_PX
+from viewer.gpu.picture_parts import PicturePart, parts_of
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.summation import Summation, even_places, rounds_of
-from viewer.gpu.targets import Targets
-from viewer.gpu.view_choice import ApertureSample, clamped_to_grid, nearest_present
+from viewer.gpu.targets import Target, Targets, unbind
 from viewer.state import DrawReport, Optics
 
-STRIDES = (1, 2, 3, 4)
-"""View steps between the samples of a picture drawn in a hurry: the least for which there is time."""
+KEPT_SIZES = 2
+"""Of the picture: one drawn in a hurry is smaller than the one that follows it."""
 
-LEAST_ACROSS = 2.0
-"""Samples across the aperture, at least."""
+Size = tuple[int, int]
 
 
 class Renderer:
     """Draws one light field at a time. Call it only from the thread its context belongs to.
 
     prefilter: smooth what lies between sparse samples; off, it shows them as separate copies. adaptive: tiles skip the
-    layers they have no content for. report: what is known of the picture drawn last. note: what had to be left out, a
-    sentence for people.
+    layers they have no content for, and searches that find nothing. report: what is known of the picture drawn last.
+    note: what had to be left out, a sentence for people.
     """
 
     def __init__(self, gl: GLContext, prefilter: bool = True, adaptive: bool = True) -> None:
@@ -47,22 +51,24 @@ class Renderer:
         self.report = DrawReport()
         self.note = ""
         self.programs = ProgramCache(self.ctx)
-        self._passes = Passes(self.ctx, self.programs)
-        self._passes.adaptive = adaptive
-        self._targets: Targets | None = None
+        self._drawing = Drawing(self.ctx, self.programs)
+        self.adaptive = adaptive
+        self._targets: dict[Size, Targets] = {}
+        self._shown: Targets | None = None
         self._summation: Summation | None = None
-        self._cost_s = gl.seconds_per_sample
-        self._refining_cost_s = 4 * gl.seconds_per_sample
+        self._pace = Pace(gl.seconds_per_fetch)
+        self._refining_s = 4 * gl.seconds_per_fetch
+        self._haste = 0
         self._errors = ErrorEstimate()
 
     @property
     def adaptive(self) -> bool:
-        """Whether tiles skip the layers they have no content for."""
-        return self._passes.adaptive
+        """Whether tiles skip what they have no content for."""
+        return self._drawing.passes.adaptive
 
     @adaptive.setter
     def adaptive(self, is_on: bool) -> None:
-        self._passes.adaptive = is_on
+        self._drawing.passes.adaptive = is_on
 
     def open_field(self, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool) -> None:
         """Start an empty light field of this size in place of the one before.
@@ -84,36 +90,39 @@ class Renderer:
     def render(
         self,
         optics: Optics,
-        size_px: tuple[int, int],
+        size_px: Size,
         framebuffer: moderngl.Framebuffer | None = None,
-        stride: int = 1,
+        haste: Haste = NO_HASTE,
     ) -> None:
         """Draw the picture at once, stretched to size_px = (width, height), with every view the aperture sees.
 
         framebuffer: drawn into its current viewport, which should have that size; None draws into the renderer's own
-        image (`image_texture`, `read_image`). stride: view steps between the samples. Before the first view the picture
-        is black. The framebuffer stays bound.
+        image (`image_texture`, `read_image`). haste: what to leave out, except for its scale. Before the first view the
+        picture is black. The framebuffer stays bound.
         """
-        self._begin(optics, size_px, stride)
-        self._sum_up(math.inf, rounds=1)
+        self._summation = self._summation_of(optics, size_px, haste)
+        self._draw(math.inf, rounds=1)
         self._finish(framebuffer)
-        self._errors.begin(stride)
+        self._errors.begin(haste)
 
-    def render_in_time(self, optics: Optics, size_px: tuple[int, int], budget_s: float) -> None:
-        """Draw the picture with as many samples as the time is thought to allow; `refine` then makes it better."""
+    def render_in_time(self, optics: Optics, size_px: Size, budget_s: float) -> None:
+        """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
+
+        Its own image may then be smaller than size_px.
+        """
         start = time.perf_counter()
         programs_before = len(self.programs)
-        stride = self._stride_for(optics, size_px, budget_s)
-        self.render(optics, size_px, stride=stride)
+        self._haste = least_haste(partial(self._work, optics, size_px), self._pace, budget_s, self._haste)
+        haste = HASTES[self._haste]
+        self.render(optics, scaled(size_px, haste.scale), haste=haste)
         self.ctx.finish()
         seconds = time.perf_counter() - start
-        summation = self._current()
-        if summation.lens.aperture_share > 0 and len(self.programs) == programs_before:
-            of_samples = max(seconds / math.prod(size_px) - self.gl.seconds_per_picture, 0.0)
-            self._cost_s = max(of_samples / summation.done, self.gl.seconds_per_sample / 4)
-        if stride > 1:
-            self._begin(optics, size_px, 1)
-        self._tell(summation.done, seconds)
+        if len(self.programs) == programs_before:
+            self._pace.learn(self._work(optics, size_px, haste), seconds)
+        drawn = self._current().done
+        if haste != NO_HASTE:
+            self._summation = self._summation_of(optics, size_px, NO_HASTE)
+        self._tell(drawn, seconds)
 
     def refine(self, budget_s: float = math.inf) -> None:
         """Draw more samples of the same picture, for about that long; the image changes after each round."""
@@ -124,16 +133,28 @@ class Renderer:
             self._errors.add(self.read_image(), 0)
         start = time.perf_counter()
         round_before, done_before, programs_before = summation.round, summation.done, len(self.programs)
-        self._sum_up(budget_s, rounds=len(summation.places))
+        self._draw(budget_s, rounds=len(summation.places))
         if summation.round > round_before:
             self._finish(None)
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs_before:
-            self._refining_cost_s = seconds / max(summation.done - done_before, 1) / math.prod(summation.size_px)
+            self._refining_s = seconds / max(summation.done - done_before, 1) / math.prod(summation.size_px)
         if summation.round > round_before and (summation.is_complete or math.log2(summation.round).is_integer()):
             self._errors.add(self.read_image(), summation.round)
         self._tell(summation.done, seconds)
+
+    def converged_picture(self, optics: Optics, size_px: Size, is_linear: bool) -> NDArray[np.uint8 | np.float32]:
+        """The picture with every sample it will get, (height, width, 3), of any size: drawn part by part.
+
+        is_linear: float32 linear light, not cut off at white; else sRGB-encoded uint8.
+        """
+        width, height = size_px
+        image = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
+        for part in parts_of(size_px, self.gl.max_texture_size):
+            drawn = self._converged_part(optics, size_px, part, is_linear)
+            image[part.kept] = drawn[part.kept_of_drawn]
+        return image
 
     @property
     def is_converged(self) -> bool:
@@ -156,24 +177,33 @@ class Renderer:
 
     @property
     def image_texture(self) -> int:
-        """GL name of the renderer's own image (RGBA8, rows bottom-up). A new size may change it."""
-        assert self._targets is not None, "render first"
-        return self._targets.image.textures[0].glo
+        """GL name of the renderer's own image (RGBA8, rows bottom-up). Another picture may change it."""
+        assert self._shown is not None, "render first"
+        return self._shown.image.textures[0].glo
 
     def read_image(self) -> NDArray[np.uint8]:
-        """The renderer's own image as (H, W, 3) uint8, sRGB-encoded, row 0 at the top."""
-        assert self._targets is not None, "render first"
-        width, height = self._targets.size_px
-        pixels = np.frombuffer(self._targets.image.framebuffer.read(components=3, alignment=1), np.uint8)
-        return pixels.reshape(height, width, 3)[::-1].copy()
+        """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller."""
+        assert self._shown is not None, "render first"
+        image: NDArray[np.uint8] = read_pixels(self._shown.image.framebuffer, np.uint8)
+        size_px = self._current().size_px if self._summation else self._shown.size_px
+        return image if self._shown.size_px == size_px else stretched(image, size_px)
+
+    def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
+        """The picture at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
+        assert self._shown is not None, "render first"
+        framebuffer = self._shown.image.framebuffer
+        x, y = (min(max(int(at * size), 0), size - 1) for at, size in zip((u, 1 - v), framebuffer.size))
+        red, green, blue = framebuffer.read((x, y, 1, 1), components=3, alignment=1)
+        return red, green, blue
 
     def release(self) -> None:
         """Free every GL object."""
         self.programs.release()
-        self._passes.release()
-        if self._targets is not None:
-            self._targets.release()
-            self._targets = None
+        self._drawing.release()
+        for targets in self._targets.values():
+            targets.release()
+        self._targets.clear()
+        self._shown = None
         if self.field is not None:
             self.field.release()
             self.field = None
@@ -187,108 +217,74 @@ class Renderer:
             raise ValueError("no light field is open")
         return self.field
 
-    def _targets_of(self, size_px: tuple[int, int]) -> Targets:
-        if self._targets is None or self._targets.size_px != size_px:
-            if self._targets is not None:
-                self._targets.release()
-            self._targets = Targets(self.ctx, size_px, TILE_PX)
-        return self._targets
+    def _targets_of(self, size_px: Size) -> Targets:
+        """Those of this size; beside them only the ones that were asked for last are kept."""
+        targets = self._targets.pop(size_px, None) or Targets(self.ctx, size_px, TILE_PX)
+        while len(self._targets) >= KEPT_SIZES:
+            oldest = self._targets.pop(next(iter(self._targets)))
+            self._shown = None if self._shown is oldest else self._shown
+            oldest.release()
+        self._targets[size_px] = targets
+        return targets
 
-    def _begin(self, optics: Optics, size_px: tuple[int, int], stride: int) -> None:
+    def _summation_of(self, optics: Optics, size_px: Size, haste: Haste) -> Summation:
         field = self._open_field()
-        lens = lens_of(optics, field, size_px[0], self.prefilter, stride)
-        count = rounds_of(lens, field) if stride == 1 and field.present.any() else 1
-        self._summation = Summation(lens, size_px, tuple(even_places(count)))
+        lens = lens_of(optics, field, size_px[0], self.prefilter, haste)
+        count = rounds_of(lens, field) if haste == NO_HASTE and field.present.any() else 1
+        return Summation(lens, size_px, tuple(even_places(count)))
 
-    def _sum_up(self, budget_s: float, rounds: int) -> None:
-        """Draw samples until the time is spent or so many rounds are complete."""
+    def _draw(self, budget_s: float, rounds: int) -> None:
         summation = self._current()
-        self.ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
+        sample_s = self._refining_s * math.prod(summation.size_px)
         targets = self._targets_of(summation.size_px)
-        if not self._open_field().present.any():
-            for target in (targets.light, targets.blurred):
-                target.framebuffer.clear()
-            summation.round = len(summation.places)
-            return
-        end = time.perf_counter() + budget_s
-        while summation.round < rounds:
-            sample_s = self._refining_cost_s * math.prod(summation.size_px)
-            self._draw_some(summation, targets, _batch_size(budget_s, sample_s))
-            if time.perf_counter() >= end:
-                break
-        self.ctx.disable(moderngl.BLEND)
-
-    def _draw_some(self, summation: Summation, targets: Targets, count: int) -> None:
-        """Draw the next samples; the pinhole's share comes with the first of a round."""
-        field, lens = self._open_field(), summation.lens
-        if summation.at == 0:
-            self._start_round(summation, targets)
-        batch = _alike(summation.samples[summation.at :][:count], field)
-        layers = {"SHARP": targets.light, "BLURRED": targets.blurred} if lens.keeps_layers else {"": targets.light}
-        for layer, target in layers.items():
-            if summation.at == 0 and lens.aperture_share < 1:
-                self._passes.draw_pinhole(field, lens, summation.within_px, target, layer)
-            if batch:
-                self._passes.draw_aperture(field, lens, batch, summation.few, target, targets, layer)
-        summation.at += len(batch)
-        summation.done += max(len(batch), 1)
-        if summation.at >= len(summation.samples):
-            summation.round, summation.at = summation.round + 1, 0
-
-    def _start_round(self, summation: Summation, targets: Targets) -> None:
-        field, lens, place = self._open_field(), summation.lens, summation.places[summation.round]
-        moved = ViewOffset(lens.stride * place.t, lens.stride * place.s)
-        summation.samples, summation.few = [], {}
-        if lens.aperture_share > 0:
-            summation.few = self._few_samples(lens, moved)
-            summation.samples = sorted(
-                lens.samples(field.grid, field.present, moved),
-                key=lambda sample: (sample.wanted not in summation.few, not _is_direct(sample, field)),
-            )
-        if summation.round > 0:
-            return
-        targets.light.start_sum()
-        targets.blurred.start_sum()
-        if lens.has_dolly:
-            self._passes.update_stand_ins(field)
-        if lens.keeps_layers:
-            self._passes.find_defocus(field, lens, summation.samples or [_eye_sample(lens, field)], targets)
-
-    def _few_samples(self, lens: Lens, moved: ViewOffset) -> dict[ViewOffset, float]:
-        """Weights of every other sample across and down."""
-        field = self._open_field()
-        every = {sample.wanted for sample in lens.samples(field.grid, field.present, moved)}
-        coarse = lens.samples(field.grid, field.present, moved, coarser=2)
-        few = {sample.wanted: sample.weight for sample in coarse if sample.wanted in every}
-        return {wanted: weight / sum(few.values()) for wanted, weight in few.items()}
+        self._drawing.sum_up(self._open_field(), summation, targets, rounds, budget_s, sample_s)
 
     def _finish(self, framebuffer: moderngl.Framebuffer | None) -> None:
-        """Smooth what is summed up and show it."""
-        summation, targets = self._current(), self._targets
-        assert targets is not None
-        self.ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
-        if summation.lens.keeps_layers:
-            self._passes.smooth(summation.lens, targets, 1 / math.sqrt(max(summation.round, 1)))
-        (framebuffer or targets.image).use()
-        self._passes.present(summation.lens, targets)
+        targets = self._targets_of(self._current().size_px)
+        self._drawing.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
+        self._shown = targets
 
-    def _stride_for(self, optics: Optics, size_px: tuple[int, int], budget_s: float) -> int:
-        """The least that is thought to be drawn in time."""
+    def _converged_part(
+        self, optics: Optics, size_px: Size, part: PicturePart, is_linear: bool
+    ) -> NDArray[np.uint8 | np.float32]:
+        whole = self._summation_of(optics, size_px, NO_HASTE)
+        summation = replace(whole, lens=replace(whole.lens, part=Window(*part.window)), size_px=part.size_px)
+        targets = self._targets_of(part.size_px)
+        self._drawing.sum_up(self._open_field(), summation, targets, len(summation.places))
+        target = Target(self.ctx, [self.ctx.texture(part.size_px, 4, dtype="f4" if is_linear else "f1")])
+        self._drawing.finish(summation, targets, target.framebuffer, is_linear)
+        pixels = read_pixels(target.framebuffer, np.float32 if is_linear else np.uint8)
+        unbind(self.ctx)
+        target.release()
+        return pixels
+
+    def _work(self, optics: Optics, size_px: Size, haste: Haste) -> Work:
         field = self._open_field()
-        if lens_of(optics, field, size_px[0], self.prefilter).aperture_share == 0 or not field.present.any():
-            return 1
-        per_sample = self._cost_s * math.prod(size_px)
-        for stride in STRIDES:
-            if stride > max(optics.aperture_diameter / LEAST_ACROSS, 1.0):
-                return stride - 1
-            lens = lens_of(optics, field, size_px[0], self.prefilter, stride)
-            if len(lens.samples(field.grid, field.present)) * per_sample <= budget_s:
-                return stride
-        return STRIDES[-1]
+        lens = lens_of(optics, field, round(size_px[0] * haste.scale), self.prefilter, haste)
+        samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []
+        return Work(
+            samples=len(samples),
+            sources=min(lens.most_sources, int(field.present.sum())) if lens.aperture_share < 1 else 0,
+            has_detours=lens.has_dolly or lens.focus_range > 0 or not field.present.all(),
+            keeps_layers=lens.keeps_layers,
+            pixels=math.prod(scaled(size_px, haste.scale)),
+        )
 
     def _tell(self, samples: int, seconds: float) -> None:
         in_all = max(self.samples_converged, samples)
         self.report = DrawReport(samples, in_all, 1e3 * seconds, self._errors.estimate)
+
+
+def scaled(size_px: Size, scale: float) -> Size:
+    """That size times scale, at least one pixel."""
+    return max(round(size_px[0] * scale), 1), max(round(size_px[1] * scale), 1)
+
+
+def read_pixels(framebuffer: moderngl.Framebuffer, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
+    """What was drawn, (H, W, 3), row 0 at the top."""
+    width, height = framebuffer.size
+    raw = framebuffer.read(components=3, alignment=1, dtype="f1" if dtype is np.uint8 else "f4")
+    return np.frombuffer(raw, dtype).reshape(height, width, 3)[::-1].copy()
 
 
 def _field_that_fits(
@@ -308,27 +304,3 @@ def _field_that_fits(
 
 def _ordinal(number: int) -> str:
     return f"{number}{ {2: 'nd', 3: 'rd'}.get(number, 'th') }"
-
-
-def _is_direct(sample: ApertureSample, field: LightFieldTexture) -> bool:
-    return field.grid.offset(sample.row, sample.column) == sample.wanted
-
-
-def _alike(samples: list[ApertureSample], field: LightFieldTexture) -> list[ApertureSample]:
-    """The first of them that one program can draw."""
-    for i, sample in enumerate(samples):
-        if _is_direct(sample, field) != _is_direct(samples[0], field):
-            return samples[:i]
-    return samples
-
-
-def _batch_size(budget_s: float, sample_s: float) -> int:
-    return int(min(max(budget_s / sample_s, 1), MAX_SAMPLES))
-
-
-def _eye_sample(lens: Lens, field: LightFieldTexture) -> ApertureSample:
-    """The eye, answered by the present view nearest to it."""
-    inside = clamped_to_grid(lens.eye, field.grid)
-    row, column = round(inside.t) + field.grid.centre[0], round(inside.s) + field.grid.centre[1]
-    stored = nearest_present(field.present)[row, column]
-    return ApertureSample(lens.eye, int(stored[0]), int(stored[1]), 1.0)

@@ -65,7 +65,7 @@ def rounds_of(lens: Lens, field: LightFieldTexture) -> int:
 
 
 def _is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
-    row, column = eye.t + field.grid.centre[0], eye.s + field.grid.centre[1]
+    row, column = float(eye.t + field.grid.centre[0]), float(eye.s + field.grid.centre[1])
     is_on_grid = 0 <= row < field.grid.rows and 0 <= column < field.grid.columns
     return is_on_grid and row.is_integer() and column.is_integer() and bool(field.present[int(row), int(column)])
 

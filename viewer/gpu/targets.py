@@ -21,14 +21,19 @@ class Target:
         """Draw here from now on."""
         self.framebuffer.use()
 
+    @property
+    def holds_sum(self) -> bool:
+        """Whether the next `add` keeps what is here."""
+        return self._holds_sum
+
     def start_sum(self) -> None:
         """The next `add` replaces what is here: blending and clearing cost time."""
         self._holds_sum = False
 
-    def add(self) -> None:
-        """Add what is drawn from now on to what is here."""
+    def add(self, keeps: bool | None = None) -> None:
+        """Add what is drawn from now on to what is here. keeps: False replaces it, None as `holds_sum` says."""
         self.framebuffer.use()
-        if self._holds_sum:
+        if self._holds_sum if keeps is None else keeps:
             self._ctx.enable(moderngl.BLEND)
             self._ctx.blend_func = moderngl.ONE, moderngl.ONE
         else:
@@ -47,7 +52,7 @@ class Targets:
 
     light: all of it, or what is sharp. blurred: in front, behind, and all weights, at half size, see
     shaders/include/layers.glsl. half_across, half_smooth: front and behind, smoothed. tiles, wide_tiles: blur widths.
-    image: the finished picture, RGBA8, rows bottom-up.
+    spans: where searches begin and end. image: the finished picture, RGBA8, rows bottom-up.
     """
 
     def __init__(self, ctx: moderngl.Context, size_px: tuple[int, int], tile_px: int) -> None:
@@ -62,13 +67,20 @@ class Targets:
         self.half_smooth = Target(ctx, [_light(ctx, half) for _ in range(2)])
         self.tiles = Target(ctx, [_light(ctx, tiles)])
         self.wide_tiles = Target(ctx, [_light(ctx, tiles)])
+        self.spans = Target(ctx, [_light(ctx, tiles) for _ in range(2)])
 
     def release(self) -> None:
         """Free framebuffers and textures."""
-        self._ctx.detect_framebuffer(0).use()  # moderngl binds what was last used again, and that must still exist
+        unbind(self._ctx)
         for target in (self.image, self.light, self.blurred, self.half_across, self.half_smooth, self.tiles):
             target.release()
-        self.wide_tiles.release()
+        for target in (self.wide_tiles, self.spans):
+            target.release()
+
+
+def unbind(ctx: moderngl.Context) -> None:
+    """Needed before a framebuffer is released: moderngl binds what was last used again, and that must still exist."""
+    ctx.detect_framebuffer(0).use()
 
 
 def _light(ctx: moderngl.Context, size_px: tuple[int, int], components: int = 4) -> moderngl.Texture:

@@ -6,6 +6,7 @@ Weights change smoothly with the eye and the aperture, so that nothing jumps whi
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -147,10 +148,16 @@ def nearest_present(present: NDArray[np.bool_]) -> NDArray[np.intp]:
 
     Neighbours take turns among equally near ones, lest all their errors lie on one side.
     """
-    indices = np.argwhere(present)
-    every = np.indices(present.shape).reshape(2, -1).T
+    return _nearest_present_of(present.tobytes(), (present.shape[0], present.shape[1]))
+
+
+@lru_cache(maxsize=4)
+def _nearest_present_of(present: bytes, shape: tuple[int, int]) -> NDArray[np.intp]:
+    there = np.frombuffer(present, bool).reshape(shape)
+    indices = np.argwhere(there)
+    every = np.indices(shape).reshape(2, -1).T
     distances = ((every[:, None] - indices[None]) ** 2).sum(-1)
     is_nearest = distances == distances.min(1, keepdims=True)
     turn = (every @ (1, 2)) % is_nearest.sum(1)
     chosen = (is_nearest & (np.cumsum(is_nearest, 1) == turn[:, None] + 1)).argmax(1)
-    return indices[chosen].reshape(*present.shape, 2)
+    return indices[chosen].reshape(*shape, 2)

@@ -30,7 +30,8 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     if width <= 0:
         return []
     palette = palette_of(state.preferences.theme)
-    imgui.set_next_window_pos(imgui.ImVec2(margin, layout.window.height - margin), 0, imgui.ImVec2(0, 1))
+    bottom = layout.window.height - margin if layout.status is None else layout.status.y
+    imgui.set_next_window_pos(imgui.ImVec2(margin, bottom), 0, imgui.ImVec2(0, 1))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
     imgui.begin("notices", None, _FLAGS)
     actions = [action for i, notice in enumerate(state.notices) for action in _notice(i, notice, palette)]

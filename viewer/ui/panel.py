@@ -7,12 +7,14 @@ from collections.abc import Callable
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from iibr_core.types import DEFAULT_QUALITY
 from viewer.actions import Action, ApplyPreset, OpenPath, ResumeWork, StopWork, ToggleSection
 from viewer.commands import BY_NAME
 from viewer.layout import Layout
 from viewer.limits import aperture_limit
 from viewer.presets import PRESETS
 from viewer.state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source
+from viewer.ui.inspect_section import inspect_section
 from viewer.ui.lens_sections import aperture_section, focus_section, light_section
 from viewer.ui.scene_section import scene_section
 from viewer.ui.style import Palette, palette_of
@@ -33,6 +35,7 @@ SECTION_WORDS: dict[Section, str] = {
     "focus": "Focus",
     "aperture": "Aperture",
     "light": "Light",
+    "inspect": "Inspect",
     "scene": "Scene",
 }
 _FIXED = (
@@ -106,7 +109,7 @@ def size_words(scene: Scene) -> str:
     """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, exact"."""
     words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
     is_made_here = scene.plan is not None
-    return words if scene.source.quality == "fast" or not is_made_here else f"{words}, {scene.source.quality}"
+    return words if scene.source.quality == DEFAULT_QUALITY or not is_made_here else f"{words}, {scene.source.quality}"
 
 
 def _tools(state: AppState, layout: Layout) -> list[Action]:
@@ -212,6 +215,7 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout, pa
         "focus": lambda: focus_section(state, scene, layout),
         "aperture": lambda: aperture_section(state, scene, layout, palette),
         "light": lambda: light_section(state, layout),
+        "inspect": lambda: inspect_section(state, scene, layout),
         "scene": lambda: [*scene_section(state, scene, layout), *_recent_elsewhere(state, layout)],
     }
     is_open = section in state.preferences.open_sections

@@ -9,7 +9,18 @@ from imgui_bundle import imgui
 from viewer.actions import Action, DoTask, OpenPath, ShowPrompt
 from viewer.commands import COMMANDS, commands_matching
 from viewer.layout import Layout
-from viewer.state import AppState, PalettePrompt, PathPrompt, Prompt, ReadMaskTask, SavePrompt, SaveTask, Source
+from viewer.state import (
+    AppState,
+    PalettePrompt,
+    PathPrompt,
+    Prompt,
+    ReadMaskTask,
+    ReadTruthTask,
+    SavePrompt,
+    SaveTask,
+    Source,
+    Task,
+)
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
 
@@ -30,6 +41,7 @@ PATH_WORDS = {
     "photo": "Open a photo",
     "folder": "Open a folder of views",
     "mask": "Image for the aperture; white lets light through",
+    "truth": "Ground truth: a folder of views",
 }
 _FLAGS = (
     imgui.WindowFlags_.no_title_bar
@@ -106,8 +118,8 @@ def _path(prompt: PathPrompt, layout: Layout) -> list[Action]:
     pressed, closed = _buttons("Open", layout)
     if (pressed or entered) and path.strip():
         path = path.strip()
-        asked: Action = DoTask(ReadMaskTask(path)) if prompt.what == "mask" else OpenPath(Source(path))
-        return [ShowPrompt(None), asked]
+        tasks: dict[str, Task] = {"mask": ReadMaskTask(path), "truth": ReadTruthTask(path)}
+        return [ShowPrompt(None), DoTask(tasks[prompt.what]) if prompt.what in tasks else OpenPath(Source(path))]
     return _closed_or_edited(closed, replace(prompt, path=path), prompt)
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.actions import Action
+from viewer.inquiry import NO_AIDS, Aids
 from viewer.layout import Layout
 from viewer.state import AppState
+from viewer.ui.inspection import draw_beside_picture, draw_over_picture
 from viewer.ui.notices import notices
 from viewer.ui.overlays import overlays
 from viewer.ui.panel import panel
@@ -14,14 +16,19 @@ from viewer.ui.prompts import prompts
 from viewer.ui.style import packed, palette_of
 
 
-def build_screen(state: AppState, layout: Layout, picture_texture: int | None) -> list[Action]:
-    """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up."""
+def build_screen(state: AppState, layout: Layout, picture_texture: int | None, aids: Aids = NO_AIDS) -> list[Action]:
+    """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up. aids: what
+    inspection shows.
+    """
     window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
     imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, packed(palette.background))
     if picture_texture is not None and layout.picture is not None:
         _picture(layout, picture_texture)
-        overlays(state, layout)
+        draw_over_picture(state, layout, aids)
+        draw_beside_picture(state, layout, aids)
+        if not state.inspection.shows_grid:
+            overlays(state, layout)
     return panel(state, layout) + notices(state, layout) + prompts(state, layout)
 
 

@@ -107,8 +107,10 @@ def gap(layout: Layout, units: float = 4.0) -> None:
 def tooltip(text: str, layout: Layout) -> None:
     """Words that come up while the pointer rests on the last item, beside the panel: they must not hide its widgets."""
     if text and imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
-        corner = imgui.ImVec2(layout.panel.x - 4 * layout.ui_scale, imgui.get_item_rect_min().y)
-        imgui.set_next_window_pos(corner, 0, imgui.ImVec2(1, 0))
+        is_low = imgui.get_item_rect_max().y > 0.75 * layout.window.height
+        y = imgui.get_item_rect_max().y if is_low else imgui.get_item_rect_min().y
+        corner = imgui.ImVec2(layout.panel.x - 4 * layout.ui_scale, min(y, layout.window.height))
+        imgui.set_next_window_pos(corner, 0, imgui.ImVec2(1, 1 if is_low else 0))
         imgui.begin_tooltip()
         imgui.push_text_wrap_pos(260 * layout.ui_scale)
         imgui.text(text)

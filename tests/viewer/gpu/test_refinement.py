@@ -16,6 +16,7 @@ from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.context import GLContext
 from viewer.gpu.error_estimate import ErrorEstimate
+from viewer.gpu.haste import Haste
 from viewer.gpu.programs import ProgramCache, ShaderError
 from viewer.gpu.renderer import Renderer
 from viewer.gpu.summation import EDGE_ROUNDS, even_places
@@ -41,7 +42,7 @@ def test_refining_comes_nearer_to_a_dense_aperture(renderer: Renderer) -> None:
     truth = through_aperture(SCENE, offsets, weights, CENTRE, 0.0)
     errors = []
     for stride in (3, 2, 1):
-        renderer.render(WIDE, SIZE, stride=stride)
+        renderer.render(WIDE, SIZE, haste=Haste(stride))
         errors.append(rms(renderer.read_image(), truth, border=20))
     renderer.refine()
     errors.append(rms(renderer.read_image(), truth, border=20))

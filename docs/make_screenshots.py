@@ -1,0 +1,92 @@
+"""Makes the README's pictures from the demo photo, without a display: python docs/make_screenshots.py [FOLDER]
+
+screenshot.png: the window, refocused. inspection.png: disparity, EPIs and values.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from iibr_core.resources import resource_folder
+from iibr_core.types import ViewOffset
+from viewer.actions import (
+    DismissNotice,
+    MoveEye,
+    SetAperture,
+    SetApertureShape,
+    SetFocus,
+    SetHover,
+)
+from viewer.headless import HeadlessViewer
+from viewer.inspection import SetOverlay, ShowEpis, ShowValues
+from viewer.state import ApertureShape, Hover, Section, Source
+
+SIZE = 1200, 760
+MOST_BYTES = 700_000
+TANK = 0.57, 0.42
+"""Where the motorcycle's tank is, as shares of the picture."""
+
+
+def main() -> None:
+    """Write the pictures beside this script, or into the folder named."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
+    with HeadlessViewer() as viewer:
+        viewer.open(Source(str(resource_folder("assets") / "motorcycle" / "motorcycle.png")), 1.0, lambda _: None)
+        viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
+        write(folder / "screenshot.png", whole_window(viewer))
+        write(folder / "inspection.png", inspection(viewer))
+
+
+def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
+    """From the left, focused on the tank, wide open with seven blades."""
+    open_sections(viewer, "view", "focus", "aperture")
+    viewer.do(MoveEye(ViewOffset(0.5, -1.5)))
+    pointed = hover_at(viewer, *TANK)
+    assert pointed.disparity is not None
+    viewer.do(SetFocus(pointed.disparity), SetAperture(6.0), SetApertureShape(ApertureShape("polygon", blades=7)))
+    viewer.do(SetHover(pointed))
+    return viewer.screen(SIZE)
+
+
+def inspection(viewer: HeadlessViewer) -> NDArray[np.uint8]:
+    """Disparity over the picture, EPIs through the pointer, values under it."""
+    open_sections(viewer, "view", "inspect")
+    viewer.do(SetAperture(0.0), ShowEpis(True), ShowValues(True), SetOverlay("disparity"))
+    viewer.do(SetHover(hover_at(viewer, *TANK)))
+    return viewer.screen(SIZE)
+
+
+def open_sections(viewer: HeadlessViewer, *sections: Section) -> None:
+    """Open these sections of the panel and no others."""
+    viewer.state = replace(viewer.state, preferences=replace(viewer.state.preferences, open_sections=sections))
+
+
+def hover_at(viewer: HeadlessViewer, x_share: float, y_share: float) -> Hover:
+    """The pointer at a place of the picture."""
+    scene = viewer.state.scene
+    assert scene is not None
+    x, y = x_share * scene.width, y_share * scene.height
+    return Hover(x, y, viewer.pick(x, y))
+
+
+def write(path: Path, pixels: NDArray[np.uint8]) -> None:
+    """Write a PNG that is small enough for a repository: compressed harder than the program does."""
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8")
+    spec.attribute("png:compressionLevel", 9)
+    buffer = oiio.ImageBuf(spec)
+    buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels))
+    if not buffer.write(str(path)):
+        raise SystemExit(f"{path}: {buffer.geterror()}")
+    if path.stat().st_size > MOST_BYTES:
+        raise SystemExit(f"{path}: {path.stat().st_size} bytes, more than {MOST_BYTES}")
+    print(f"{path}: {path.stat().st_size // 1000} kB")
+
+
+if __name__ == "__main__":
+    main()

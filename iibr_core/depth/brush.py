@@ -1,0 +1,280 @@
+"""Strokes of a brush on a disparity map. They end at the photo's contours: how far a pixel is from the stroke is
+measured along the way, and crossing a contour counts like going as far as the brush reaches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil, exp, floor, hypot, sqrt
+
+import numpy as np
+
+from iibr_core.depth.edit import UNEDITED, BrushTool, DepthEdits, Stroke, extent_of, require_sound, toned
+from iibr_core.kernels import kernel
+from iibr_core.types import FloatImage
+
+CONTOUR_CONTRAST = 0.12
+"""A difference in colour (sRGB-encoded, root of the summed squares) that ends a stroke."""
+NOISE_MEDIANS = 2.5
+"""Differences between neighbours below so many medians of them are texture, no contour."""
+MOST_NOISE = 0.03
+MOST_SWEEPS = 16
+"""Over a window, there and back, to measure ways: three do unless the ways wind like a maze's."""
+SMOOTHING_ROUNDS = 3
+PARTING_RADII = 3.0
+"""A contour parts what is smoothed like going so many radii."""
+
+Window = tuple[slice, slice]
+_SIGNS: dict[BrushTool, float] = {"nearer": 1.0, "farther": -1.0, "smooth": 1.0}
+_MOST = np.finfo(np.float32).max
+
+
+def edited(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
+    """The map with all its edits: (H, W) float32, finite; the map itself where nothing is edited.
+
+    photo: (H, W, 3), sRGB-encoded, guides the strokes. disparity: (H, W), any unit in which larger is closer.
+    Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known.
+    """
+    return DepthCanvas(photo, disparity).shown(edits)
+
+
+class DepthCanvas:
+    """A map that follows its edits: where they only go on, only what is new is worked out.
+
+    `shown` gives the same as `edited`, to the bit, whatever was shown before.
+    """
+
+    def __init__(self, photo: FloatImage, disparity: FloatImage) -> None:
+        """photo: (H, W, 3), sRGB-encoded; disparity: (H, W). Raises ValueError where the sizes differ."""
+        if photo.shape != (*disparity.shape, 3):
+            raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
+        self._photo, self._given = photo, np.asarray(disparity, np.float32)
+        self._is_known = bool(np.isfinite(self._given).all())
+        self._extent: tuple[float, float] | None = None
+        self._noise: float | None = None
+        self._edits = UNEDITED.tone
+        self._toned: FloatImage | None = None
+        self._values: FloatImage = self._given
+        self._open: _OpenStroke | None = None
+
+    def shown(self, edits: DepthEdits) -> FloatImage:
+        """The map with these edits, (H, W) float32; not to be written to. Raises InputError as `edited` does."""
+        if edits == UNEDITED and self._is_known:
+            return self._given
+        require_sound(edits)
+        self._extent = self._extent or extent_of(self._given)
+        if self._toned is None or self._edits.tone != edits.tone:
+            self._toned = toned(self._given, edits, self._extent)
+            self._forget(edits)
+        self._return_to(edits)
+        for stroke in edits.strokes[len(self._edits.strokes) :]:
+            self._begin(stroke)
+        return self._values
+
+    def before_strokes(self, edits: DepthEdits) -> FloatImage:
+        """The map without the strokes of these edits: what stays as it is where the brush does not go."""
+        self.shown(edits)
+        return self._given if self._toned is None else self._toned
+
+    def _forget(self, edits: DepthEdits) -> None:
+        assert self._toned is not None
+        self._edits, self._values, self._open = edits.tone, self._toned, None
+
+    def _return_to(self, edits: DepthEdits) -> None:
+        """Keep of what was painted what these strokes begin with, and go on with the last one if it became longer."""
+        done, wanted = self._edits.strokes, edits.strokes
+        if wanted[: len(done)] == done:
+            return
+        if self._open is None or wanted[: len(done) - 1] != done[:-1]:
+            self._forget(edits)
+        elif len(wanted) >= len(done) and _goes_on(done[-1], wanted[len(done) - 1]):
+            self._go_on(wanted[len(done) - 1], first=len(done[-1].points))
+        else:
+            self._values, self._open = self._open.under, None
+            self._edits = replace(self._edits, strokes=done[:-1])
+
+    def _begin(self, stroke: Stroke) -> None:
+        target, under = None, self._values
+        if stroke.tool == "smooth":
+            target = smoothed(self._photo, under, radius_px(stroke, under), self._texture())
+        self._open = _OpenStroke(under, np.ones(under.shape, np.float32), target)
+        self._edits = replace(self._edits, strokes=(*self._edits.strokes, stroke))
+        self._paint(stroke, first=0)
+
+    def _go_on(self, stroke: Stroke, first: int) -> None:
+        self._edits = replace(self._edits, strokes=(*self._edits.strokes[:-1], stroke))
+        self._paint(stroke, first)
+
+    def _texture(self) -> float:
+        self._noise = texture_contrast(self._photo) if self._noise is None else self._noise
+        return self._noise
+
+    def _paint(self, stroke: Stroke, first: int) -> None:
+        """Lay the stroke on the map, from its point of this index on. Maps handed out before stay as they are."""
+        assert self._open is not None
+        assert self._extent is not None
+        under, distance, target = self._open.under, self._open.distance, self._open.target
+        amount = np.float32(min(stroke.strength * (self._extent[1] - self._extent[0]), _MOST) * _SIGNS[stroke.tool])
+        values = self._values.copy()
+        for i in range(first, len(stroke.points)):
+            window = _measure_from(self._photo, stroke, i, self._texture(), distance)
+            weight, before = falloff(distance[window]), under[window]
+            if target is not None:
+                change = np.float32(stroke.strength) * weight * (target[window] - before)
+            else:
+                change = amount * weight
+            values[window] = np.clip(before + change, -_MOST, _MOST)
+        self._values = values
+
+
+@dataclass(frozen=True, eq=False)
+class _OpenStroke:
+    """The last stroke, which may go on. under: the map without it. distance: of every pixel from it, 1 = out of reach.
+
+    target: the smoothed map, for "smooth".
+    """
+
+    under: FloatImage
+    distance: FloatImage
+    target: FloatImage | None
+
+
+def falloff(distance: FloatImage) -> FloatImage:
+    """How much a brush does at a distance (1 = its radius): 1 in its middle, smoothly to 0."""
+    return np.square(1 - np.square(np.minimum(distance, np.float32(1))))
+
+
+def radius_px(stroke: Stroke, disparity: FloatImage) -> float:
+    """The brush's radius in pixels of a map, at least one."""
+    return max(stroke.radius * disparity.shape[1], 1.0)
+
+
+def texture_contrast(photo: FloatImage) -> float:
+    """Difference in colour between neighbours of a photo (H, W, 3) below which it is texture or noise."""
+    step = max(1, photo.shape[0] * photo.shape[1] // 500_000)
+    differences = [
+        np.sqrt(np.square(np.diff(rows, axis=1)).sum(axis=2)).reshape(-1)
+        for rows in (photo[::step], photo[:, ::step].swapaxes(0, 1))
+    ]
+    both = np.concatenate(differences)
+    return min(NOISE_MEDIANS * float(np.median(both)), MOST_NOISE) if both.size else 0.0
+
+
+def stroke_distance(photo: FloatImage, stroke: Stroke) -> FloatImage:
+    """How far every pixel of a photo (H, W, 3) is from a stroke, in its radii: (H, W), 1 = out of reach."""
+    distance = np.ones(photo.shape[:2], np.float32)
+    noise = texture_contrast(photo)
+    for i in range(len(stroke.points)):
+        _measure_from(photo, stroke, i, noise, distance)
+    return distance
+
+
+def smoothed(photo: FloatImage, disparity: FloatImage, radius: float, noise: float) -> FloatImage:
+    """The map (H, W), smoothed over about `radius` px, not across the photo's contours.
+
+    The recursive filter of Gastal and Oliveira, "Domain transform for edge-aware image and video processing" (2011).
+    noise: see `texture_contrast`.
+    """
+    values = np.ascontiguousarray(disparity, np.float32).copy()
+    parting = PARTING_RADII * radius / CONTOUR_CONTRAST
+    for k in range(SMOOTHING_ROUNDS):
+        sigma = radius * sqrt(3) * 2 ** (SMOOTHING_ROUNDS - k - 1) / sqrt(4**SMOOTHING_ROUNDS - 1)
+        _smooth_rows(photo, values, sqrt(2) / sigma, parting, noise)
+        _smooth_rows(photo.swapaxes(0, 1), values.T, sqrt(2) / sigma, parting, noise)
+    return values
+
+
+def _goes_on(old: Stroke, new: Stroke) -> bool:
+    """Whether a stroke is another one, continued."""
+    return replace(new, points=old.points) == old and new.points[: len(old.points)] == old.points
+
+
+def _measure_from(photo: FloatImage, stroke: Stroke, index: int, noise: float, distance: FloatImage) -> Window:
+    """Shorten the distances (H, W) to what they are from the way to the stroke's point of this index.
+
+    Returns the window in which they may have changed.
+    """
+    height, width = distance.shape
+    ends = [(x * width - 0.5, y * height - 0.5) for x, y in stroke.points[max(index - 1, 0) : index + 1]]
+    radius = radius_px(stroke, distance)
+    xs, ys = zip(*ends)
+    reach = ceil(radius) + 1
+    window = _span(min(ys) - reach, max(ys) + reach, height), _span(min(xs) - reach, max(xs) + reach, width)
+    (x0, y0), (x1, y1) = ends[0], ends[-1]
+    x0, y0, x1, y1 = (float(np.clip(at, -1e6, 1e6)) for at in (x0, y0, x1, y1))
+    _seed(distance, x0, y0, x1, y1, radius)
+    if distance[window].size:
+        _measure(photo[window], distance[window], radius, noise, MOST_SWEEPS)
+    return window
+
+
+def _span(low: float, high: float, size: int) -> slice:
+    first, last = (int(min(max(at, 0), size)) for at in (floor(low), ceil(high) + 1))
+    return slice(first, last)
+
+
+@kernel
+def _seed(distance, x0, y0, x1, y1, radius):  # type: ignore[no-untyped-def]
+    """Distances of the pixels about every place on the way from (x0, y0) to (x1, y1)."""
+    height, width = distance.shape
+    steps = max(int(ceil(2 * hypot(x1 - x0, y1 - y0))), 1)
+    for k in range(steps + 1):
+        x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
+        column, row = int(floor(x + 0.5)), int(floor(y + 0.5))
+        if 0 <= row < height and 0 <= column < width:
+            distance[row, column] = min(distance[row, column], np.float32(hypot(column - x, row - y) / radius))
+
+
+@kernel
+def _contour(photo, y, x, other_y, other_x, noise):  # type: ignore[no-untyped-def]
+    """Difference in colour between two pixels beyond texture."""
+    total = 0.0
+    for c in range(3):
+        total += (photo[y, x, c] - photo[other_y, other_x, c]) ** 2
+    return max(sqrt(total) - noise, 0.0)
+
+
+@kernel
+def _measure(photo, distance, radius, noise, most_sweeps):  # type: ignore[no-untyped-def]
+    """Shortest ways from pixel to pixel (8 neighbours), by sweeps there and back until nothing changes."""
+    height, width = distance.shape
+    sweep = 0
+    changed = True
+    while changed and sweep < most_sweeps:
+        changed = False
+        for way in range(2):
+            for j in range(height):
+                y = j if way == 0 else height - 1 - j
+                back = -1 if way == 0 else 1
+                for i in range(width):
+                    x = i if way == 0 else width - 1 - i
+                    best = distance[y, x]
+                    for k in range(4):
+                        # The four neighbours that the sweep has passed.
+                        other_y = y if k == 0 else y + back
+                        other_x = x + back if k < 2 else (x if k == 2 else x - back)
+                        if not (0 <= other_y < height and 0 <= other_x < width):
+                            continue
+                        length = sqrt(2.0) if k == 1 or k == 3 else 1.0
+                        before = distance[other_y, other_x] + length / radius
+                        if before < best:
+                            before += _contour(photo, y, x, other_y, other_x, noise * length) / CONTOUR_CONTRAST
+                            best = min(best, np.float32(before))
+                    if best < distance[y, x]:
+                        distance[y, x] = best
+                        changed = True
+        sweep += 1
+
+
+@kernel
+def _smooth_rows(photo, values, rate, parting, noise):  # type: ignore[no-untyped-def]
+    """Every row of values, smoothed there and back. rate: by how much a pixel's step lets go of what was before."""
+    height, width = values.shape
+    kept = np.empty(width)
+    for y in range(height):
+        for x in range(1, width):
+            kept[x] = exp(-rate * (1.0 + parting * _contour(photo, y, x, y, x - 1, noise)))
+        for x in range(1, width):
+            values[y, x] += kept[x] * (values[y, x - 1] - values[y, x])
+        for x in range(width - 2, -1, -1):
+            values[y, x] += kept[x + 1] * (values[y, x + 1] - values[y, x])

@@ -1,0 +1,84 @@
+"""Finds the scenes below a folder, whatever layout they come in, and reads what a trial needs of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from iibr_core.depth.sidecar import read_disparity
+from iibr_core.formats.grid_folder import read_grid_folder
+from iibr_core.formats.llff import read_llff
+from iibr_core.formats.middlebury import read_middlebury
+from iibr_core.formats.multi_view import KnownDisparity, KnownView, MultiView, with_equal_sizes
+from iibr_core.formats.photo import read_photo
+from iibr_core.formats.raster import read_size
+from iibr_core.formats.stanford import read_stanford
+from iibr_core.types import Disparity, FloatImage, InputError
+
+Reader = Callable[[Path], MultiView | None]
+"""Gives the scene of a folder, None where the folder is laid out otherwise; InputError where it is damaged."""
+READERS: tuple[Reader, ...] = (read_llff, read_stanford, read_middlebury, read_grid_folder)
+LAYOUTS = "HCI, Stanford archive, Heber, LLFF, Middlebury, or views/v00_u00.png ..."
+
+
+def read_scene(folder: Path) -> MultiView | None:
+    """The scene of a folder, None where it is none that is known. Raises InputError where it is damaged."""
+    for read in READERS:
+        scene = read(folder)
+        if scene is not None:
+            return with_equal_sizes(scene)
+    return None
+
+
+def find_scenes(folder: Path) -> Iterator[MultiView]:
+    """The scene of a folder, or those of its subfolders. Raises InputError where there is none, or one is damaged."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is no folder; give the folder of a data set ({LAYOUTS})")
+    scene = read_scene(folder)
+    if scene is not None:
+        yield scene
+        return
+    below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+    found = [scene for path in below if (scene := read_scene(path)) is not None]
+    if not found:
+        raise InputError(f"{folder}: holds no scene with several views; laid out as {LAYOUTS}")
+    yield from found
+
+
+def read_known_disparity(known: KnownDisparity, size: tuple[int, int]) -> Disparity:
+    """The map for a picture of (height, width), px per view step, what is unknown filled. Raises InputError."""
+    return read_disparity(known.path, size, known.scale)
+
+
+def read_view(view: KnownView, max_pixels: int) -> tuple[FloatImage, NDArray[np.bool_]]:
+    """Colours (H, W, 3) sRGB-encoded in 0..1, and where they are known (H, W).
+
+    A turned camera's picture is turned back, so that it looks as the given one does.
+    """
+    pixels = np.clip(read_photo(view.path, max_pixels).pixels, 0, 1)
+    if view.turned is None:
+        return pixels, np.ones(pixels.shape[:2], np.bool_)
+    smaller = np.eye(3)
+    for axis, (stored, now) in enumerate(zip(read_size(view.path)[::-1], pixels.shape[1::-1])):
+        smaller[axis, axis] = now / stored
+        smaller[axis, 2] = 0.5 * now / stored - 0.5
+    return turned_back(pixels, smaller @ view.turned @ np.linalg.inv(smaller))
+
+
+def turned_back(pixels: FloatImage, turned: NDArray[np.float64]) -> tuple[FloatImage, NDArray[np.bool_]]:
+    """The picture (H, W, 3) as an equal camera at its place would see it that looks as the given one does, and where
+    that is known. turned: see `KnownView`, for pictures of this size.
+    """
+    height, width = pixels.shape[:2]
+    y, x = np.mgrid[0:height, 0:width].astype(np.float64)
+    across = np.stack([x, y, np.ones_like(x)], axis=-1) @ turned.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = np.stack([across[..., 1], across[..., 0]]) / across[..., 2]
+    inside = (across[..., 2] > 0) & (at[0] >= 0) & (at[0] <= height - 1) & (at[1] >= 0) & (at[1] <= width - 1)
+    at = np.where(inside, at, 0.0)
+    channels = [map_coordinates(pixels[..., c], at, order=3, mode="nearest") for c in range(3)]
+    return np.clip(np.stack(channels, axis=-1), 0, 1).astype(np.float32), inside

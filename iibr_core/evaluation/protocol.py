@@ -1,0 +1,263 @@
+"""Judges every way of making views on one trial: identity, reference warp, and the qualities asked for.
+
+Each judged view is read once and made by every method; figures are of the whole frame, of what the given view sees,
+and of holes.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.depth.origin import DepthChoice
+from iibr_core.depth.refine import refine
+from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
+from iibr_core.evaluation.datasets import read_view
+from iibr_core.evaluation.metrics import Lpips, Mask, flip, psnr, ssim
+from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
+from iibr_core.evaluation.trials import DisparityFrom, Given, Trial, given_of, trials_of
+from iibr_core.evaluation.views import ViewMaker, as_stored
+from iibr_core.formats.multi_view import MultiView
+from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
+from iibr_core.types import Disparity, FloatImage, Quality, ViewOffset
+
+QUALITIES: tuple[Quality, ...] = ("fast", "balanced", "exact")
+IDENTITY, REFERENCE, TRUTH = "identity", "reference warp", "truth"
+SAME_ROW = 0.05
+"""Views whose rows differ by less, in view steps, make an EPI together."""
+LEAST_EPI_VIEWS = 3
+
+Tell = Callable[[int, int, str], None]
+"""Told (steps done, steps in all, what is being done)."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """source: where disparity comes from. choice: how it is estimated and refined. most_views: judged in one trial."""
+
+    source: DisparityFrom | Path = "auto"
+    choice: DepthChoice = field(default_factory=DepthChoice)
+    qualities: tuple[Quality, ...] = QUALITIES
+    max_pixels: int = DEFAULT_MAX_PIXELS
+    most_views: int | None = None
+    lpips: Path | None = None
+    with_consistency: bool = True
+
+
+@dataclass(frozen=True)
+class Figures:
+    """PSNR in dB of the frame, of what the given view sees, and of holes; SSIM, FLIP and LPIPS of the frame; time."""
+
+    full_db: float
+    visible_db: float
+    hole_db: float
+    ssim: float
+    flip: float
+    lpips: float
+    ms: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method: means over the views (of holes over those that have any), the worst view, figures of each view."""
+
+    method: str
+    mean: Figures
+    worst_view: str
+    worst_db: float
+    of_views: Mapping[str, Figures]
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """To look at: one view by every method and as it is, and EPIs of one row of pixels, (views, W, 3) each."""
+
+    view: str
+    by_method: Mapping[str, FloatImage]
+    epis: Mapping[str, FloatImage]
+    epi_row: int
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """One trial with one disparity map. consistency: by quality, and of the truth's EPIs where it has a row of views.
+
+    hole_share: of the pixels, mean over views. seconds: for everything.
+    """
+
+    scene: str
+    layout: str
+    trial: str
+    given: str
+    size: tuple[int, int]
+    disparity: str
+    rows: tuple[Row, ...]
+    consistency: Mapping[str, Consistency]
+    pictures: Pictures
+    hole_share: float
+    notes: tuple[str, ...]
+    seconds: float
+
+
+def evaluate(
+    scene: MultiView,
+    options: Options | None = None,
+    tell: Tell = lambda done, total, doing: None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> list[Judgement]:
+    """Judge a scene by the paper's trials: one judgement for each trial and disparity map.
+
+    Raises InputError where the scene or an option is bad, Cancelled or StoppedError once should_stop is true.
+    """
+    options = options or Options()
+    lpips = None if options.lpips is None else Lpips(options.lpips)
+    source: DisparityFrom = "auto" if isinstance(options.source, Path) else options.source
+    judgements = []
+    for trial in trials_of(scene, source, options.most_views):
+        tell(0, 0, f"{scene.name}: disparity")
+        given = given_of(trial, options.source, options.choice, options.max_pixels, should_stop)
+        for disparity in given.maps:
+            judgements.append(_Judge(trial, given, disparity, options, lpips, tell, should_stop).judged())
+    return judgements
+
+
+class _Judge:
+    """One trial with one disparity map, view by view."""
+
+    def __init__(
+        self,
+        trial: Trial,
+        given: Given,
+        disparity: Disparity,
+        options: Options,
+        lpips: Lpips | None,
+        tell: Tell,
+        should_stop: Callable[[], bool],
+    ) -> None:
+        self.trial, self.given, self.disparity, self.options = trial, given, disparity, options
+        self.lpips, self.tell, self.should_stop = lpips, tell, should_stop
+        self.refined = disparity.values
+        if options.choice.refine > 0:
+            self.refined = refine(given.photo, disparity.values, options.choice.refine)
+        self.figures: dict[str, dict[str, Figures]] = {}
+        self.hole_shares: list[float] = []
+        self.lines: list[LineView] = []
+        self.epis: dict[str, list[tuple[float, FloatImage]]] = {}
+        self.shown: tuple[str, dict[str, FloatImage]] = ("", {})
+
+    def judged(self) -> Judgement:
+        trial, scene, start = self.trial, self.trial.scene, time.perf_counter()
+        self.epi_row = _row_to_show(self.disparity.values)
+        self.farthest = max(trial.judged, key=lambda k: math.hypot(*trial.offset(k)))
+        offsets = [trial.offset(index) for index in trial.judged]
+        with (
+            ViewMaker(self.given.photo, self.refined, offsets, self.options.qualities, self.should_stop) as maker,
+            ThreadPoolExecutor(2, thread_name_prefix="iibr-metrics") as pool,
+        ):
+            for done, index in enumerate(trial.judged):
+                self.tell(done, len(trial.judged), f"{scene.name}: {scene.views[index].name}")
+                self._judge_view(index, maker, pool)
+            agreement = self._consistency(maker, offsets) if self.options.with_consistency else {}
+        rows = tuple(_row(method, of_views) for method, of_views in self.figures.items())
+        return Judgement(
+            scene.name,
+            scene.layout,
+            trial.name,
+            scene.views[trial.given].name,
+            (self.given.photo.shape[0], self.given.photo.shape[1]),
+            self.disparity.source,
+            rows,
+            agreement,
+            Pictures(*self.shown, self._epis(), self.epi_row),
+            float(np.mean(self.hole_shares)),
+            tuple(dict.fromkeys((*scene.notes, *self.given.notes, *self.disparity.notes))),
+            time.perf_counter() - start,
+        )
+
+    def _judge_view(self, index: int, maker: ViewMaker, pool: ThreadPoolExecutor) -> None:
+        offset, view = self.trial.offset(index), self.trial.scene.views[index]
+        truth, known = read_view(view, self.options.max_pixels)
+        judge = reference_warp(self.given.photo, self.given.judge.values, offset)
+        made = {IDENTITY: (self.given.photo, 0.0), **self._warped(offset)}
+        for quality in self.options.qualities:
+            made_view, ms = maker.timed_view(quality, offset)
+            made[quality] = as_stored(made_view.colors), ms
+        hole, visible = judge.hole & known, judge.visible & known
+        self.hole_shares.append(float(hole.mean()))
+
+        def score(method: str) -> Figures:
+            image, ms = made[method]
+            return self._figures(image, truth, None if known.all() else known, visible, hole, ms)
+
+        for method, figures in zip(made, pool.map(score, made)):
+            self.figures.setdefault(method, {})[view.name] = figures
+        pictures = {TRUTH: truth, **{method: image for method, (image, _) in made.items()}}
+        if index == self.farthest:
+            self.shown = view.name, pictures
+        self._keep_row(offset, pictures, judge)
+
+    def _warped(self, offset: ViewOffset) -> dict[str, tuple[FloatImage, float]]:
+        start = time.perf_counter()
+        colors = reference_warp(self.given.photo, self.disparity.values, offset).colors
+        return {REFERENCE: (as_stored(colors), 1e3 * (time.perf_counter() - start))}
+
+    def _figures(
+        self, image: FloatImage, truth: FloatImage, known: Mask | None, visible: Mask, hole: Mask, ms: float
+    ) -> Figures:
+        shown = image if known is None else np.where(known[..., None], image, truth)
+        return Figures(
+            psnr(image, truth, known),
+            psnr(image, truth, visible),
+            psnr(image, truth, hole),
+            ssim(shown, truth, known),
+            flip(shown, truth, known),
+            math.nan if self.lpips is None else self.lpips(shown, truth),
+            ms,
+        )
+
+    def _keep_row(self, offset: ViewOffset, pictures: Mapping[str, FloatImage], judge: WarpedView) -> None:
+        """What EPIs need of a view in the given one's row."""
+        if abs(offset.t) > SAME_ROW:
+            return
+        self.lines.append(LineView(offset.s, pictures[TRUTH], np.where(judge.hole, np.nan, judge.disparity)))
+        for method, image in pictures.items():
+            self.epis.setdefault(method, []).append((offset.s, image[self.epi_row]))
+
+    def _epis(self) -> dict[str, FloatImage]:
+        epis = {}
+        for method, lines in self.epis.items():
+            every = sorted([*lines, (0.0, self.given.photo[self.epi_row])], key=lambda line: line[0])
+            if len(every) >= LEAST_EPI_VIEWS and method != IDENTITY:
+                epis[method] = np.stack([line for _, line in every])
+        return epis
+
+    def _consistency(self, maker: ViewMaker, offsets: Sequence[ViewOffset]) -> dict[str, Consistency]:
+        found: dict[str, Consistency] = {}
+        for quality in self.options.qualities:
+            self.tell(0, 0, f"{self.trial.scene.name}: consistency, {quality}")
+            make = partial(maker.view, quality)
+            found[quality] = consistency(make, offsets, self.given.photo, self.refined)
+        if len(self.lines) + 1 >= LEAST_EPI_VIEWS:
+            rms, off_px = line_straightness(self.given.photo, self.given.judge.values, self.lines)
+            found[TRUTH] = Consistency(math.nan, math.nan, rms, off_px, 0)
+        return found
+
+
+def _row(method: str, of_views: Mapping[str, Figures]) -> Row:
+    worst = min(of_views, key=lambda name: of_views[name].full_db)
+    table = np.array([list(vars(figures).values()) for figures in of_views.values()])
+    known = np.isfinite(table)
+    means = np.where(known, table, 0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    return Row(method, Figures(*(float(mean) for mean in means)), worst, of_views[worst].full_db, of_views)
+
+
+def _row_to_show(disparity: FloatImage) -> int:
+    """The row of pixels whose disparity varies most: its EPI crosses most edges."""
+    return int(np.abs(np.diff(disparity, axis=1)).sum(axis=1).argmax()) if disparity.shape[1] > 1 else 0

@@ -1,0 +1,170 @@
+"""The reference warp: the plain way to make a view, slow and easy to follow, that every quality has to beat.
+
+Three steps: the nearest surface that lands on each pixel; the photo's colour where that surface lies; the colour of
+the nearest background where nothing landed. It shares no code with the renderer, so that it can judge it, and gives
+the masks of what the photo sees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from iibr_core.kernels import kernel
+from iibr_core.types import FloatImage, ViewOffset
+
+SAMPLES = 3
+"""Every pixel lands as SAMPLES x SAMPLES points, so that stretched surfaces stay closed."""
+SAME_SURFACE = 0.08
+"""Pixels whose disparities (px per view step) differ by less are one surface, interpolated between them."""
+LOBES = 3
+"""Of the Lanczos kernel."""
+NOWHERE = -1e30
+LONGEST_PX = 120
+SIMILAR = 0.15
+"""What is seen around a hole within this disparity of the farthest fills it."""
+EIGHT = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)])
+
+
+@dataclass(frozen=True, eq=False)
+class WarpedView:
+    """colors: (H, W, 3). disparity: (H, W), in holes meaningless. hole: (H, W), True where the photo shows nothing."""
+
+    colors: FloatImage
+    disparity: FloatImage
+    hole: NDArray[np.bool_]
+
+    @property
+    def visible(self) -> NDArray[np.bool_]:
+        """All but the holes and one pixel around them."""
+        return ~binary_dilation(self.hole, np.ones((3, 3), bool))
+
+
+def reference_warp(photo: FloatImage, disparity: FloatImage, offset: ViewOffset) -> WarpedView:
+    """The view at an offset of a photo (H, W, 3), sRGB-encoded in 0..1, with disparity (H, W), px per view step."""
+    height, width = disparity.shape
+    nearest = _splat(disparity.astype(np.float32), float(offset.t), float(offset.s))
+    hole = nearest == NOWHERE
+    nearest[hole] = 0
+    y, x = np.mgrid[0:height, 0:width]
+    from_x, from_y = x + nearest * offset.s, y + nearest * offset.t
+    hole |= (from_x < -0.5) | (from_y < -0.5) | (from_x > width - 0.5) | (from_y > height - 0.5)
+    colors = np.clip(_lanczos(photo.astype(np.float32), from_x, from_y), 0, 1)
+    return WarpedView(_filled(colors, hole, nearest), nearest, hole)
+
+
+@kernel
+def _splat(disparity, t, s):  # type: ignore[no-untyped-def]
+    """The nearest (largest) disparity that lands on each pixel, NOWHERE where none does."""
+    height, width = disparity.shape
+    nearest = np.full((height, width), NOWHERE, np.float32)
+    for y in range(height):
+        for x in range(width):
+            for j in range(SAMPLES):
+                for i in range(SAMPLES):
+                    point_x = x + (i + 0.5) / SAMPLES - 0.5
+                    point_y = y + (j + 0.5) / SAMPLES - 0.5
+                    d = _surface_at(disparity, x, y, point_x, point_y)
+                    to_x, to_y = math.floor(point_x - d * s + 0.5), math.floor(point_y - d * t + 0.5)
+                    if 0 <= to_x < width and 0 <= to_y < height and d > nearest[int(to_y), int(to_x)]:
+                        nearest[int(to_y), int(to_x)] = d
+    return nearest
+
+
+@kernel
+def _surface_at(disparity, x, y, point_x, point_y):  # type: ignore[no-untyped-def]
+    """Disparity at a point of pixel (x, y): between the four around it if they are one surface, else the pixel's."""
+    left, top = math.floor(point_x), math.floor(point_y)
+    if left < 0 or top < 0 or left + 1 >= disparity.shape[1] or top + 1 >= disparity.shape[0]:
+        return disparity[y, x]
+    a, b = disparity[top, left], disparity[top, left + 1]
+    c, d = disparity[top + 1, left], disparity[top + 1, left + 1]
+    if not max(a, b, c, d) - min(a, b, c, d) < SAME_SURFACE:
+        return disparity[y, x]
+    across, down = np.float32(point_x - left), np.float32(point_y - top)
+    return (a * (1 - across) + b * across) * (1 - down) + (c * (1 - across) + d * across) * down
+
+
+@kernel
+def _lanczos_weight(distance):  # type: ignore[no-untyped-def]
+    if distance == 0:
+        return 1.0
+    if abs(distance) >= LOBES:
+        return 0.0
+    angle = math.pi * distance
+    return LOBES * math.sin(angle) * math.sin(angle / LOBES) / (angle * angle)
+
+
+@kernel
+def _lanczos(photo, from_x, from_y):  # type: ignore[no-untyped-def]
+    """The photo (H, W, 3) at the positions (H, W); its border is repeated."""
+    height, width = photo.shape[:2]
+    result = np.empty((*from_x.shape, 3), np.float32)
+    weights_x, weights_y = np.empty(2 * LOBES), np.empty(2 * LOBES)
+    for row in range(from_x.shape[0]):
+        for column in range(from_x.shape[1]):
+            x = min(max(from_x[row, column], -0.5), width - 0.5)
+            y = min(max(from_y[row, column], -0.5), height - 0.5)
+            left, top = math.floor(x) - LOBES + 1, math.floor(y) - LOBES + 1
+            for k in range(2 * LOBES):
+                weights_x[k], weights_y[k] = _lanczos_weight(x - left - k), _lanczos_weight(y - top - k)
+            total = red = green = blue = 0.0
+            for j in range(2 * LOBES):
+                v = min(max(top + j, 0), height - 1)
+                for i in range(2 * LOBES):
+                    u = min(max(left + i, 0), width - 1)
+                    w = weights_x[i] * weights_y[j]
+                    total += w
+                    red += w * photo[v, u, 0]
+                    green += w * photo[v, u, 1]
+                    blue += w * photo[v, u, 2]
+            result[row, column, 0] = red / total
+            result[row, column, 1] = green / total
+            result[row, column, 2] = blue / total
+    return result
+
+
+@kernel
+def _filled(colors, hole, disparity):  # type: ignore[no-untyped-def]
+    """Colours with holes filled: of what is met first in eight directions, the farthest surface, nearer ones more."""
+    height, width = hole.shape
+    filled = colors.copy()
+    met = np.empty((8, 3), np.int64)
+    for y in range(height):
+        for x in range(width):
+            if not hole[y, x]:
+                continue
+            count, farthest = 0, np.inf
+            for k in range(8):
+                step_x, step_y = EIGHT[k]
+                for length in range(1, LONGEST_PX + 1):
+                    u, v = x + length * step_x, y + length * step_y
+                    if not (0 <= u < width and 0 <= v < height):
+                        break
+                    if hole[v, u]:
+                        continue
+                    # The pixel at the very edge is mixed with what hides the hole.
+                    far_u, far_v = min(max(u + step_x, 0), width - 1), min(max(v + step_y, 0), height - 1)
+                    if not hole[far_v, far_u]:
+                        u, v = far_u, far_v
+                    met[count, 0], met[count, 1], met[count, 2] = v, u, length
+                    farthest = min(farthest, disparity[v, u])
+                    count += 1
+                    break
+            total = red = green = blue = 0.0
+            for k in range(count):
+                v, u, length = met[k]
+                if disparity[v, u] >= farthest + SIMILAR:
+                    continue
+                w = 1.0 / length**2
+                total += w
+                red += w * colors[v, u, 0]
+                green += w * colors[v, u, 1]
+                blue += w * colors[v, u, 2]
+            if total > 0:
+                filled[y, x, 0], filled[y, x, 1], filled[y, x, 2] = red / total, green / total, blue / total
+    return filled

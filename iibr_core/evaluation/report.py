@@ -1,0 +1,88 @@
+"""Judgements on disk: report.json with every figure, report.md with tables, index.html with tables and pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from iibr_core.evaluation.page import page_of
+from iibr_core.evaluation.protocol import Judgement
+from iibr_core.evaluation.tables import (
+    Table,
+    about,
+    consistency_table,
+    figures_table,
+    heading,
+    summary_table,
+)
+from iibr_core.formats.files import written_whole
+from iibr_core.types import InputError
+
+FILES = ("report.json", "report.md", "index.html")
+
+
+def require_report_folder(folder: Path) -> None:
+    """Raise InputError where reports cannot be written, before hours are spent on figures."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is a file; --out names a folder")
+    existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    if not existing.is_dir():
+        raise InputError(f"{folder}: {existing} is a file; choose another place with --out")
+
+
+def write_report(folder: Path, judgements: Sequence[Judgement], command: str) -> None:
+    """Write FILES into a folder, made if need be; each whole or not at all. command: how they were made.
+
+    Raises InputError where the folder cannot be written.
+    """
+    texts = (json_of(judgements, command), markdown_of(judgements, command), page_of(judgements, command))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be created ({error.strerror}); choose another place with --out") from error
+    for name, text in zip(FILES, texts):
+        with written_whole(folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+def json_of(judgements: Sequence[Judgement], command: str) -> str:
+    """Everything but the pictures; what is not known is null."""
+    plain = []
+    for judgement in judgements:
+        fields = {name: value for name, value in vars(judgement).items() if name != "pictures"}
+        fields["rows"] = [asdict(replace(row, of_views=dict(row.of_views))) for row in judgement.rows]
+        fields["consistency"] = {name: asdict(found) for name, found in judgement.consistency.items()}
+        fields["size"] = {"height": judgement.size[0], "width": judgement.size[1]}
+        plain.append(fields)
+    return json.dumps(_finite({"command": command, "judgements": plain}), indent=1, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    """JSON knows no NaN."""
+    if isinstance(value, dict):
+        return {name: _finite(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def markdown_of(judgements: Sequence[Judgement], command: str) -> str:
+    """Tables of all judgements, a summary first."""
+    lines = ["# Evaluation", "", f"Made by `{command}`.", "", *markdown_table(summary_table(judgements))]
+    for judgement in judgements:
+        lines += ["", f"## {heading(judgement)}", "", about(judgement), "", *markdown_table(figures_table(judgement))]
+        if judgement.consistency:
+            lines += ["", *markdown_table(consistency_table(judgement))]
+        if judgement.notes:
+            lines += ["", *(f"- {note}" for note in judgement.notes)]
+    return "\n".join(lines) + "\n"
+
+
+def markdown_table(table: Table) -> list[str]:
+    """Lines of Markdown."""
+    rows = [table.head, ("---",) * len(table.head), *table.rows]
+    return [f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in rows]

@@ -1,0 +1,233 @@
+"""The passes of inspection against plain numpy: EPIs, sheet, overlays, views read back, who sees a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.gpu.scenes import TwoPlanes
+from viewer.colormap import VIRIDIS, mapped
+from viewer.gpu.context import GLContext
+from viewer.gpu.inspection import SAME_SURFACE, SAME_SURFACE_PX, Cell, InspectionPasses, Line, OverlayStyle
+from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.renderer import Renderer
+from viewer.state import Optics
+
+GRID = GridShape(5, 7)
+SCENE = TwoPlanes()
+SIZE = SCENE.width, SCENE.height
+BAND = 4
+
+
+@pytest.fixture
+def passes(gl: GLContext, renderer: Renderer) -> Iterator[InspectionPasses]:
+    made = InspectionPasses(gl.ctx, renderer.programs)
+    yield made
+    made.release()
+
+
+def full(renderer: Renderer) -> LightFieldTexture:
+    SCENE.fill(renderer, GRID)
+    assert renderer.field is not None
+    return renderer.field
+
+
+def middle_only(renderer: Renderer) -> LightFieldTexture:
+    SCENE.open(renderer, GRID)
+    SCENE.upload(renderer, GRID, *GRID.centre)
+    assert renderer.field is not None
+    return renderer.field
+
+
+def epi_across(passes: InspectionPasses, field: LightFieldTexture, row: int, y: int) -> np.ndarray:
+    """(U, W, 3): one line of pixels a view."""
+    line = Line(row, (y + 0.5) / SCENE.height)
+    passes.draw_epi(field, line, (SCENE.width, BAND * GRID.columns), 1.0)
+    image = passes.read("across")[..., :3]
+    bands = image.reshape(GRID.columns, BAND, SCENE.width, 3)
+    np.testing.assert_array_equal(bands, bands[:, :1].repeat(BAND, 1))
+    return bands[:, 0]
+
+
+def test_an_epi_is_one_line_of_every_view_of_its_row(renderer: Renderer, passes: InspectionPasses) -> None:
+    epi = epi_across(passes, full(renderer), row=1, y=30)
+    expected = [SCENE.view(GRID.offset(1, u))[0][30] for u in range(GRID.columns)]
+    np.testing.assert_allclose(epi, expected, atol=1)
+
+
+def test_an_upright_epi_is_one_column_of_every_view_of_its_column(renderer: Renderer, passes: InspectionPasses) -> None:
+    line = Line(4, (50 + 0.5) / SCENE.width, is_upright=True)
+    passes.draw_epi(full(renderer), line, (BAND * GRID.rows, SCENE.height), 1.0)
+    epi = passes.read("upright")[..., :3].reshape(SCENE.height, GRID.rows, BAND, 3)[:, :, 1]
+    expected = [SCENE.view(GRID.offset(v, 4))[0][:, 50] for v in range(GRID.rows)]
+    np.testing.assert_allclose(epi.transpose(1, 0, 2), expected, atol=1)
+
+
+def test_edges_in_an_epi_are_straight_and_as_steep_as_the_disparity(
+    renderer: Renderer, passes: InspectionPasses
+) -> None:
+    scene = TwoPlanes(contrast=0.0)  # disc and background, one colour each
+    scene.fill(renderer, GRID)
+    assert renderer.field is not None
+    epi = epi_across(passes, renderer.field, row=2, y=scene.height // 2).astype(int)
+    is_front = np.abs(epi - epi[:, scene.width // 2][:, None]).sum(axis=2) < 3
+    left = is_front.argmax(axis=1)
+    s = np.arange(GRID.columns) - GRID.centre[1]
+    slope, middle = np.polyfit(s, left, 1)
+    assert slope == pytest.approx(-scene.front, abs=1e-6)
+    np.testing.assert_allclose(left, slope * s + middle, atol=1e-6)
+
+
+def test_views_that_are_not_there_are_hatched_grey(renderer: Renderer, passes: InspectionPasses) -> None:
+    field = middle_only(renderer)
+    epi = epi_across_as_drawn(passes, field)
+    there = GRID.centre[1]
+    np.testing.assert_allclose(epi[there, 0], SCENE.view(ViewOffset(0, 0))[0][30], atol=1)
+    missing = np.delete(epi, there, axis=0)
+    assert (missing.min(axis=-1) == missing.max(axis=-1)).all()
+    assert len(np.unique(missing)) == 2
+    np.testing.assert_array_equal(epi_across_as_drawn(passes, field, row=0)[..., 0] > 0, True)
+
+
+def epi_across_as_drawn(passes: InspectionPasses, field: LightFieldTexture, row: int = GRID.centre[0]) -> np.ndarray:
+    """(U, BAND, W, 3)."""
+    passes.draw_epi(field, Line(row, (30 + 0.5) / SCENE.height), (SCENE.width, BAND * GRID.columns), 1.0)
+    return passes.read("across")[..., :3].reshape(GRID.columns, BAND, SCENE.width, 3)
+
+
+@pytest.mark.parametrize("stops", [-2.0, 0.0, 1.5])
+def test_exposure_is_a_factor_of_light(renderer: Renderer, passes: InspectionPasses, stops: float) -> None:
+    field = full(renderer)
+    passes.draw_view(field, 1, 2, "photo", 2.0**stops)
+    light = linear_from_srgb(SCENE.view(GRID.offset(1, 2))[0] / 255) * 2.0**stops
+    expected = srgb_from_linear(np.clip(light, 0, 1)) * 255
+    np.testing.assert_allclose(passes.read("photo")[..., :3], expected, atol=2)
+
+
+def test_a_stored_view_is_read_back(renderer: Renderer, passes: InspectionPasses) -> None:
+    field = full(renderer)
+    read = passes.read_view(field, 4, 0)
+    assert read is not None
+    np.testing.assert_allclose(read, SCENE.view(GRID.offset(4, 0))[0], atol=1)
+    assert passes.read_view(middle_only(renderer), 4, 0) is None
+
+
+def test_every_byte_comes_back_within_one_step_and_bright_ones_exactly(
+    renderer: Renderer, passes: InspectionPasses
+) -> None:
+    colors = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, 2)
+    renderer.open_field(GridShape(1, 1), 16, 16, hdr=False, with_disparity=False)
+    renderer.upload_view(0, 0, colors, None)
+    assert renderer.field is not None
+    read = passes.read_view(renderer.field, 0, 0)
+    assert read is not None
+    np.testing.assert_allclose(read, colors, atol=1)
+    bright = colors > 130
+    np.testing.assert_array_equal(read[bright], colors[bright])
+
+
+def test_hdr_views_are_read_back_as_bytes_white_beyond_white(renderer: Renderer, passes: InspectionPasses) -> None:
+    colors = np.array([[[0.0, 0.25, 0.5], [0.75, 1.0, 30.0]]], np.float16)
+    renderer.open_field(GridShape(1, 1), 2, 1, hdr=True, with_disparity=False)
+    renderer.upload_view(0, 0, colors, None)
+    assert renderer.field is not None
+    read = passes.read_view(renderer.field, 0, 0)
+    np.testing.assert_allclose(read, np.clip(colors.astype(float), 0, 1) * 255, atol=0.6)
+
+
+def test_the_sheet_shows_each_view_in_its_cell_and_grey_where_none_is(
+    renderer: Renderer, passes: InspectionPasses
+) -> None:
+    field = middle_only(renderer)
+    cells = Cell(2, 3, 48, 36), Cell(60, 3, 48, 36)
+    passes.start_sheet((110, 60))
+    passes.draw_on_sheet(field, *GRID.centre, cells[0], 1.0)
+    passes.draw_on_sheet(field, 0, 0, cells[1], 1.0)
+    sheet = passes.read("sheet")[..., :3].astype(float)
+    light = linear_from_srgb(SCENE.view(ViewOffset(0, 0))[0] / 255)
+    halved = srgb_from_linear(light.reshape(36, 2, 48, 2, 3).mean(axis=(1, 3))) * 255
+    np.testing.assert_allclose(sheet[3:39, 2:50], halved, atol=4)
+    missing = sheet[3:39, 60:108]
+    assert np.ptp(missing, axis=-1).max() == 0
+    assert missing.min() > 0
+    outside = np.ones(sheet.shape[:2], bool)
+    outside[3:39, 2:50] = outside[3:39, 60:108] = False
+    assert not sheet[outside].any()
+
+
+LOOK = OverlayStyle(VIRIDIS, (-1.0, 2.0), opacity=0.5)
+
+
+def test_the_disparity_overlay_at_a_stored_view_is_its_map_in_colours(
+    renderer: Renderer, passes: InspectionPasses
+) -> None:
+    view = (1, 5)
+    passes.draw_overlay(full(renderer), Optics(eye=GRID.offset(*view)), view, SIZE, LOOK)
+    overlay = passes.read("overlay")
+    disparity = SCENE.view(GRID.offset(*view))[1]
+    expected = [[mapped((d + 1) / 3) for d in row] for row in disparity]
+    np.testing.assert_allclose(overlay[..., :3], np.multiply(expected, 255), atol=1)
+    np.testing.assert_allclose(overlay[..., 3], 127.5, atol=1)
+
+
+@pytest.mark.parametrize("eye", [ViewOffset(0.4, -0.3), ViewOffset(-2.7, 3.4)])
+def test_between_views_the_overlay_lies_where_the_eye_sees_the_surfaces(
+    renderer: Renderer, passes: InspectionPasses, eye: ViewOffset
+) -> None:
+    view = min(4, max(0, round(eye.t) + 2)), min(6, max(0, round(eye.s) + 3))
+    passes.draw_overlay(full(renderer), Optics(eye=eye), view, SIZE, LOOK)
+    near = passes.read("overlay")[..., 0].astype(int) > 128  # viridis: only its light end is red
+    np.testing.assert_array_equal(near.any(), True)
+    assert (near != (SCENE.view(eye)[1] > 0)).mean() < 0.01
+
+
+def test_values_are_laid_over_the_surface_they_belong_to(renderer: Renderer, passes: InspectionPasses) -> None:
+    """A mask of the disc, known in the middle view, covers the disc from another eye."""
+    mask = (SCENE.view(ViewOffset(0, 0))[1] > 0).astype(np.uint8) * 255
+    eye = ViewOffset(1.0, -2.0)
+    amber = OverlayStyle(((255, 184, 60),) * len(VIRIDIS), (0.0, 1.0), 1.0, is_mask=True)
+    passes.draw_overlay(full(renderer), Optics(eye=eye), GRID.centre, SIZE, amber, mask)
+    overlay = passes.read("overlay")
+    covered = overlay[..., 3] == 255
+    assert (covered != (SCENE.view(eye)[1] > 0)).mean() < 0.02
+    np.testing.assert_array_equal(np.unique(overlay[covered][:, :3], axis=0), [[255, 184, 60]])
+    assert not overlay[~covered][:, 3].any()
+
+
+@pytest.mark.parametrize(
+    ("eye", "place"), [(ViewOffset(0, 0), (48, 36)), (ViewOffset(1.5, -2.5), (30, 20)), (ViewOffset(0, 3), (2, 70))]
+)
+def test_how_many_views_see_a_surface(
+    renderer: Renderer, passes: InspectionPasses, eye: ViewOffset, place: tuple[int, int]
+) -> None:
+    field = full(renderer)
+    x, y = place
+    disparity = float(SCENE.view(eye)[1][y, x])
+    seen = passes.seen_in(field, eye, x, y, disparity)
+    tolerance = SAME_SURFACE * (field.range_px[1] - field.range_px[0]) + SAME_SURFACE_PX
+    expected = np.zeros(GRID, bool)
+    for v, u in np.ndindex(*GRID):
+        t, s = GRID.offset(v, u)
+        column, row = round(x - disparity * (s - eye.s) + 1e-6), round(y - disparity * (t - eye.t) + 1e-6)
+        if 0 <= column < SCENE.width and 0 <= row < SCENE.height:
+            expected[v, u] = abs(SCENE.view(ViewOffset(t, s))[1][row, column] - disparity) <= tolerance
+    np.testing.assert_array_equal(seen, expected)
+    assert expected.any()
+
+
+def test_views_that_are_not_there_see_nothing(renderer: Renderer, passes: InspectionPasses) -> None:
+    seen = passes.seen_in(middle_only(renderer), ViewOffset(0, 0), 48, 36, SCENE.front)
+    assert seen.sum() == 1
+    assert seen[GRID.centre]
+
+
+@pytest.mark.parametrize("size", [(33, 21), (1, 1), (64, 9)])
+def test_images_take_any_size(renderer: Renderer, passes: InspectionPasses, size: tuple[int, int]) -> None:
+    field = middle_only(renderer)
+    for used in ((16, 16), size):
+        passes.draw_epi(field, Line(0, 0.5), used, 1.0)
+    assert passes.read("across").shape == (size[1], size[0], 4)

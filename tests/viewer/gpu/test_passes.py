@@ -1,0 +1,223 @@
+"""Each pass between light field and picture against numpy: spans of searches, defocus, smoothing, layers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from iibr_core.color import srgb_from_linear
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.gpu.scenes import TwoPlanes, rms
+from viewer.gpu.lens import WHOLE, Lens, lens_of
+from viewer.gpu.passes import TILE_PX, Passes, _search_steps
+from viewer.gpu.renderer import Renderer
+from viewer.gpu.targets import Targets
+from viewer.gpu.view_choice import pinhole_sources
+from viewer.state import CENTRE, Optics
+
+GRID = GridShape(5, 5)
+SCENE = TwoPlanes(width=160, height=96, back=-4.0, front=5.0, radius_px=25.0)
+SIZE = SCENE.width, SCENE.height
+RANDOM = np.random.default_rng(5)
+
+
+@pytest.fixture
+def passes(renderer: Renderer) -> Passes:
+    return renderer._drawing.passes
+
+
+@pytest.fixture
+def targets(renderer: Renderer) -> Targets:
+    return renderer._targets_of(SIZE)
+
+
+def lens(renderer: Renderer, optics: Optics) -> Lens:
+    assert renderer.field is not None
+    return lens_of(optics, renderer.field, SIZE[0], prefilter=True)
+
+
+def read(texture: object, channels: int = 4) -> NDArray[np.float32]:
+    width, height = texture.size  # type: ignore[attr-defined]
+    return np.frombuffer(texture.read(), np.float32).reshape(height, width, channels)  # type: ignore[attr-defined]
+
+
+def first_step_that_finds(
+    disparity: NDArray[np.float32], delta: NDArray[np.float64], steps: int, ends: tuple
+) -> NDArray:
+    """Twin of the search, for every pixel: the step it ends at, -1 where it finds nothing. delta: px per px (x, y)."""
+    far, near = ends
+    stride = (near - far) / steps
+    y, x = np.indices(disparity.shape) + 0.5
+    found = np.full(disparity.shape, -1)
+    for k in range(steps + 1):
+        d = near - stride * k
+        seen = looked_up(disparity, x - delta[0] * d, y - delta[1] * d)
+        refined = looked_up(disparity, x - delta[0] * seen, y - delta[1] * seen)
+        ends_here = (seen - d >= -0.5 * stride) & ((seen - d <= 1.5 * stride) | (k == 0))
+        ends_here &= refined >= seen - 1.5 * stride
+        found[ends_here & (found < 0)] = k
+    return found
+
+
+def looked_up(image: NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float32]:
+    rows = np.clip(np.floor(y), 0, image.shape[0] - 1).astype(int)
+    return image[rows, np.clip(np.floor(x), 0, image.shape[1] - 1).astype(int)]
+
+
+@pytest.mark.parametrize("eye", [ViewOffset(0.37, -0.73), ViewOffset(-1.21, 3.43)])
+def test_no_search_ends_outside_its_tiles_span(
+    renderer: Renderer, passes: Passes, targets: Targets, eye: ViewOffset
+) -> None:
+    SCENE.fill(renderer, GRID)
+    field, view = renderer.field, lens(renderer, Optics(eye))
+    assert field is not None
+    field.range_px = -10.0, 11.0  # wider than what is there: something can be saved
+    passes._find_spans(field, view, WHOLE, targets)
+    spans = np.concatenate([read(texture) for texture in targets.spans.textures], axis=-1)
+    flat = spans[..., 1] < 0
+    assert 0.1 < flat.mean() < 0.9
+    for i, (row, column, _) in enumerate(pinhole_sources(eye, GRID, field.present)):
+        there = GRID.offset(row, column)
+        _, disparity = SCENE.view(there)
+        steps = _search_steps(field, view, there, WHOLE)
+        delta = np.array([there.s - eye.s, there.t - eye.t])
+        found = first_step_that_finds(disparity, delta, steps, field.range_px)
+        tiles = found.reshape(SIZE[1] // TILE_PX, TILE_PX, SIZE[0] // TILE_PX, TILE_PX).swapaxes(1, 2)
+        first, last = spans[..., 2 * i, None, None], spans[..., 2 * i + 1, None, None]
+        within = (tiles < 0) | ((tiles >= first) & (tiles <= last))
+        assert within[~flat].all()
+        assert (last - first)[~flat].max() < steps
+        stride = (field.range_px[1] - field.range_px[0]) / steps
+        one = field.range_px[1] - stride * tiles
+        assert (np.abs(one - first)[flat & (tiles >= 0).all((-2, -1))] <= 2.5 * stride).all(), "flat: near the surface"
+
+
+@pytest.mark.parametrize("optics", [Optics(ViewOffset(0.4, -0.7)), Optics(ViewOffset(0.3, 2.7), dolly=2.0)])
+@pytest.mark.parametrize("present", [1, 5, 25])
+def test_tiles_change_nothing_about_a_pinhole_view(renderer: Renderer, optics: Optics, present: int) -> None:
+    SCENE.open(renderer, GRID)
+    for index in [12, 0, 4, 20, 24, *range(25)][: present + 5 if present == 25 else present]:
+        SCENE.upload(renderer, GRID, *divmod(index, 5))
+    images = []
+    for renderer.adaptive in (True, False):
+        renderer.render(optics, SIZE)
+        images.append(renderer.read_image())
+    assert np.mean(np.abs(images[0].astype(int) - images[1]).max(-1) > 2) < 0.001
+
+
+def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targets: Targets) -> None:
+    SCENE.fill(renderer, GRID)
+    field, wide = renderer.field, lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=3.0))
+    assert field is not None
+    samples = wide.samples(GRID, field.present)
+    passes.find_defocus(field, wide, samples, targets)
+    seen = read(targets.tiles.textures[0])
+    rows, columns = SIZE[1] // TILE_PX, SIZE[0] // TILE_PX
+    widest = np.zeros((rows, columns, 2))
+    for sample in samples:
+        _, disparity = SCENE.view(sample.wanted)
+        y, x = np.indices(disparity.shape) + 0.5
+        shifted = looked_up(
+            disparity, x - wide.focus_disparity * sample.wanted.s, y - wide.focus_disparity * sample.wanted.t
+        )
+        beside = (shifted - 1.0).reshape(rows, TILE_PX, columns, TILE_PX)
+        widest[..., 0] = np.maximum(widest[..., 0], beside.max((1, 3)))
+        widest[..., 1] = np.maximum(widest[..., 1], (-beside).max((1, 3)))
+    assert (seen[..., :2] >= wide.blur_px * widest - 1e-3).all(), "no blur is overlooked"
+    assert np.mean(np.abs(seen[..., :2] - wide.blur_px * widest).max(-1) < 1e-2) > 0.5, "and mostly it is as wide"
+    around = read(targets.wide_tiles.textures[0])[..., :2]
+    reach = min(int(np.ceil((wide.widest_blur_px / 2 + TILE_PX / 2) / TILE_PX)), 4)
+    padded = np.pad(seen[..., :2], ((reach, reach), (reach, reach), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1, 2 * reach + 1), axis=(0, 1))
+    assert np.array_equal(around, windows.max((-2, -1)))
+
+
+@pytest.mark.parametrize("width_px", [3.0, 9.3, 40.0])
+def test_smoothing_is_a_box_as_wide_as_told(
+    renderer: Renderer, passes: Passes, targets: Targets, width_px: float
+) -> None:
+    SCENE.fill(renderer, GRID)
+    half = (SIZE[1] + 1) // 2, (SIZE[0] + 1) // 2
+    layers = [RANDOM.random((*half, 4)).astype(np.float32) for _ in range(2)]
+    for texture, layer in zip(targets.blurred.textures, layers):
+        texture.write(layer.tobytes())
+    tiles = np.zeros((SIZE[1] // TILE_PX, SIZE[0] // TILE_PX, 4), np.float32)
+    tiles[..., 0] = width_px
+    targets.wide_tiles.textures[0].write(tiles.tobytes())
+    passes.smooth(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), targets, narrowing=1.0)
+    reach = 0.25 * np.sqrt(max(width_px**2 - 8, 4.0))
+    whole = int(np.ceil(reach - 0.5))
+    taps = np.clip(reach + 0.5 - np.abs(np.arange(-whole, whole + 1)), 0, 1) / (2 * reach)
+    expected = layers[0].astype(float)
+    for axis in (1, 0):
+        padded = np.pad(expected, [(whole, whole) if a == axis else (0, 0) for a in range(3)], mode="edge")
+        expected = np.apply_along_axis(lambda line: np.convolve(line, taps, "valid"), axis, padded)
+    assert read(targets.half_smooth.textures[0]) == pytest.approx(expected, abs=1e-5)
+    assert not read(targets.half_smooth.textures[1]).any(), "nothing is smoothed where tiles tell of nothing"
+
+
+def test_layers_are_laid_over_each_other(renderer: Renderer, passes: Passes, targets: Targets) -> None:
+    """Sharp background in the left half, half of it covered by foreground of two brightnesses."""
+    SCENE.fill(renderer, GRID)
+    wide = replace(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), exposure=1.0)
+    assert wide.keeps_layers
+    height, width = (SIZE[1] + 1) // 2, (SIZE[0] + 1) // 2
+    sharp, front, back = (
+        np.full((SIZE[1], SIZE[0], 4), 0.0, "f4"),
+        np.zeros((height, width, 4), "f4"),
+        np.zeros((height, width, 4), "f4"),
+    )
+    covered = 0.5
+    sharp[:] = (1 - covered) * np.array([0.2, 0.4, 0.6, 1.0])
+    front[:, : width // 2] = covered * np.array([0.8, 0.8, 0.8, 1.0])
+    front[:, width // 2 :] = covered * np.array([0.1, 0.1, 0.1, 1.0])
+    weights = np.zeros((height, width, 2), "f4")
+    weights[:] = 1.0, covered
+    for texture, values in (
+        (targets.light.textures[0], sharp),
+        (targets.half_smooth.textures[0], front),
+        (targets.half_smooth.textures[1], back),
+        (targets.blurred.textures[2], weights),
+    ):
+        texture.write(values.tobytes())
+    targets.image.use()
+    passes.present(wide, targets, is_linear=False)
+    renderer._shown = targets
+    image = renderer.read_image()
+    for columns, bright in ((slice(0, 70), 0.8), (slice(90, 160), 0.1)):
+        expected = srgb_from_linear(0.5 * np.array([0.2, 0.4, 0.6]) + 0.5 * bright) * 255
+        assert np.abs(image[:, columns] - expected).max() < 1
+
+
+def test_outside_all_views_mirror_images_stand_in(renderer: Renderer) -> None:
+    """Seen from far beside the grid, a flat scene goes on as its mirror image: no streaks."""
+    scene = TwoPlanes(width=96, height=64, back=6.0, front=6.0)
+    grid = GridShape(3, 3)
+    scene.fill(renderer, grid)
+    eye = ViewOffset(0.0, 3.0)
+    renderer.render(Optics(eye), (96, 64))
+    image = renderer.read_image()
+    photo = scene.view(ViewOffset(0.0, 1.0))[0]
+    moved = round(6.0 * (eye.s - 1.0))
+    mirrored = np.concatenate([photo, photo[:, ::-1]], axis=1)[:, moved : moved + 96]
+    assert rms(image, mirrored, border=2) < 0.01
+
+
+def test_edits_of_the_optics_rebuild_nothing(renderer: Renderer) -> None:
+    """No program, texture or view is made anew: numbers change, and the picture is drawn."""
+    SCENE.fill(renderer, GRID)
+    first = Optics(ViewOffset(0.2, 0.1), focus_disparity=1.0, aperture_diameter=3.0)
+    renderer.render(first, SIZE)
+    before = len(renderer.programs), renderer.field, renderer.image_texture
+    for edit in (
+        replace(first, eye=CENTRE),
+        replace(first, focus_disparity=-3.0),
+        replace(first, aperture_diameter=4.5),
+        replace(first, focus_tilt=(1.0, 0.5)),
+        replace(first, exposure_stops=1.0),
+    ):
+        renderer.render(edit, SIZE)
+        assert (len(renderer.programs), renderer.field, renderer.image_texture) == before, edit

@@ -1,0 +1,144 @@
+"""What `iibr bench` does: times every switch, measures its error, writes tables and plots. Heavy imports wait."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from iibr_core.types import GridShape, InputError
+from viewer.options import MaxPixels
+from viewer.terminal import progress_shown
+
+if TYPE_CHECKING:
+    from iibr_core.evaluation.bench.figures import Target
+    from iibr_core.evaluation.bench.variants import BenchScene, Draw, Stored
+    from iibr_core.types import FloatImage, ViewOffset
+
+TARGET_SIZE = 512, 512
+FIRST_FRAME_S = 1.5
+
+
+def bench(
+    data: Annotated[
+        Path, typer.Option(metavar="DIR", help="A scene with true views and disparity, or a folder of such.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for speed.md, speed.svg and speed.png.")],
+    repeats: Annotated[int, typer.Option(min=1, help="Rounds; figures are their medians.")] = 3,
+    max_pixels: MaxPixels = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Small series, no soft maps: to see that it works.")] = False,
+) -> None:
+    """Measure speed against error for every switch, and how cost grows with what a scene asks for.
+
+    Example: iibr bench --data data --out docs
+    """
+    if not out.is_dir():
+        raise InputError(f"{out}: is no folder; --out names one that exists")
+    from iibr_core.evaluation.packages import require_packages
+
+    require_packages("scipy", "skimage", "matplotlib")
+    from iibr_core.evaluation.bench.figures import foretell, measure_scene, targets
+    from iibr_core.evaluation.bench.report import Bench, write_bench
+    from iibr_core.evaluation.bench.scaling import growth, series
+    from iibr_core.evaluation.bench.variants import VARIANTS, bench_scenes
+    from iibr_core.evaluation.datasets import find_scenes
+    from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
+
+    scenes = [
+        scene
+        for known in find_scenes(data)
+        if known.disparity
+        for scene in bench_scenes(known, max_pixels or DEFAULT_MAX_PIXELS, with_soft=not quick)
+    ]
+    if not scenes:
+        raise InputError(
+            f"{data}: holds no scene with disparity; give one, such as views/v00_u00.png and gt_disp_*.npy"
+        )
+    with drawing() as draw, progress_shown("measuring") as show:
+        figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
+        whole = [scene for scene in scenes if not scene.is_soft]
+        foretold = tuple(f for scene in whole for f in foretell(scene, ("fast", "balanced"), show))
+        growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
+        judged = next((s for s in whole if s.photo.shape[:2] == TARGET_SIZE and s.reach == 4), None)
+        met = [] if judged is None or quick else targets(judged, repeats, show)
+        if judged is not None and not quick:
+            met.append(first_frame(judged))
+    machine = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}"
+    command = shlex.join(["iibr", *sys.argv[1:]])
+    for path in write_bench(out, Bench(figures, foretold, growths, tuple(met), machine, command)):
+        print(path)
+
+
+@contextmanager
+def drawing() -> Iterator[Draw | None]:
+    """What draws pinhole pictures from stored views; None where there is no OpenGL."""
+    from viewer.gpu.context import create_headless
+
+    try:
+        gl = create_headless()
+    except InputError as error:
+        print(f"note: variants that leave views out are not measured: {error}", file=sys.stderr)
+        yield None
+        return
+    from viewer.gpu.renderer import Renderer
+
+    renderer = Renderer(gl)
+    try:
+        yield lambda stored, offsets: _drawn(renderer, stored, offsets)
+    finally:
+        renderer.release()
+        gl.release()
+
+
+def _drawn(renderer: Any, stored: Stored, offsets: Iterable[ViewOffset]) -> list[FloatImage]:
+    import numpy as np
+
+    from viewer.state import Optics
+
+    reach = round(max(abs(part) for at in stored for part in at))
+    grid = GridShape(2 * reach + 1, 2 * reach + 1)
+    colors = next(iter(stored.values()))[0]
+    height, width = colors.shape[:2]
+    renderer.open_field(grid, width, height, hdr=colors.dtype != np.uint8, with_disparity=True)
+    for at, (pixels, disparity) in stored.items():
+        renderer.upload_view(round(at.t) + reach, round(at.s) + reach, pixels, disparity)
+    pictures = []
+    for at in offsets:
+        renderer.render(Optics(eye=at), (width, height))
+        renderer.refine()
+        pictures.append(renderer.read_image().astype(np.float32) / 255)
+    return pictures
+
+
+def first_frame(scene: BenchScene) -> Target:
+    """From the start of a process to the first picture of the scene, drawn without a display."""
+    import time
+
+    import numpy as np
+
+    from iibr_core.evaluation.bench.figures import Target
+    from iibr_core.formats.photo import write_image
+
+    seconds = []
+    with tempfile.TemporaryDirectory() as folder:
+        photo = Path(folder) / "photo.png"
+        write_image(photo, scene.photo)
+        np.save(Path(folder) / "photo_disparity.npy", scene.disparity)
+        words = ["screenshot", str(photo), "--grid", "1", "-o", str(Path(folder) / "picture.png")]
+        for _ in range(3):
+            start = time.perf_counter()
+            subprocess.run([sys.executable, "-m", "viewer", *words], check=True, capture_output=True)
+            seconds.append(time.perf_counter() - start)
+    said = f"{min(seconds):.2f} s, the least of {len(seconds)}"
+    return Target(
+        "photo and disparity: process start to first picture", "<= 1.5 s", said, min(seconds) <= FIRST_FRAME_S
+    )
