@@ -27,8 +27,12 @@ RAY_US = 2.0
 ROBUST_PERCENTILES = (1.0, 99.0)
 """A few wild disparities must not set the baseline."""
 DISPARITY_BYTES = 4
-RAY_BYTES = 21
-"""Of one pixel of one source image: colours, disparity, coverage, flag (see rays.RaySet)."""
+RAY_BYTES = 33
+"""Of one pixel of one source image: colours, disparity, coverage, flag (rays.RaySet), and what lies around it."""
+WORKING_BYTES = 28
+"""Of one pixel of a view in the making: float colours, disparity, flags, and parts of rows before they are joined."""
+BAND_BYTES = 16 << 20
+"""Of the candidates of one band of rows (synthesis.MOST_BAND_PIXELS)."""
 FARTHEST_VIEWS = 8
 
 
@@ -126,8 +130,10 @@ def _view_bytes(photo: Photo) -> int:
 
 
 def _generating_bytes(photo: Photo, inpainted_views: int) -> int:
-    """Memory for the ray set (the photo, its fringe, inpainted views) and the views in flight."""
-    return photo.size[0] * photo.size[1] * RAY_BYTES * (2 + inpainted_views) + 4 * _view_bytes(photo)
+    """Memory for the ray set (the photo, its fringe, inpainted views) and the views in flight, one a thread."""
+    pixels = photo.size[0] * photo.size[1]
+    at_work = (os.cpu_count() or 1) * (pixels * WORKING_BYTES + _view_bytes(photo) + BAND_BYTES)
+    return pixels * RAY_BYTES * (2 + inpainted_views) + at_work
 
 
 def _grid_for(parallax_px: float, view_bytes: int, budget: int) -> GridShape:
