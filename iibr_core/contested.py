@@ -84,7 +84,7 @@ def find_contested(
 ) -> Contested:
     """The contested rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
 
-    shown: disparity and source (N, W) of the heaviest candidates, as `look_up_colors` gives them. every: take all rays
+    shown: disparity and source (N, W) of the candidates that `lookup.heaviest` gives. every: take all rays
     near which anything lands, contested or not. hypotheses: K, at least 2.
     """
     first, last = rows

@@ -29,21 +29,30 @@ LEAST_TAP_WEIGHT = 0.3
 
 
 def look_up_colors(
-    rays: RaySet, candidates: Candidates, weights: FloatImage
+    rays: RaySet, candidates: Candidates, weights: FloatImage, wanted: NDArray[np.bool_] | None = None
 ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
     """Colours (N, W, 3), sRGB-encoded, of target rays; disparity (N, W) and source (N, W) of the heaviest candidates.
 
-    Rays without candidates are black at disparity 0 of source 0.
+    Rays without candidates, or not wanted (N, W), are black at disparity 0 of source 0.
     """
     shape = candidates.count.shape
     colors, disparity = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
     source = np.zeros(shape, np.uint8)
+    if wanted is None:
+        wanted = np.ones(shape, np.bool_)
     offsets, images, surfaces, _, near_edge, _, _ = rays.arrays
     _gather(
         images, surfaces, near_edge, np.array(candidates.offset) - offsets, candidates.first_row,
-        candidates.count, candidates.disparity, candidates.source, weights, colors, disparity, source,
+        candidates.count, candidates.disparity, candidates.source, weights, wanted, colors, disparity, source,
     )  # fmt: skip
     return colors, disparity, source
+
+
+def heaviest(candidates: Candidates, weights: FloatImage) -> tuple[FloatImage, NDArray[np.uint8]]:
+    """Disparity and source, each (N, W), of the heaviest candidates; 0 where there is none."""
+    disparity, source = np.zeros(candidates.count.shape, np.float32), np.zeros(candidates.count.shape, np.uint8)
+    _heaviest(candidates.count, candidates.disparity, candidates.source, weights, disparity, source)
+    return disparity, source
 
 
 @kernel
@@ -132,23 +141,23 @@ def look_up(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-unty
 @kernel
 def _gather(  # type: ignore[no-untyped-def]
     images, surfaces, near_edge, offsets, first_row,
-    count, candidate_disparity, candidate_source, weights, colors, disparity, source,
+    count, candidate_disparity, candidate_source, weights, wanted, colors, disparity, source,
 ):  # fmt: skip
     """What `look_up_colors` returns. offsets (S, 2): from each source to the target view."""
     _, height, width, _ = images.shape
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
             used = np.int64(count[row, x])
-            if used == 0:
+            if used == 0 or not wanted[row, x]:
                 continue
-            total, heaviest = 0.0, 0
+            total, heavy = 0.0, 0
             for k in range(used):
                 total += weights[k, row, x]
-                if weights[k, row, x] > weights[heaviest, row, x]:
-                    heaviest = k
-            disparity[row, x] = candidate_disparity[heaviest, row, x]
-            source[row, x] = candidate_source[heaviest, row, x]
-            sole = weights[heaviest, row, x] >= SOLE * total
+                if weights[k, row, x] > weights[heavy, row, x]:
+                    heavy = k
+            disparity[row, x] = candidate_disparity[heavy, row, x]
+            source[row, x] = candidate_source[heavy, row, x]
+            sole = weights[heavy, row, x] >= SOLE * total
             sum_r = sum_g = sum_b = 0.0
             for k in range(used):
                 w = weights[k, row, x] / total
@@ -173,3 +182,18 @@ def _gather(  # type: ignore[no-untyped-def]
             if not sole:
                 sum_r, sum_g, sum_b = srgb_scalar(sum_r), srgb_scalar(sum_g), srgb_scalar(sum_b)
             colors[row, x, 0], colors[row, x, 1], colors[row, x, 2] = sum_r, sum_g, sum_b
+
+
+@kernel
+def _heaviest(count, candidate_disparity, candidate_source, weights, disparity, source):  # type: ignore[no-untyped-def]
+    for row in range(count.shape[0]):
+        for x in range(count.shape[1]):
+            used = np.int64(count[row, x])
+            if used == 0:
+                continue
+            heavy = 0
+            for k in range(1, used):
+                if weights[k, row, x] > weights[heavy, row, x]:
+                    heavy = k
+            disparity[row, x] = candidate_disparity[heavy, row, x]
+            source[row, x] = candidate_source[heavy, row, x]

@@ -14,10 +14,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.candidates import find_candidates
+from iibr_core.candidates import Candidates, find_candidates
 from iibr_core.contested import HYPOTHESES, REACH_PX, Contested, decide, find_contested
 from iibr_core.inpaint.background import fill_background
-from iibr_core.lookup import OWN_SURFACE_PX, look_up_colors
+from iibr_core.lookup import OWN_SURFACE_PX, heaviest, look_up_colors
 from iibr_core.mixed_pixels import split_mixed_pixels
 from iibr_core.occlusion import entropy, occlusion_mask
 from iibr_core.rays import RaySet
@@ -129,19 +129,30 @@ class ViewSynthesis:
         above = min(rows[0], around)
         candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + around, rays.size[0])), self._slots)
         weights = closed_form_weights(candidates)
-        colors, disparity, source = look_up_colors(rays, candidates, weights)
         occluded = occlusion_mask(weights)
         inner = slice(above, above + rows[1] - rows[0])
         if self._transformer:
-            shown = disparity, source
-            contested = find_contested(
-                rays, candidates, weights, shown, (inner.start, inner.stop), self._every, self._hypotheses
-            )
-            at = contested.pixel[:, 0] - candidates.first_row, contested.pixel[:, 1]
-            decided = self._transformer(contested)
-            colors[at], disparity[at], source[at] = decide(rays, contested, decided)
+            colors, disparity, source = self._decided(rays, candidates, weights, inner)
+        else:
+            colors, disparity, source = look_up_colors(rays, candidates, weights)
         kept = (entropy(weights)[inner],) if self._keeps_entropy else ()
         return colors[inner], disparity[inner], source[inner], occluded[inner], *kept
+
+    def _decided(
+        self, rays: RaySet, candidates: Candidates, weights: FloatImage, inner: slice
+    ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
+        """What `look_up_colors` gives for the inner rows, but what contested rays show is the transformer's choice."""
+        assert self._transformer is not None
+        rows = inner.start, inner.stop
+        shown = heaviest(candidates, weights)
+        contested = find_contested(rays, candidates, weights, shown, rows, self._every, self._hypotheses)
+        at = contested.pixel[:, 0] - candidates.first_row, contested.pixel[:, 1]
+        wanted = np.zeros(candidates.count.shape, np.bool_)
+        wanted[inner] = True
+        wanted[at] = False
+        colors, disparity, source = look_up_colors(rays, candidates, weights, wanted)
+        colors[at], disparity[at], source[at] = decide(rays, contested, self._transformer(contested))
+        return colors, disparity, source
 
     def _band(self, rays: RaySet, offset: ViewOffset) -> Callable[[tuple[int, int]], tuple[NDArray[Any], ...]]:
         """What renders rows [first, last) of this view."""

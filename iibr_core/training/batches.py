@@ -17,7 +17,7 @@ from torch import Tensor
 from iibr_core.candidates import find_candidates
 from iibr_core.color import linear_from_srgb
 from iibr_core.contested import HYPOTHESES, REACH_PX, SHARE, Contested, find_contested, votes
-from iibr_core.lookup import look_up_colors
+from iibr_core.lookup import heaviest
 from iibr_core.rays import RaySet
 from iibr_core.synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.training.degrade import degrade
@@ -117,9 +117,8 @@ def contested_rays(
     above = min(rows[0], REACH_PX)
     candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + REACH_PX, rays.size[0])))
     weights = closed_form_weights(candidates)
-    _, disparity, source = look_up_colors(rays, candidates, weights)
     inner = above, above + rows[1] - rows[0]
-    return find_contested(rays, candidates, weights, (disparity, source), inner, every, hypotheses)
+    return find_contested(rays, candidates, weights, heaviest(candidates, weights), inner, every, hypotheses)
 
 
 def _seen(scene: Scene, rays: RaySet, contested: Contested, choice: RayChoice) -> Rays:
