@@ -19,11 +19,13 @@ Lines = NDArray[np.float64]
 
 
 def line_of(point: ArrayLike, direction: ArrayLike) -> Lines:
-    """The lines through points (N, 3) along directions (N, 3). Raises ValueError for a direction without length."""
+    """The lines through points (N, 3) along directions (N, 3). Raises ValueError for a direction without length, or
+    one that is not finite.
+    """
     d = np.asarray(direction, np.float64)
     length = np.linalg.norm(d, axis=-1, keepdims=True)
-    if not (length > 0).all():
-        raise ValueError("a direction has no length")
+    if not ((length > 0) & (length < np.inf)).all():
+        raise ValueError("a direction has no length, or an infinite one")
     d = d / length
     return np.concatenate([d, np.cross(np.asarray(point, np.float64), d)], axis=-1)
 

@@ -96,7 +96,9 @@ class Disparity:
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.values).all():
-            raise InputError(f"{self.source}: holds disparities that are NaN, infinite or too large; fill or scale them")
+            raise InputError(
+                f"{self.source}: holds disparities that are NaN, infinite or too large; fill or scale them"
+            )
 
 
 @dataclass(frozen=True, eq=False)

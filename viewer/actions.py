@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from iibr_core.types import ViewOffset
+from viewer.depth_work import DepthEdit
 from viewer.inspection import InspectionEdit
 from viewer.presets import PresetName
 from viewer.state import (
@@ -16,6 +17,7 @@ from viewer.state import (
     Notice,
     Progress,
     Prompt,
+    Saved,
     SavedSettings,
     Scene,
     Section,
@@ -282,7 +284,9 @@ class AskForPath:
 
 @dataclass(frozen=True)
 class AskToSave:
-    """Ask where to save the picture."""
+    """Ask where to save the picture, or its disparity map."""
+
+    what: Saved = "picture"
 
 
 @dataclass(frozen=True)
@@ -366,6 +370,7 @@ Action = (
     | WorkerNews
     | SettingsEdit
     | InspectionEdit
+    | DepthEdit
     | ShowTiltHandles
     | SetDepthStrength
     | TakeSettings

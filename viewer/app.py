@@ -23,6 +23,9 @@ from viewer.actions import (
     WorkerLost,
 )
 from viewer.apply import apply
+from viewer.depth_preview import DepthPreview
+from viewer.depth_work import DepthWork, DropStroke
+from viewer.depth_work_edits import is_depth_ahead, work_asked_for
 from viewer.errands import Errands
 from viewer.gpu.context import create_for_window
 from viewer.input import (
@@ -96,6 +99,7 @@ class App:
             raise
         self.stage = Stage(self._gl)
         self.table = LightTable(self._gl, self.stage)
+        self._depth = DepthPreview(self.stage)
         self._second_look = SecondLook(wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._worker = Worker(wake)
@@ -103,6 +107,7 @@ class App:
         self._kept_in = kept_in
         self._kept_recent = self.state.recent
         self._submitted = 0
+        self._work = DepthWork()
         self._stopped: int | None = None
         self._stepped_at = 0.0
         self._shown: Frame | None = None
@@ -120,6 +125,7 @@ class App:
         heard = self._drained() + self._dropped() + self._happened()
         self.do(*heard)
         self._is_busy = self.stage.upload(UPLOAD_BUDGET_S) or bool(heard)
+        self._preview_depth()
         layout, look = self.layout(), self.look()
         picture = self.stage.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
         if picture and self.stage.report != self.state.report:
@@ -253,8 +259,20 @@ class App:
             return
         scene = self.state.scene
         loaded = self.stage.loaded if scene and scene.source is self.state.source else None
-        self._submitted = self.state.generation
-        self._worker.submit(Request(self.state.generation, self.state.source, self.state.depth_strength, loaded))
+        if self.state.stroke is not None:
+            return  # it will be another one
+        self._submitted, self._work = self.state.generation, work_asked_for(self.state)
+        strength = self.state.depth_strength
+        self._worker.submit(Request(self.state.generation, self.state.source, strength, loaded, self._work))
+
+    def _preview_depth(self) -> None:
+        """While depth is edited, show it; the views of what it was before need not be made."""
+        if is_depth_ahead(self.state, self._work):
+            self._worker.cancel()
+        try:
+            self._depth.update(self.state)
+        except InputError as error:
+            self.do(Notify(Notice(str(error), is_error=True)), DropStroke())
 
     def _keep_recent(self) -> None:
         """At once: they are what one misses after a crash."""

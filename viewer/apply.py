@@ -46,6 +46,8 @@ from viewer.actions import (
     WorkerLost,
     WorkerNews,
 )
+from viewer.depth_work import DepthEdit
+from viewer.depth_work_edits import depth_edited, stroke_ended
 from viewer.history import gesture_ended, recorded, redone, undone
 from viewer.inspection import InspectionEdit
 from viewer.inspection_edits import divider_released, inspected, pointed_at
@@ -60,6 +62,7 @@ from viewer.state import (
     PathPrompt,
     Preferences,
     Progress,
+    Saved,
     SavedSettings,
     SavePrompt,
     TiltHandles,
@@ -84,6 +87,8 @@ def apply(state: AppState, action: Action) -> AppState:
         return heard(state, action)
     if isinstance(action, InspectionEdit):
         return inspected(state, action)
+    if isinstance(action, DepthEdit):
+        return depth_edited(state, action)
     if isinstance(action, SettingsEdit):
         return replace(state, preferences=_preferences_edited(state.preferences, action))
     match action:
@@ -92,7 +97,7 @@ def apply(state: AppState, action: Action) -> AppState:
         case TakeSettings(settings):
             return recorded(state, _settings_taken(state, settings), "TakeSettings")
         case EndGesture():
-            return divider_released(gesture_ended(state))
+            return divider_released(gesture_ended(stroke_ended(state)))
         case Undo():
             return undone(state)
         case Redo():
@@ -122,8 +127,9 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, prompt=prompt)
         case AskForPath(what):
             return replace(state, prompt=PathPrompt(what))
-        case AskToSave() if state.scene is not None:
-            return replace(state, prompt=SavePrompt(_path_beside(state), (state.scene.width, state.scene.height)))
+        case AskToSave(what) if state.scene is not None and (what == "picture" or state.scene.plan is not None):
+            size_px = state.scene.width, state.scene.height
+            return replace(state, prompt=SavePrompt(_path_beside(state, what), size_px, what=what))
         case PictureDrawn(report):
             return replace(state, report=report)
         case SetHover(hover):
@@ -197,9 +203,14 @@ def _preferences_edited(preferences: Preferences, action: SettingsEdit) -> Prefe
     return preferences
 
 
-def _path_beside(state: AppState) -> str:
-    """Where the picture is saved unless the user says otherwise: beside the photo."""
+def _path_beside(state: AppState, what: Saved) -> str:
+    """Where it is saved unless the user says otherwise: beside the photo. A map is found there the next time, unless
+    one was given for it.
+    """
     assert state.source is not None
     assert state.scene is not None
-    path = PurePath(state.source.path)
-    return str(path.parent / f"{state.scene.name}-iibr.png")
+    path, origin = PurePath(state.source.path), state.scene.depth_origin
+    ending = "-iibr.png" if what == "picture" else "_disparity.pfm"
+    if what == "map" and origin is not None and origin.kind == "file":
+        ending = "-edited.pfm"
+    return str(path.parent / f"{state.scene.name}{ending}")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from iibr_core.depth.edit import UNEDITED
 from iibr_core.depth.origin import DepthChoice
 from iibr_core.types import DEFAULT_QUALITY, GridShape, InputError, Quality, ViewOffset
 from viewer.bench_command import bench
@@ -79,6 +80,8 @@ def main() -> None:
         _end(str(error.format_message()) + " (--help tells more)", EXIT_BAD_INPUT)
     except InputError as error:
         _end(str(error), EXIT_BAD_INPUT)
+    except MemoryError as error:
+        _end(f"out of memory ({error}): lower --max-pixels, or the --grid", EXIT_BAD_INPUT)
     except (KeyboardInterrupt, typer.Abort):
         _end("interrupted", EXIT_INTERRUPTED)
 
@@ -245,11 +248,13 @@ def screenshot(
     from viewer.saving import is_float, write_picture
 
     actions: list[Action] = []
+    edits = UNEDITED
     if like is not None:
         saved, given = read_settings(like), given_options(context)
         source = decided_like(source, saved, given)
         size = size or (None if ui else Size(*saved.size_px))
         depth_strength = depth_strength if "depth_strength" in given else saved.depth_strength
+        edits = saved.depth_edits
         actions.append(TakeSettings(saved))
     actions += [] if view is None else [MoveEye(view)]
     actions += [] if focus is None else [SetFocus(focus)]
@@ -258,7 +263,8 @@ def screenshot(
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
         with progress_shown("reading") as show:
-            viewer.open(source, depth_strength, lambda progress: show(progress.done, progress.total, progress.doing))
+            tell = lambda progress: show(progress.done, progress.total, progress.doing)  # noqa: E731
+            viewer.open(source, depth_strength, tell, edits)
         if viewer.state.scene is not None:
             print_depth(viewer.state.scene.depth_origin)
             print_notes(viewer.state.scene.notes)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from iibr_core.depth.edit import BRUSH_TOOLS, BrushTool
 from viewer.actions import (
     Action,
     ApplyPreset,
@@ -23,6 +24,7 @@ from viewer.actions import (
     StopWork,
     Undo,
 )
+from viewer.depth_work import ResetDepth, SetBrush, SetTone
 from viewer.inspection import (
     COMPARISONS,
     OVERLAYS,
@@ -43,6 +45,7 @@ COMPARE_WORDS: dict[Comparison, str] = {
     "quality": "Compare fast and exact",
     "truth": "Compare with ground truth",
 }
+BRUSH_WORDS: dict[BrushTool, str] = {"nearer": "Nearer", "farther": "Farther", "smooth": "Smooth"}
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
 
 
@@ -94,6 +97,19 @@ def _comparison_toggled(kind: Comparison) -> Callable[[AppState], Action]:
     return lambda state: Compare(None if state.inspection.comparison == kind else kind)
 
 
+def _brush_toggled(state: AppState) -> Action:
+    return SetBrush(replace(state.brush, is_on=not state.brush.is_on))
+
+
+def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
+    return lambda state: SetBrush(replace(state.brush, tool=tool, is_on=True))
+
+
+def _inverted(state: AppState) -> Action:
+    edits = state.depth.edits
+    return SetTone(replace(edits, is_inverted=not edits.is_inverted), is_finished=True)
+
+
 COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
     Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
@@ -107,6 +123,13 @@ COMMANDS: tuple[Command, ...] = (
     Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
     Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
+    Command("Depth brush", _brush_toggled, (Chord("b"),)),
+    *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
+    Command("Invert depth", _inverted),
+    Command("Reset depth edits", _always(ResetDepth())),
+    Command("Open a depth map…", _always(DoTask(ChooseTask("map")))),
+    Command("Open a depth model…", _always(DoTask(ChooseTask("model")))),
+    Command("Save the depth map…", _always(AskToSave("map"))),
     Command("EPI strips", lambda s: ShowEpis(not s.inspection.shows_epis), (Chord("e"),)),
     Command("All views", lambda s: ShowGrid(not s.inspection.shows_grid), (Chord("g"),)),
     Command("Values under the pointer", lambda s: ShowValues(not s.inspection.shows_values), (Chord("v"),)),

@@ -12,7 +12,21 @@ UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first it finds."""
 
 PHOTO_SUFFIXES = "*.jpg *.jpeg *.png *.tif *.tiff *.exr *.hdr *.webp *.bmp *.heic"
-MASK_SUFFIXES = "*.png *.jpg *.jpeg *.tif *.tiff *.bmp *.exr"
+FILE_KINDS: dict[ChoiceOf, str] = {
+    "photo": PHOTO_SUFFIXES,
+    "mask": "*.png *.jpg *.jpeg *.tif *.tiff *.bmp *.exr",
+    "map": "*.pfm *.exr *.npy *.png *.tif *.tiff",
+}
+"""What is no folder."""
+
+DIALOG_TITLES: dict[ChoiceOf, str] = {
+    "photo": "Open a photo",
+    "folder": "Open a folder of views",
+    "mask": "Aperture image",
+    "truth": "Ground truth: a folder of views",
+    "map": "Open a disparity map for this photo",
+    "model": "Open the folder of a depth model",
+}
 
 
 def has_dialogs() -> bool:
@@ -28,12 +42,11 @@ class Dialog:
 
         self.what = what
         self._dialog: Any
-        if what in ("folder", "truth"):
-            title = "Open a folder of views" if what == "folder" else "Ground truth: a folder of views"
-            self._dialog = dialogs.select_folder(title)
+        kinds = FILE_KINDS.get(what)
+        if kinds is None:
+            self._dialog = dialogs.select_folder(DIALOG_TITLES[what])
         else:
-            title, kinds = ("Open a photo", PHOTO_SUFFIXES) if what == "photo" else ("Aperture image", MASK_SUFFIXES)
-            self._dialog = dialogs.open_file(title, filters=["Images", kinds, "All files", "*"])
+            self._dialog = dialogs.open_file(DIALOG_TITLES[what], filters=["Images", kinds, "All files", "*"])
 
     def answer(self) -> str | None:
         """The path chosen, "" where the user chose none; None while it is open."""

@@ -6,32 +6,46 @@ from dataclasses import replace
 from pathlib import Path
 
 from iibr_core.types import InputError
-from viewer.actions import Action, AskForPath, DoTask, Notify, OpenPath, SetApertureShape, ShowPrompt, TaskTaken
+from viewer.actions import Action, AskForPath, DismissNotice, Notify, SetApertureShape, ShowPrompt, TaskTaken
+from viewer.choices import chosen
 from viewer.dialogs import Dialog, has_dialogs
 from viewer.inspection import GroundTruth, TruthRead
-from viewer.saving import AlreadyThereError, save_picture
+from viewer.saving import AlreadyThereError, save_map, save_picture
 from viewer.stage import Stage
-from viewer.state import AppState, ChooseTask, Notice, ReadMaskTask, ReadTruthTask, SavePrompt, SaveTask, Source, Task
+from viewer.state import AppState, ChooseTask, Notice, ReadMaskTask, ReadTruthTask, SavePrompt, SaveTask, Task
+
+LARGE_PIXELS = 4_000_000
+"""Of a picture: saving it then takes seconds."""
+
+TURNS_ANNOUNCED = 4
+"""ImGui lays out in two frames; so many turns later a notice is on the screen for certain."""
 
 
 class Errands:
-    """Carries out tasks in the window's thread; the one that takes long, a file dialog, is asked again each turn."""
+    """Carries out tasks in the window's thread; the one that takes long, a file dialog, is asked again each turn.
+
+    A large picture is announced first: while it is drawn and written the window stands still.
+    """
 
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
         self._dialog: Dialog | None = None
+        self._announced: tuple[SaveTask, int] | None = None
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a dialog is open."""
-        return self._dialog is not None
+        """Whether a dialog is open, or a notice must be seen first."""
+        return self._dialog is not None or self._announced is not None
 
     def run(self, state: AppState) -> list[Action]:
         """Take up the state's tasks and say what came of them, and of a dialog that was closed."""
-        actions = self._answered()
+        actions = self._answered(state)
         for task in state.tasks:
             if isinstance(task, ReadTruthTask) and not is_scene_open(state):
                 continue  # what it must fit is not known yet
+            if isinstance(task, SaveTask) and self._must_announce(task):
+                actions.append(Notify(saving_notice(task)))
+                continue
             actions += [TaskTaken(task), *self._done(task, state)]
         return actions
 
@@ -47,28 +61,46 @@ class Errands:
             case ReadTruthTask(path):
                 return _truth_read(path)
             case SaveTask():
-                return self._saved(task, state)
+                self._announced = None
+                return [DismissNotice(saving_notice(task)), *self._saved(task, state)]
+
+    def _must_announce(self, task: SaveTask) -> bool:
+        """Whether the notice about it has not been on the screen for some turns."""
+        if task.what == "map" or task.size_px[0] * task.size_px[1] < LARGE_PIXELS:
+            return False
+        turns = self._announced[1] + 1 if self._announced is not None and self._announced[0] == task else 0
+        self._announced = task, turns
+        return turns < TURNS_ANNOUNCED
 
     def _saved(self, task: SaveTask, state: AppState) -> list[Action]:
         if state.scene is None:
             return []
         try:
+            if task.what == "map":
+                if self._stage.generation != state.generation:
+                    return [Notify(Notice("The map is still being made; save it again in a moment."))]
+                return [Notify(Notice(save_map(self._stage, task)))]
             path = save_picture(self._stage, state, task)
         except AlreadyThereError:
-            return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True))]
+            return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, what=task.what))]
         except InputError as error:
             return [Notify(Notice(str(error), is_error=True))]
         return [Notify(Notice(f"Saved {path}"))]
 
-    def _answered(self) -> list[Action]:
+    def _answered(self, state: AppState) -> list[Action]:
         answer = self._dialog.answer() if self._dialog is not None else None
         if self._dialog is None or answer is None:
             return []
         what, self._dialog = self._dialog.what, None
         if not answer:
             return []
-        tasks: dict[str, Task] = {"mask": ReadMaskTask(answer), "truth": ReadTruthTask(answer)}
-        return [DoTask(tasks[what]) if what in tasks else OpenPath(Source(answer))]
+        return [chosen(what, answer, state)]
+
+
+def saving_notice(task: SaveTask) -> Notice:
+    """Shown while a large picture is saved."""
+    width, height = task.size_px
+    return Notice(f"Drawing and writing {width} × {height} px; the window stands still for a while.")
 
 
 def is_scene_open(state: AppState) -> bool:

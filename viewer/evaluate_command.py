@@ -53,7 +53,9 @@ def evaluate(
     max_pixels: MaxPixels = None,
     lpips: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="LPIPS too, with torchvision's AlexNet from here.", show_default=False),
+        typer.Option(
+            metavar="DIR", help="LPIPS too: its alex.pth and torchvision's alexnet-*.pth.", show_default=False
+        ),
     ] = None,
 ) -> None:
     """Judge views against data sets whose true views are known, beside a plain warp and beside doing nothing.

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.depth.edit import UNEDITED, DepthEdits
 from viewer.actions import Action, OpenPath, ProgressMade, SceneOpened
 from viewer.apply import apply
+from viewer.depth_work import DepthWork
 from viewer.gpu.context import Backend, create_headless
 from viewer.inquiry import NO_AIDS, Aids, beside_of, wanted_inquiry
 from viewer.inspection import Probed
@@ -55,17 +58,28 @@ class HeadlessViewer:
         """Whether `screen` works here: ImGui's own OpenGL loader finds no functions in OSMesa."""
         return self._gl.backend != "osmesa"
 
-    def open(self, source: Source, depth_strength: float, on_progress: Callable[[Progress], None]) -> None:
-        """Read and plan the scene and make all its views, telling how far it is. Raises InputError."""
+    def open(
+        self,
+        source: Source,
+        depth_strength: float,
+        on_progress: Callable[[Progress], None],
+        edits: DepthEdits = UNEDITED,
+    ) -> None:
+        """Read and plan the scene, its depth edited so, and make all its views, telling how far it is.
+
+        Raises InputError.
+        """
         self.state = AppState(depth_strength=depth_strength)
         self.do(OpenPath(source))
         on_progress(self.state.progress)
-        request = Request(self.state.generation, source, depth_strength)
+        work = DepthWork(source.refine, edits)
+        request = Request(self.state.generation, source, depth_strength, work=work)
         for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
             if isinstance(result, SceneReady):
                 self._stage.open(result)
                 self._table.open()
                 self.do(SceneOpened(result.generation, result.scene))
+                self.state = replace(self.state, depth=work)
             else:
                 self._stage.add(result.view)
                 self._table.add(result.view)

@@ -12,7 +12,7 @@ EDITS_KEPT = 200
 
 def edit_of(state: AppState) -> Edit:
     """What undo would bring back if something else took its place."""
-    return Edit(state.optics, state.depth_strength)
+    return Edit(state.optics, state.depth_strength, state.depth)
 
 
 def recorded(before: AppState, after: AppState, kind: str, always: bool = False) -> AppState:
@@ -62,12 +62,14 @@ def mapped(history: History, carried: Callable[[Optics], Optics]) -> History:
 
 
 def _restored(state: AppState, edit: Edit, history: History) -> AppState:
-    """Other depth strength needs a new field, which then brings the optics along."""
-    restarts = edit.depth_strength != state.depth_strength and state.source is not None
+    """Other depth needs a new field, which then brings the optics along."""
+    is_same_depth = (edit.depth_strength, edit.depth) == (state.depth_strength, state.depth)
+    restarts = not is_same_depth and state.source is not None
     return replace(
         state,
         optics=edit.optics,
         depth_strength=edit.depth_strength,
+        depth=edit.depth,
         generation=state.generation + restarts,
         motion=Motion(speed=state.motion.speed),
         history=history,

@@ -23,12 +23,13 @@ from viewer.actions import (
     ShowPrompt,
 )
 from viewer.commands import BY_NAME, COMMANDS, Chord
+from viewer.depth_work import DropStroke, Paint, SetBrush
 from viewer.focal_plane import handle_points, place_of
 from viewer.inquiry import view_at
 from viewer.inspection import MoveDivider, ShowGrid
 from viewer.layout import Layout, Rect, pixel_at
 from viewer.limits import focus_limits
-from viewer.state import CENTRE, AppState, Hover, ReadTruthTask, Scene, Source
+from viewer.state import CENTRE, AppState, Hover, ReadTruthTask, Scene, Source, source_beside, source_with_map
 
 DRAG_THRESHOLD = 4.0
 """A press that moved farther than this (window units) is a drag, not a click."""
@@ -38,6 +39,9 @@ DRAG_ACROSS_GRID = 0.6
 
 FOCUS_STEPS = 40
 """Notches of the wheel from the nearest focus to the farthest."""
+
+BRUSH_NOTCH = 1.15
+"""A notch of the wheel makes the brush so many times as large."""
 
 ARROW_STEP_VIEWS = 0.5
 HANDLE_REACH = 14.0
@@ -88,6 +92,8 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
         return []
     if state.inspection.shows_grid:
         return _on_sheet(pointer, layout, scene, picture)
+    if is_brushing(state):
+        return _brushed(pointer, layout, state, scene, picture, pick)
     if pointer.wheel and picture.contains(pointer.x, pointer.y):
         low, high = focus_limits(scene)
         return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
@@ -123,7 +129,7 @@ def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: 
     is_pointing = (
         not pointer.is_over_panel
         and not state.inspection.shows_grid
-        and not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD)
+        and (is_brushing(state) or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
     )
     if scene is not None and picture is not None and is_pointing and picture.contains(pointer.x, pointer.y):
         x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
@@ -145,9 +151,13 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
 
 
 def _closed(state: AppState) -> Action:
-    """What Esc closes: a prompt, the sheet of views, then the program."""
+    """What Esc closes: a prompt, the sheet of views, a stroke, the brush, then the program."""
     if state.prompt is not None:
         return ShowPrompt(None)
+    if state.stroke is not None:
+        return DropStroke()
+    if state.brush.is_on and not state.inspection.shows_grid:
+        return SetBrush(replace(state.brush, is_on=False))
     return ShowGrid(False) if state.inspection.shows_grid else Quit()
 
 
@@ -160,13 +170,32 @@ def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bo
         return [DoTask(ReadTruthTask(paths[0]))]
     maps = [path for path in paths if PurePath(path).suffix.lower() in DISPARITY_SUFFIXES]
     others = [path for path in paths if path not in maps]
-    base = state.source or Source("")
-    disparity = maps[0] if maps else None
     if others:
-        return [OpenPath(replace(base, path=others[0], disparity_path=disparity, focus_disparity=None))]
+        source = source_beside(state.source, others[0])
+        return [OpenPath(source_with_map(source, maps[0]) if maps else source)]
     if maps and state.source:
-        return [OpenPath(replace(state.source, disparity_path=disparity, focus_disparity=None))]
+        return [OpenPath(source_with_map(state.source, maps[0]))]
     return [OpenPath(Source(path)) for path in maps[:1]]
+
+
+def is_brushing(state: AppState) -> bool:
+    """Whether dragging over the picture paints."""
+    return state.brush.is_on and state.scene is not None and state.scene.plan is not None
+
+
+def _brushed(
+    pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
+) -> list[Action]:
+    """Paint on the surface under the pointer, wherever it lies in the photo; the wheel makes the brush larger."""
+    if pointer.wheel and picture.contains(pointer.x, pointer.y):
+        return [SetBrush(replace(state.brush, radius=state.brush.radius * BRUSH_NOTCH**pointer.wheel))]
+    begins = pointer.is_pressed and picture.contains(pointer.pressed_x, pointer.pressed_y)
+    if not pointer.is_down or not (begins or state.stroke is not None):
+        return []
+    x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+    disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
+    x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
+    return [Paint(((x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height))]
 
 
 def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:

@@ -31,11 +31,14 @@ INPAINTED_RGB = (255, 184, 60)
 
 @dataclass(frozen=True)
 class _Base:
-    """What images depend on: the field, how many of its views are there, brightness as a factor."""
+    """What images depend on: the field, how many of its views are there, brightness as a factor, how often edited depth
+    was shown in its place.
+    """
 
     generation: int
     views: int
     exposure: float
+    previews: int
 
 
 class LightTable:
@@ -67,9 +70,11 @@ class LightTable:
         scene, field = state.scene, self._stage.renderer.field
         if scene is None or field is None or layout.picture_px is None or not field.present.any():
             return NO_AIDS
-        if field.grid != scene.grid:
-            return NO_AIDS  # only the first view is there yet
-        base = _Base(self._stage.generation, self._stage.views_present, 2.0**state.optics.exposure_stops)
+        exposure = 2.0**state.optics.exposure_stops
+        base = _Base(self._stage.generation, self._stage.views_present, exposure, self._stage.previews)
+        if field.grid != scene.grid:  # only the photo's own view is there, or what is being done to its depth
+            overlay = self._overlay(state, scene, field, layout.picture_px[2:], base)
+            return Aids(overlay=overlay, shown=(self._drawn["overlay"][0],) if overlay else ())
         names = self._strips(state, scene, field, layout, base)
         names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
         names["overlay"] = self._overlay(state, scene, field, layout.picture_px[2:], base)
@@ -163,9 +168,9 @@ class LightTable:
         self, state: AppState, scene: Scene, field: LightFieldTexture, size_px: tuple[int, int], base: _Base
     ) -> int | None:
         kind, optics = state.inspection.overlay, state.optics
-        row, column = view_near(optics.eye, scene.grid)
+        row, column = view_near(optics.eye, field.grid)
         view: ViewIndex = tuple(nearest_present(field.present)[row, column].tolist())
-        if kind is None or not field.has_disparity[view]:
+        if kind is None or not field.has_disparity[view] or (kind != "disparity" and field.grid != scene.grid):
             return None
         values: NDArray[np.uint8] | None = None
         looked_up = None

@@ -10,6 +10,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any, get_args
 
+from iibr_core.depth.edit import UNEDITED, DepthEdits, Stroke, require_sound
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 from viewer.limits import is_finite
 from viewer.state import APERTURE_KINDS, ApertureMask, ApertureShape, Optics, SavedSettings, Source
@@ -34,6 +35,8 @@ def settings_text(settings: SavedSettings) -> str:
         "source": decided,
         "size_px": settings.size_px,
     }
+    if settings.depth_edits != UNEDITED:
+        whole["depth_edits"] = dataclasses.asdict(settings.depth_edits)
     return json.dumps(whole, separators=(",", ":"), allow_nan=False)
 
 
@@ -47,9 +50,9 @@ def settings_from_text(text: str, name: str) -> SavedSettings:
         if whole["format"] != FORMAT:
             raise InputError(f"{name}: its settings have format {whole['format']!r}, this program reads {FORMAT}")
         width, height = (_whole_number(side, 1, 1_000_000) for side in whole["size_px"])
-        settings = SavedSettings(
-            _optics(whole["optics"]), _number(whole["depth_strength"]), _source(whole["source"]), (width, height)
-        )
+        optics, source = _optics(whole["optics"]), _source(whole["source"])
+        edits = _depth_edits(whole.get("depth_edits"))
+        settings = SavedSettings(optics, _number(whole["depth_strength"]), source, (width, height), edits)
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
@@ -136,6 +139,25 @@ def _source(fields: dict[str, Any]) -> Source:
         raise ValueError(f"quality {quality!r}")
     scale, refine = _number(fields["disparity_scale"]), _number(fields.get("refine", 1.0))
     return Source("", None, scale, grid, focus, most, memory, quality, refine=refine)
+
+
+def _depth_edits(fields: dict[str, Any] | None) -> DepthEdits:
+    """Raises InputError where they make no sense."""
+    if fields is None:
+        return UNEDITED
+    strokes = tuple(
+        Stroke(
+            stroke["tool"],
+            tuple((_number(x), _number(y)) for x, y in stroke["points"]),
+            _number(stroke["radius"]),
+            _number(stroke["strength"]),
+        )
+        for stroke in fields["strokes"]
+    )
+    numbers = {name: _number(fields[name]) for name in ("far_clip", "near_clip", "gamma")}
+    edits = DepthEdits(bool(fields["is_inverted"]), strokes=strokes, **numbers)
+    require_sound(edits)
+    return edits
 
 
 def _number(value: Any) -> float:

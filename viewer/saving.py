@@ -26,8 +26,36 @@ class AlreadyThereError(InputError):
 def settings_of(state: AppState, size_px: tuple[int, int]) -> SavedSettings:
     """What it takes to take the present picture again. size_px: (width, height)."""
     assert state.source is not None
-    source = replace(state.source, path="", disparity_path=None)
-    return SavedSettings(state.optics, state.depth_strength, source, size_px)
+    source = replace(state.source, path="", disparity_path=None, refine=state.depth.refine)
+    return SavedSettings(state.optics, state.depth_strength, source, size_px, state.depth.edits)
+
+
+def save_map(stage: Stage, task: SaveTask) -> str:
+    """Write the disparity map of the scene on the stage, edits included, in px per view step as given.
+
+    Returns a sentence for people. Raises AlreadyThereError, and InputError as `write_map` does and where there is none.
+    """
+    from iibr_core.formats.map_file import write_map
+
+    path = _path_of(task, ".pfm")
+    if stage.loaded is None:
+        raise InputError(f"{path}: this scene has no disparity map of its own")
+    _require_leave(path, task)
+    note = write_map(path, stage.loaded.disparity.values)
+    return f"Saved {path}. {note}".strip()
+
+
+def _path_of(task: SaveTask, suffix: str) -> Path:
+    """The path asked for; with this suffix where it has none."""
+    path = Path(task.path.strip()).expanduser()
+    if not path.name:
+        raise InputError(f"no file name was given: write one that ends in {suffix}")
+    return path if path.suffix else path.with_name(f"{path.name}{suffix}")
+
+
+def _require_leave(path: Path, task: SaveTask) -> None:
+    if path.exists() and not task.may_replace:
+        raise AlreadyThereError(f"{path}: there is a file of this name already")
 
 
 def save_picture(stage: Stage, state: AppState, task: SaveTask) -> Path:
@@ -35,15 +63,10 @@ def save_picture(stage: Stage, state: AppState, task: SaveTask) -> Path:
 
     Raises AlreadyThereError, and InputError for other endings, sizes beyond the graphics card, and unwritable places.
     """
-    path = Path(task.path.strip()).expanduser()
-    if not path.name:
-        raise InputError("no file name was given: write one that ends in .png or .exr")
-    if not path.suffix:
-        path = path.with_name(f"{path.name}.png")
+    path = _path_of(task, ".png")
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: can be written as .png or .exr only")
-    if path.exists() and not task.may_replace:
-        raise AlreadyThereError(f"{path}: there is a file of this name already")
+    _require_leave(path, task)
     write_picture(path, drawn_pixels(stage, state, task.size_px, is_float(path)), state, task.size_px)
     return path
 

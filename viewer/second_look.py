@@ -20,7 +20,8 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.plan import ScenePlan, plan_literal
 from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
 from viewer.inquiry import Inquiry
-from viewer.worker import Loaded, message_of
+from viewer.loaded import Loaded
+from viewer.worker import message_of
 
 if TYPE_CHECKING:
     from iibr_core.rays import RaySet

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.renderer import Renderer
+from viewer.loaded import Loaded
 from viewer.picking import is_kept_for_picking, pick_disparity
-from viewer.state import AppState, DrawReport, Picture, Scene
-from viewer.worker import Loaded, SceneReady
+from viewer.state import CENTRE, AppState, DrawReport, Picture, Scene
+from viewer.worker import SceneReady
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
@@ -36,7 +37,8 @@ PREVIEW_GRID = GridShape(1, 1)
 class Stage:
     """Holds the renderer and the views of the scene that is shown.
 
-    generation: whose views these are. views_present: uploaded so far. pictures_drawn: how often the picture was drawn.
+    generation: whose views these are. previews: of edited depth shown so far. views_present: uploaded so far.
+    pictures_drawn: how often the picture was drawn.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -46,8 +48,10 @@ class Stage:
         self.loaded: Loaded | None = None
         self.views_present = 0
         self.pictures_drawn = 0
+        self.previews = 0
         self._scene: Scene | None = None
-        self._preview: ViewUpdate | None = None
+        self._centre: ViewUpdate | None = None
+        self._is_preview = False
         self._waiting: deque[ViewUpdate] = deque()
         self._disparities: dict[ViewOffset, FloatImage] = {}
         self._drawn: Picture | None = None
@@ -62,11 +66,30 @@ class Stage:
         scene = ready.scene
         self._open_field(scene, PREVIEW_GRID)
         self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
-        self.generation, self.loaded, self._scene, self._preview = ready.generation, ready.loaded, scene, ready.centre
+        self.generation, self.loaded, self._scene, self._centre = ready.generation, ready.loaded, scene, ready.centre
+        self._is_preview = True
         self.views_present = 1
         self._waiting.clear()
         self._disparities.clear()
         self._keep_for_picking(scene, ready.centre)
+
+    def show_disparity(self, disparity: FloatImage) -> None:
+        """Show the photo warped by this field disparity (H, W) in place of its views, until those of a new plan come.
+
+        Raises InputError where the graphics card has no room.
+        """
+        scene, centre, field = self._scene, self._centre, self.renderer.field
+        assert scene is not None
+        assert centre is not None
+        assert field is not None
+        far, near = field.range_px
+        if not self._is_preview or disparity.min() < far or disparity.max() > near:
+            self._open_field(scene, PREVIEW_GRID)
+            self.views_present, self._is_preview = 1, True
+            self._waiting.clear()
+        self.renderer.upload_view(0, 0, centre.colors, disparity)
+        self._disparities = {CENTRE: disparity}
+        self.previews += 1
 
     def add(self, view: ViewUpdate) -> None:
         """Take a view of the present scene; it is uploaded later. Raises InputError where they do not fit all."""
@@ -74,10 +97,10 @@ class Stage:
         assert scene is not None
         if (view.row, view.column) == scene.grid.centre:
             return  # there since the scene was opened
-        if self._preview is not None:
+        if self._is_preview and self._centre is not None:
             self._open_field(scene, scene.grid)
-            self.renderer.upload_view(*scene.grid.centre, self._preview.colors, self._preview.disparity)
-            self._preview = None
+            self.renderer.upload_view(*scene.grid.centre, self._centre.colors, self._centre.disparity)
+            self._is_preview = False
         self._waiting.append(view)
         self._view_came_at = time.perf_counter()
         self._keep_for_picking(scene, view)
@@ -121,7 +144,7 @@ class Stage:
         """Draw the picture this state asks for, unless it is there already; return its record, None without views."""
         if self.views_present == 0:
             return None
-        wanted = Picture(self.generation, self.views_present, state.optics, size_px)
+        wanted = Picture(self.generation, self.views_present, state.optics, size_px, previews=self.previews)
         budget_s = self._gl.frame_budget_s
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)

@@ -5,15 +5,18 @@ Comparing two records decides what an edit costs: a new `generation` restarts th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from iibr_core.depth.edit import UNEDITED, DepthEdits, Levels, Stroke
 from iibr_core.depth.origin import DepthOrigin, DepthStart
 from iibr_core.plan import ScenePlan
 from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
+from viewer.depth_work import Brush, DepthWork
 from viewer.inspection import Inspection
 
 CENTRE = ViewOffset(0.0, 0.0)
+AS_FOUND = DepthWork()
 
 
 ApertureKind = Literal["disc", "polygon", "ring", "cat_eye", "mask"]
@@ -92,6 +95,23 @@ class Source:
     refine: float = 1.0
 
 
+def source_beside(source: Source | None, path: str) -> Source:
+    """To open another file: what was decided about the one before counts, but for what belongs to its depth map."""
+    base = source or Source("")
+    return replace(base, path=path, disparity_path=None, disparity_scale=1.0, focus_disparity=None)
+
+
+def source_with_map(source: Source, path: str) -> Source:
+    """The same photo with this disparity map."""
+    return replace(source, disparity_path=path, disparity_scale=1.0, focus_disparity=None, depth_start="auto")
+
+
+def source_with_depth(source: Source, start: DepthStart, model: str | None = None) -> Source:
+    """The same photo, its depth looked for from here on; model: a name or a folder."""
+    without_map = replace(source, disparity_path=None, disparity_scale=1.0, focus_disparity=None)
+    return replace(without_map, depth_start=start, depth_model=model or source.depth_model)
+
+
 @dataclass(frozen=True)
 class Scene:
     """What is open: a photo with its plan, or a light field from disk (plan None).
@@ -99,7 +119,8 @@ class Scene:
     depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
     has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
     not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
-    file was saved with by this program, "" without.
+    file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
+    view step as given. depth_models: names of those on this machine.
     """
 
     source: Source
@@ -117,6 +138,8 @@ class Scene:
     subject_disparity_px: float = 0.0
     settings: str = ""
     depth_origin: DepthOrigin | None = None
+    levels: Levels | None = None
+    depth_models: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -131,12 +154,16 @@ class Progress:
 
 @dataclass(frozen=True)
 class SavedSettings:
-    """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height)."""
+    """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
+
+    depth_edits: of the photo's disparity.
+    """
 
     optics: Optics
     depth_strength: float
     source: Source
     size_px: tuple[int, int]
+    depth_edits: DepthEdits = UNEDITED
 
 
 @dataclass(frozen=True)
@@ -180,6 +207,7 @@ class Edit:
 
     optics: Optics
     depth_strength: float
+    depth: DepthWork = AS_FOUND
 
 
 @dataclass(frozen=True)
@@ -217,7 +245,8 @@ class TiltHandles:
     taken: int | None = None
 
 
-ChoiceOf = Literal["photo", "folder", "mask", "truth"]
+ChoiceOf = Literal["photo", "folder", "mask", "truth", "map", "model"]
+"""map: a disparity map for the photo that is open; model: the folder of a depth model."""
 
 
 @dataclass(frozen=True)
@@ -228,13 +257,17 @@ class PathPrompt:
     path: str = ""
 
 
+Saved = Literal["picture", "map"]
+
+
 @dataclass(frozen=True)
 class SavePrompt:
-    """The question where to save the picture, and how large. already_there: such a file exists."""
+    """The question where to save the picture, and how large, or its disparity map. already_there: there is one."""
 
     path: str
     size_px: tuple[int, int]
     already_there: bool = False
+    what: Saved = "picture"
 
 
 @dataclass(frozen=True)
@@ -256,11 +289,12 @@ class ChooseTask:
 
 @dataclass(frozen=True)
 class SaveTask:
-    """Write the picture. size_px: (width, height)."""
+    """Write the picture, or its disparity map. size_px: (width, height)."""
 
     path: str
     size_px: tuple[int, int]
     may_replace: bool = False
+    what: Saved = "picture"
 
 
 @dataclass(frozen=True)
@@ -281,8 +315,8 @@ Task = ChooseTask | SaveTask | ReadMaskTask | ReadTruthTask
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
 Theme = Literal["dark", "light"]
-Section = Literal["view", "focus", "aperture", "light", "inspect", "scene"]
-SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "inspect", "scene")
+Section = Literal["view", "focus", "aperture", "light", "depth", "inspect", "scene"]
+SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "depth", "inspect", "scene")
 
 
 @dataclass(frozen=True)
@@ -315,6 +349,7 @@ class AppState:
 
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
+    depth: what is made of the scene's depth; stroke: of the brush, while it is drawn.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -337,13 +372,16 @@ class AppState:
     recent: tuple[str, ...] = ()
     report: DrawReport | None = None
     inspection: Inspection = field(default_factory=Inspection)
+    depth: DepthWork = AS_FOUND
+    brush: Brush = field(default_factory=Brush)
+    stroke: Stroke | None = None
 
 
 @dataclass(frozen=True)
 class Picture:
     """Everything the picture depends on: the scene's generation, the views present, the optics, its size in pixels.
 
-    samples: how far it has come on its way to the converged picture.
+    samples: how far it has come on its way to the converged picture. previews: of edited depth shown so far.
     """
 
     generation: int
@@ -351,3 +389,4 @@ class Picture:
     optics: Optics
     size_px: tuple[int, int]
     samples: int = 0
+    previews: int = 0

@@ -8,7 +8,6 @@ the window comes first.
 from __future__ import annotations
 
 import itertools
-import math
 import queue
 import threading
 import time
@@ -20,10 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
-from iibr_core.depth.origin import DepthChoice, DepthOrigin
-from iibr_core.plan import PlanOverrides, ScenePlan, plan_for_viewing
-from iibr_core.types import Disparity, FloatImage, InputError, Photo, ViewOffset, ViewUpdate
-from viewer.saved_settings import settings_text_in
+from iibr_core.plan import ScenePlan
+from iibr_core.types import FloatImage, InputError, Photo, ViewOffset, ViewUpdate
+from viewer.depth_work import DepthWork
+from viewer.loaded import Loaded, load, planned, prepare_brush, worked
 from viewer.state import CENTRE, Progress, Scene, Source
 
 QUEUED_RESULTS = 8
@@ -33,31 +32,17 @@ UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Where to look for the focus in a light field that says nothing about disparity."""
 
 POST_RETRY_S = 0.02
-TELL_EVERY_S = 0.1
-
-
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """A photo as read and its disparity as found, kept so that another plan does not read them again.
-
-    origin: where the disparity came from. settings: text of the settings the photo was saved with by this program, ""
-    without.
-    """
-
-    photo: Photo
-    disparity: Disparity
-    origin: DepthOrigin
-    settings: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """One job with all its inputs."""
+    """One job with all its inputs. work: what is made of the photo's depth, None for what the source says."""
 
     generation: int
     source: Source
     depth_strength: float = 1.0
     loaded: Loaded | None = None
+    work: DepthWork | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,47 +218,6 @@ def results_of(
         yield from _results_of_photo(request, should_stop, nearest_to, tell)
 
 
-def load(
-    source: Source,
-    should_stop: Callable[[], bool] = lambda: False,
-    tell: Callable[[Progress], None] = lambda progress: None,
-) -> Loaded:
-    """Read a photo and find its disparity, telling what is going on, not more often than people can see.
-
-    Raises InputError, and StoppedError where should_stop says so.
-    """
-    from iibr_core.depth.source import open_with_depth
-    from iibr_core.formats.heic import is_heic
-    from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
-
-    said_at: dict[str, float] = {}
-
-    def tell_at_times(doing: str, share: float) -> None:
-        now = time.perf_counter()
-        if now - said_at.get(doing, -math.inf) >= TELL_EVERY_S:
-            said_at[doing] = now
-            tell(Progress(doing=f"{doing}, {share:.0%}" if share else doing))
-
-    path = Path(source.path)
-    found = open_with_depth(
-        path,
-        DepthChoice(
-            source.depth_start,
-            source.disparity_path,
-            source.disparity_scale,
-            source.depth_model,
-            source.refine,
-            source.memory_bytes,
-        ),
-        source.max_pixels or DEFAULT_MAX_PIXELS,
-        source.grid,
-        should_stop,
-        tell_at_times,
-    )
-    # This program saves no HEIC.
-    return Loaded(found.photo, found.disparity, found.origin, "" if is_heic(path) else settings_text_in(path))
-
-
 def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
     """What the viewer says about a photo and its plan."""
     height, width = loaded.photo.size
@@ -292,6 +236,8 @@ def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
         subject_disparity_px=_middle(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
         depth_origin=loaded.origin,
+        levels=loaded.levels,
+        depth_models=loaded.models,
     )
 
 
@@ -316,9 +262,9 @@ def _results_of_photo(
     tell: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
-    loaded = request.loaded or load(source, should_stop, tell)
-    overrides = PlanOverrides(source.grid, request.depth_strength, source.focus_disparity, source.memory_bytes)
-    plan = plan_for_viewing(loaded.photo, loaded.disparity, overrides)
+    work = request.work or DepthWork(source.refine)
+    loaded = load(source, should_stop, tell, work) if request.loaded is None else worked(request.loaded, work)
+    plan = planned(source, loaded, request.depth_strength)
     disparity = plan.field_disparity(loaded.disparity)
     colors = stored_from_encoded(loaded.photo.pixels, loaded.photo.is_hdr)
     centre = ViewUpdate(*plan.grid.centre, colors, disparity.values)
@@ -328,6 +274,8 @@ def _results_of_photo(
 
     views = generate(loaded.photo, disparity, plan, should_stop, nearest_to, source.quality)
     yield from _counted(request.generation, views, plan.grid.rows * plan.grid.columns)
+    if not should_stop():
+        prepare_brush()
 
 
 def _results_of_folder(request: Request, should_stop: Callable[[], bool]) -> Iterator[SceneReady | ViewReady]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from iibr_core.types import InputError
 from viewer.actions import OpenFailed, ProgressMade, SceneOpened, WorkerNews
+from viewer.depth_work import DepthWork
 from viewer.history import mapped
 from viewer.inspection import of_next_scene
 from viewer.optics_edits import carried_optics
@@ -69,7 +70,8 @@ def _opened(state: AppState, scene: Scene) -> AppState:
     recent = remembered(state.recent, scene.source.path)
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
-    return replace(opened, notices=notices, history=History(), motion=motion, recent=recent)
+    depth = DepthWork(scene.source.refine)
+    return replace(opened, notices=notices, history=History(), motion=motion, recent=recent, depth=depth, stroke=None)
 
 
 def remembered(recent: tuple[str, ...], path: str) -> tuple[str, ...]:

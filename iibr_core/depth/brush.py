@@ -10,7 +10,7 @@ from math import ceil, exp, floor, hypot, sqrt
 import numpy as np
 
 from iibr_core.depth.edit import UNEDITED, BrushTool, DepthEdits, Stroke, extent_of, require_sound, toned
-from iibr_core.kernels import kernel
+from iibr_core.kernels import kernel, nearest_pixel
 from iibr_core.types import FloatImage
 
 CONTOUR_CONTRAST = 0.12
@@ -26,7 +26,7 @@ PARTING_RADII = 3.0
 
 Window = tuple[slice, slice]
 _SIGNS: dict[BrushTool, float] = {"nearer": 1.0, "farther": -1.0, "smooth": 1.0}
-_MOST = np.finfo(np.float32).max
+MOST = float(np.finfo(np.float32).max)
 
 
 def edited(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
@@ -114,16 +114,13 @@ class DepthCanvas:
         assert self._open is not None
         assert self._extent is not None
         under, distance, target = self._open.under, self._open.distance, self._open.target
-        amount = np.float32(min(stroke.strength * (self._extent[1] - self._extent[0]), _MOST) * _SIGNS[stroke.tool])
+        amount = stroke.strength * (self._extent[1] - self._extent[0]) * _SIGNS[stroke.tool]
         values = self._values.copy()
         for i in range(first, len(stroke.points)):
             window = _measure_from(self._photo, stroke, i, self._texture(), distance)
-            weight, before = falloff(distance[window]), under[window]
-            if target is not None:
-                change = np.float32(stroke.strength) * weight * (target[window] - before)
-            else:
-                change = amount * weight
-            values[window] = np.clip(before + change, -_MOST, _MOST)
+            weight, before = falloff(distance[window]), under[window].astype(np.float64)  # which do not overflow
+            change = amount if target is None else stroke.strength * (target[window] - before)
+            values[window] = np.clip(before + weight * change, -MOST, MOST)
         self._values = values
 
 
@@ -217,10 +214,10 @@ def _span(low: float, high: float, size: int) -> slice:
 def _seed(distance, x0, y0, x1, y1, radius):  # type: ignore[no-untyped-def]
     """Distances of the pixels about every place on the way from (x0, y0) to (x1, y1)."""
     height, width = distance.shape
-    steps = max(int(ceil(2 * hypot(x1 - x0, y1 - y0))), 1)
+    steps = max(ceil(2 * hypot(x1 - x0, y1 - y0)), 1)
     for k in range(steps + 1):
         x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
-        column, row = int(floor(x + 0.5)), int(floor(y + 0.5))
+        column, row = nearest_pixel(x), nearest_pixel(y)
         if 0 <= row < height and 0 <= column < width:
             distance[row, column] = min(distance[row, column], np.float32(hypot(column - x, row - y) / radius))
 
@@ -275,6 +272,6 @@ def _smooth_rows(photo, values, rate, parting, noise):  # type: ignore[no-untype
         for x in range(1, width):
             kept[x] = exp(-rate * (1.0 + parting * _contour(photo, y, x, y, x - 1, noise)))
         for x in range(1, width):
-            values[y, x] += kept[x] * (values[y, x - 1] - values[y, x])
+            values[y, x] = kept[x] * values[y, x - 1] + (1.0 - kept[x]) * values[y, x]
         for x in range(width - 2, -1, -1):
-            values[y, x] += kept[x + 1] * (values[y, x + 1] - values[y, x])
+            values[y, x] = kept[x + 1] * values[y, x + 1] + (1.0 - kept[x + 1]) * values[y, x]

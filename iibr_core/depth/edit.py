@@ -116,9 +116,9 @@ def extent_of(disparity: FloatImage) -> tuple[float, float]:
 def toned(disparity: FloatImage, edits: DepthEdits, extent: tuple[float, float] | None = None) -> FloatImage:
     """The map (H, W), inverted, clipped and bent; its strokes are left to `brush.edited`. Edits must be sound.
 
-    extent: see `extent_of`, of this map where None. What is not finite is the far end. Values keep their order (inverted
-    ones the opposite); those beyond the extent stay beyond it unless they are clipped. Without edits, finite maps come
-    back as they are. Returns (H, W) float32.
+    extent: see `extent_of`, of this map where None. What is not finite is the far end. Values keep their order
+    (inverted ones the opposite); those beyond the extent stay beyond it unless they are clipped. Without edits, finite
+    maps come back as they are. Returns (H, W) float32.
     """
     low, high = extent or extent_of(disparity)
     values = disparity if np.isfinite(disparity).all() else np.where(np.isfinite(disparity), disparity, low)

@@ -9,6 +9,7 @@ import contextlib
 import hashlib
 import os
 import zipfile
+import zlib
 from pathlib import Path
 from uuid import uuid4
 
@@ -17,6 +18,7 @@ import numpy as np
 from iibr_core.depth.estimate import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.model_config import CONFIG, PREPROCESSOR
 from iibr_core.depth.models import weight_files
+from iibr_core.formats import npy
 from iibr_core.types import FloatImage
 
 MAX_BYTES = 512 * 2**20
@@ -24,7 +26,8 @@ FORMAT = "1"
 """Part of every key: raise it when estimates mean something else."""
 
 KINDS = {"relative": RelativeInverseDepth, "metric": MetricDepth, "disparity": DisparityMap}
-MISREADINGS = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+# What numpy, zipfile and zlib raise for damaged files; RuntimeError: encrypted, or compressed in an unknown way.
+MISREADINGS = (*npy.MISREADINGS, OSError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
 def cache_folder() -> Path:

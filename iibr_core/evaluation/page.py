@@ -10,10 +10,10 @@ from html import escape
 import numpy as np
 from PIL import Image
 
+from iibr_core.color import encoded_from_stored
 from iibr_core.evaluation.metrics import flip_picture
-from iibr_core.evaluation.protocol import TRUTH, Judgement
+from iibr_core.evaluation.protocol import TRUTH, Bytes, Judgement
 from iibr_core.evaluation.tables import Table, about, consistency_table, figures_table, heading, summary_table
-from iibr_core.types import FloatImage
 
 WIDEST_PX = 480
 """Pictures are shown no wider: a page with many scenes must stay one that can be opened."""
@@ -65,7 +65,8 @@ def _section(judgement: Judgement) -> Iterator[str]:
     for method, image in pictures.by_method.items():
         yield _figure(method, image)
         if method != TRUTH:
-            yield _figure(f"{method}, error", flip_picture(image, truth))
+            error = flip_picture(encoded_from_stored(image), encoded_from_stored(truth))
+            yield _figure(f"{method}, error", (np.clip(error, 0, 1) * 255 + 0.5).astype(np.uint8))
     yield "</div>"
     if pictures.epis:
         yield f"<p>EPIs of pixel row {pictures.epi_row}, leftmost view on top:</p>"
@@ -81,26 +82,22 @@ def _table(table: Table) -> str:
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
 
 
-def _figure(caption: str, image: FloatImage) -> str:
+def _figure(caption: str, image: Bytes) -> str:
     source = _jpeg(image)
     return f'<figure><img alt="{escape(caption)}" src="{source}"><figcaption>{escape(caption)}</figcaption></figure>'
 
 
-def _jpeg(image: FloatImage) -> str:
-    picture = Image.fromarray(_bytes(image))
+def _jpeg(image: Bytes) -> str:
+    picture = Image.fromarray(image)
     picture.thumbnail((WIDEST_PX, 4 * WIDEST_PX), Image.Resampling.LANCZOS)
     return _data_of(picture, "jpeg", quality=JPEG_QUALITY)
 
 
-def _png(image: FloatImage) -> str:
-    return _data_of(Image.fromarray(_bytes(image)), "png")
+def _png(image: Bytes) -> str:
+    return _data_of(Image.fromarray(image), "png")
 
 
 def _data_of(picture: Image.Image, kind: str, **options: int) -> str:
     buffer = io.BytesIO()
     picture.save(buffer, kind, **options)
     return f"data:image/{kind};base64,{base64.b64encode(buffer.getvalue()).decode()}"
-
-
-def _bytes(image: FloatImage) -> np.ndarray:
-    return (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)

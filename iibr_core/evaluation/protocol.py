@@ -13,14 +13,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.depth.origin import DepthChoice
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
 from iibr_core.evaluation.datasets import read_view
-from iibr_core.evaluation.metrics import Lpips, Mask, flip, psnr, ssim
+from iibr_core.evaluation.metrics import Mask, flip, psnr, ssim
 from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
 from iibr_core.evaluation.trials import DisparityFrom, Given, Trial, given_of, trials_of
 from iibr_core.evaluation.views import ViewMaker, as_stored
@@ -28,12 +30,17 @@ from iibr_core.formats.multi_view import MultiView
 from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
 from iibr_core.types import Disparity, FloatImage, Quality, ViewOffset
 
+if TYPE_CHECKING:
+    from iibr_core.evaluation.lpips import Lpips
+
 QUALITIES: tuple[Quality, ...] = ("fast", "balanced", "exact")
 IDENTITY, REFERENCE, TRUTH = "identity", "reference warp", "truth"
 SAME_ROW = 0.05
 """Views whose rows differ by less, in view steps, make an EPI together."""
 LEAST_EPI_VIEWS = 3
 
+Bytes = NDArray[np.uint8]
+"""(H, W, 3), sRGB-encoded."""
 Tell = Callable[[int, int, str], None]
 """Told (steps done, steps in all, what is being done)."""
 
@@ -80,8 +87,8 @@ class Pictures:
     """To look at: one view by every method and as it is, and EPIs of one row of pixels, (views, W, 3) each."""
 
     view: str
-    by_method: Mapping[str, FloatImage]
-    epis: Mapping[str, FloatImage]
+    by_method: Mapping[str, Bytes]
+    epis: Mapping[str, Bytes]
     epi_row: int
 
 
@@ -117,7 +124,7 @@ def evaluate(
     Raises InputError where the scene or an option is bad, Cancelled or StoppedError once should_stop is true.
     """
     options = options or Options()
-    lpips = None if options.lpips is None else Lpips(options.lpips)
+    lpips = None if options.lpips is None else _lpips(options.lpips)
     source: DisparityFrom = "auto" if isinstance(options.source, Path) else options.source
     judgements = []
     for trial in trials_of(scene, source, options.most_views):
@@ -126,6 +133,12 @@ def evaluate(
         for disparity in given.maps:
             judgements.append(_Judge(trial, given, disparity, options, lpips, tell, should_stop).judged())
     return judgements
+
+
+def _lpips(folder: Path) -> Lpips:
+    from iibr_core.evaluation.lpips import Lpips  # brings torch
+
+    return Lpips(folder)
 
 
 class _Judge:
@@ -150,12 +163,12 @@ class _Judge:
         self.hole_shares: list[float] = []
         self.lines: list[LineView] = []
         self.epis: dict[str, list[tuple[float, FloatImage]]] = {}
-        self.shown: tuple[str, dict[str, FloatImage]] = ("", {})
+        self.shown: tuple[str, dict[str, Bytes]] = ("", {})
+        self.epi_row = _row_to_show(disparity.values)
+        self.farthest = max(trial.judged, key=lambda k: math.hypot(*trial.offset(k)))
 
     def judged(self) -> Judgement:
         trial, scene, start = self.trial, self.trial.scene, time.perf_counter()
-        self.epi_row = _row_to_show(self.disparity.values)
-        self.farthest = max(trial.judged, key=lambda k: math.hypot(*trial.offset(k)))
         offsets = [trial.offset(index) for index in trial.judged]
         with (
             ViewMaker(self.given.photo, self.refined, offsets, self.options.qualities, self.should_stop) as maker,
@@ -200,7 +213,7 @@ class _Judge:
             self.figures.setdefault(method, {})[view.name] = figures
         pictures = {TRUTH: truth, **{method: image for method, (image, _) in made.items()}}
         if index == self.farthest:
-            self.shown = view.name, pictures
+            self.shown = view.name, {method: _bytes(image) for method, image in pictures.items()}
         self._keep_row(offset, pictures, judge)
 
     def _warped(self, offset: ViewOffset) -> dict[str, tuple[FloatImage, float]]:
@@ -230,12 +243,12 @@ class _Judge:
         for method, image in pictures.items():
             self.epis.setdefault(method, []).append((offset.s, image[self.epi_row]))
 
-    def _epis(self) -> dict[str, FloatImage]:
-        epis = {}
+    def _epis(self) -> dict[str, Bytes]:
+        epis: dict[str, Bytes] = {}
         for method, lines in self.epis.items():
             every = sorted([*lines, (0.0, self.given.photo[self.epi_row])], key=lambda line: line[0])
             if len(every) >= LEAST_EPI_VIEWS and method != IDENTITY:
-                epis[method] = np.stack([line for _, line in every])
+                epis[method] = _bytes(np.stack([line for _, line in every]))
         return epis
 
     def _consistency(self, maker: ViewMaker, offsets: Sequence[ViewOffset]) -> dict[str, Consistency]:
@@ -248,6 +261,10 @@ class _Judge:
             rms, off_px = line_straightness(self.given.photo, self.given.judge.values, self.lines)
             found[TRUTH] = Consistency(math.nan, math.nan, rms, off_px, 0)
         return found
+
+
+def _bytes(image: FloatImage) -> Bytes:
+    return (np.clip(image, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
 def _row(method: str, of_views: Mapping[str, Figures]) -> Row:

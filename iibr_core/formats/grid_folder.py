@@ -37,7 +37,7 @@ def read_grid_folder(folder: Path) -> MultiView | None:
     folder for the centre view; estimates: disp_est_uUU_vVV.*, disp_CamNNN.pfm. Raises InputError where a grid has gaps.
     """
     inside = folder / "views" if (folder / "views").is_dir() else folder
-    pictures = [path for path in pictures_in(inside) if not MAP_WORDS.search(path.stem)]
+    pictures = _views_among(pictures_in(inside))
     indices = _indices(folder, pictures)
     if not indices:
         return None
@@ -55,6 +55,14 @@ def read_grid_folder(folder: Path) -> MultiView | None:
     return MultiView(folder.resolve().name, _layout(pictures, grid), views, maps)
 
 
+def _views_among(pictures: list[Path]) -> list[Path]:
+    """Without maps and the like: those named as views if there are any, else those not named as something else."""
+    for pattern in (CAM, V_U):
+        if named := [path for path in pictures if pattern.match(path.stem)]:
+            return named
+    return [path for path in pictures if not MAP_WORDS.search(path.stem)]
+
+
 def _layout(pictures: list[Path], grid: GridShape) -> str:
     size = f"{grid.columns}x{grid.rows}"
     if CAM.match(pictures[0].stem):
@@ -70,7 +78,7 @@ def _indices(folder: Path, pictures: list[Path]) -> dict[Index, Path]:
         return {}
     fields = list(zip(*numbered.values()))
     varying = [k for k, values in enumerate(fields) if len(set(values)) > 1]
-    if all(V_U.search(path.stem) for path in pictures):
+    if all(V_U.match(path.stem) for path in pictures):
         varying, base = [len(fields) - 2, len(fields) - 1], (0, 0)
     elif len(varying) == 2:
         base = (min(fields[varying[0]]), min(fields[varying[1]]))

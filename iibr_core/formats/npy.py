@@ -36,8 +36,10 @@ def read_array(path: Path, most_values: int) -> NDArray[Any]:
         file.seek(0)
         try:
             return np.asarray(npy_format.read_array(file, allow_pickle=False))
-        except ValueError as error:
-            raise InputError(f"{path}: became shorter while it was read; try again") from error
+        except MISREADINGS as error:  # it became shorter meanwhile, or is empty in one direction and endless in another
+            raise InputError(
+                f"{path}: cannot be read as an array of shape {shape}; get the whole file again"
+            ) from error
 
 
 def _header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:

@@ -15,9 +15,10 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.formats.files import require_file, written_whole
+from iibr_core.formats.files import require_file
 from iibr_core.formats.heic import is_heic, read_heic
-from iibr_core.formats.raster import Raster, read_raster, require_whole_png, text_attribute
+from iibr_core.formats.picture_out import write_picture
+from iibr_core.formats.raster import Raster, read_raster, text_attribute
 from iibr_core.kernels import kernel
 from iibr_core.types import FloatImage, InputError, Photo
 
@@ -77,26 +78,7 @@ def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | i
     spec.attribute("png:filter", PNG_FILTER_AVERAGE)
     for name, value in (metadata or {}).items():
         spec.attribute(name, value)
-    with written_whole(path) as temporary:
-        target = oiio.ImageOutput.create(str(temporary))
-        # Writing to an output that did not open crashes OpenImageIO.
-        if target is None or not (target.open(str(temporary), spec) and target.write_image(stored) and target.close()):
-            reason = oiio.geterror() if target is None else target.geterror()
-            raise InputError(f"{path}: cannot be written ({_one_line(reason)}); choose another place")
-        if kind == ".png":
-            _require_written(path, temporary)
-
-
-def _require_written(path: Path, temporary: Path) -> None:
-    """OpenImageIO calls a PNG well written that a full disk cut off."""
-    try:
-        require_whole_png(temporary)
-    except InputError as error:
-        raise InputError(f"{path}: cannot be written whole (is the disk full?); choose another place") from error
-
-
-def _one_line(message: str) -> str:
-    return " ".join(message.split()) or "no reason given"
+    write_picture(path, spec, stored)
 
 
 def focal_px_from_fov(width: int, fov_deg: float = DEFAULT_FOV_DEG) -> float:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.photo import write_image
 from iibr_core.formats.pfm import write_pfm
+from iibr_core.formats.photo import write_image
 from iibr_core.types import ViewOffset
 from tests.core.scenes import smooth_texture
 

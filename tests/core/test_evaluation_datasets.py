@@ -39,7 +39,9 @@ def offset_by_file(scene: MultiView) -> dict[str, ViewOffset]:
 
 @pytest.mark.parametrize(("rows", "columns"), [(3, 3), (1, 3), (3, 5)])
 def test_hci_names_count_row_by_row(tmp_path: Path, rows: int, columns: int) -> None:
-    scene = scene_of(write_hci(tmp_path / "dino", rows, columns))
+    folder = write_hci(tmp_path / "dino", rows, columns)
+    write_picture(folder / "objectids_highres.png", np.zeros((9, 9, 3), np.uint8))  # comes with the data set
+    scene = scene_of(folder)
     assert scene.name == "dino"
     assert scene.layout == f"HCI 4D light field, {columns}x{rows}"
     wanted = {f"input_Cam{v * columns + u:03d}": at for (v, u), at in offsets_of(rows, columns).items()}
@@ -64,7 +66,9 @@ def test_views_in_a_subfolder_with_truth_and_estimates(tmp_path: Path) -> None:
 def test_hebers_grid_under_any_numbering(tmp_path: Path, name: str) -> None:
     """By row and column or row by row, counted from 0 or from 1; the map without a number is the centre view's."""
     offsets = offsets_of(11, 11)
-    names = {name.format(v=v, u=u, v1=v + 1, u1=u + 1, k=v * 11 + u, k1=v * 11 + u + 1): at for (v, u), at in offsets.items()}
+    names = {
+        name.format(v=v, u=u, v1=v + 1, u1=u + 1, k=v * 11 + u, k1=v * 11 + u + 1): at for (v, u), at in offsets.items()
+    }
     folder = write_numbered(tmp_path / "pov", names)
     write_pfm(folder / "disparity.pfm", np.ones((8, 8), np.float32))
     scene = scene_of(folder)
@@ -74,7 +78,7 @@ def test_hebers_grid_under_any_numbering(tmp_path: Path, name: str) -> None:
 
 
 def stanford_names(jitter: float = 0.0) -> dict[str, ViewOffset]:
-    """5 rows counted upwards, 4 columns; positions in millimetres, x growing to the left, by up to `jitter` steps off."""
+    """5 rows counted upwards, 4 columns; positions in millimetres, x growing to the left, up to `jitter` steps off."""
     rng, found = np.random.default_rng(3), {}
     for row in range(5):
         for column in range(4):
@@ -100,7 +104,11 @@ def test_stanford_viewpoints_are_the_cameras_positions(tmp_path: Path, inside: s
 
 def test_stanford_positions_that_make_no_grid_are_told(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    names = {f"out_{v:02d}_{u:02d}_{rng.uniform():.5f}_{rng.uniform():.5f}.png": ViewOffset(0, 0) for v in range(3) for u in range(3)}
+    names = {
+        f"out_{v:02d}_{u:02d}_{rng.uniform():.5f}_{rng.uniform():.5f}.png": ViewOffset(0, 0)
+        for v in range(3)
+        for u in range(3)
+    }
     scene = scene_of(write_numbered(tmp_path / "odd", names))
     assert "regular" in scene.notes[0]
     assert {tuple(view.offset) for view in scene.views} == {(-float(v), float(u)) for v in range(3) for u in range(3)}
@@ -195,9 +203,6 @@ def test_llff_viewpoints_and_turned_cameras(tmp_path: Path) -> None:
         wanted = seen_wall(np.array([x, y, 0.0]), straight, focal)
         assert known.mean() > 0.7
         assert np.abs(pixels - wanted)[known].max() < 0.02
-        # and disparity focal * step / depth leads from the centre view to this one
-        shifted = seen_wall(np.zeros(3) + [x, y, 0], straight, focal)
-        np.testing.assert_allclose(shifted, wanted)
 
 
 def test_llff_in_a_turned_world_gives_the_same(tmp_path: Path) -> None:

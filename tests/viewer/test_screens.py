@@ -48,7 +48,7 @@ from viewer.state import (
 )
 from viewer.ui.style import DARK, LIGHT
 
-SIZE = 640, 760
+SIZE = 640, 880
 ENOUGH_PIXELS = 60
 """That differ, at least, where something new is drawn: a short word."""
 

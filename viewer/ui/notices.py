@@ -5,11 +5,12 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.actions import Action, DismissNotice, TakeSettings
-from viewer.layout import MARGIN, Layout
+from viewer.layout import MARGIN, STRIP_GAP, Layout
 from viewer.state import AppState, Notice
 from viewer.ui.style import Palette, palette_of
 
 NOTICE_WIDTH = 420.0
+LEAST_HEIGHT = 40.0
 _FLAGS = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
@@ -26,13 +27,18 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     if not state.notices:
         return []
     margin = MARGIN * layout.ui_scale
-    width = min(NOTICE_WIDTH * layout.ui_scale, layout.panel.x - 2 * margin)
+    right, bottom = layout.panel.x - margin, layout.window.height - margin
+    if layout.strip_across is not None and layout.strip_down is not None:
+        right, bottom = layout.strip_down.x - STRIP_GAP * layout.ui_scale, layout.strip_across.y - margin / 2
+    elif layout.status is not None:
+        bottom = layout.status.y
+    width = min(NOTICE_WIDTH * layout.ui_scale, right - margin)
     if width <= 0:
         return []
     palette = palette_of(state.preferences.theme)
-    bottom = layout.window.height - margin if layout.status is None else layout.status.y
     imgui.set_next_window_pos(imgui.ImVec2(margin, bottom), 0, imgui.ImVec2(0, 1))
-    imgui.set_next_window_size(imgui.ImVec2(width, 0))
+    most = max(bottom - margin / 2, LEAST_HEIGHT * layout.ui_scale)
+    imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
     imgui.begin("notices", None, _FLAGS)
     actions = [action for i, notice in enumerate(state.notices) for action in _notice(i, notice, palette)]
     imgui.end()

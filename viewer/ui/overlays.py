@@ -23,7 +23,10 @@ def overlays(state: AppState, layout: Layout) -> None:
         return
     if state.tilt_handles is not None:
         _draw_handles(state.tilt_handles, layout, picture)
-    if state.hover is not None and state.hover.disparity is not None:
+    if state.brush.is_on and scene.plan is not None:
+        if state.hover is not None:
+            _draw_brush(state, scene, state.hover, layout, picture)
+    elif state.hover is not None and state.hover.disparity is not None:
         _draw_reticle(state.optics, scene, state.hover, layout, picture)
 
 
@@ -58,6 +61,19 @@ def _draw_reticle(optics: Optics, scene: Scene, hover: Hover, layout: Layout, pi
     corners = imgui.ImVec2(left - room, top - room / 2), imgui.ImVec2(left + size.x + room, top + size.y + room / 2)
     draw.add_rect_filled(*corners, packed(DARK.background, 0.72), 4 * scale)
     draw.add_text(imgui.ImVec2(left, top), packed(DARK.text), words)
+
+
+def _draw_brush(state: AppState, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
+    """How far the brush reaches about the pointer, and in its middle what it does."""
+    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
+    x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
+    y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
+    _ring(draw, x, y, max(state.brush.radius * picture.width, 2 * scale), scale, packed(DARK.text))
+    if state.brush.tool != "smooth":
+        arm = 4 * scale
+        draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), packed(DARK.text), 1.5 * scale)
+    if state.brush.tool == "nearer":
+        draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), packed(DARK.text), 1.5 * scale)
 
 
 def _draw_handles(handles: TiltHandles, layout: Layout, picture: Rect) -> None:

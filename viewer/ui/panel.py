@@ -13,7 +13,8 @@ from viewer.commands import BY_NAME
 from viewer.layout import Layout
 from viewer.limits import aperture_limit
 from viewer.presets import PRESETS
-from viewer.state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source
+from viewer.state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source, source_beside
+from viewer.ui.depth_section import depth_line, depth_section
 from viewer.ui.inspect_section import inspect_section
 from viewer.ui.lens_sections import aperture_section, focus_section, light_section
 from viewer.ui.scene_section import scene_section
@@ -35,6 +36,7 @@ SECTION_WORDS: dict[Section, str] = {
     "focus": "Focus",
     "aperture": "Aperture",
     "light": "Light",
+    "depth": "Depth",
     "inspect": "Inspect",
     "scene": "Scene",
 }
@@ -63,6 +65,7 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
     else:
         imgui.text_wrapped(state.scene.name)
         quiet(size_words(state.scene))
+        depth_line(state.scene, layout)
         actions += _progress(state, layout)
         if state.report is not None:
             quiet(report_words(state.report))
@@ -140,10 +143,10 @@ def _welcome(state: AppState, layout: Layout) -> list[Action]:
     """What to do in an empty window, and what was open before."""
     imgui.text_wrapped("Drop a photo or a folder of views on this window to open it.")
     gap(layout)
-    return _recent(state.recent, layout)
+    return _recent(state.recent, state.source, layout)
 
 
-def _recent(paths: tuple[str, ...], layout: Layout) -> list[Action]:
+def _recent(paths: tuple[str, ...], source: Source | None, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     if paths:
         quiet("Recent")
@@ -151,7 +154,7 @@ def _recent(paths: tuple[str, ...], layout: Layout) -> list[Action]:
         is_chosen, _ = imgui.selectable(f"{_last_part(path)}##{path}", False)
         tooltip(path, layout)
         if is_chosen:
-            actions.append(OpenPath(Source(path)))
+            actions.append(OpenPath(source_beside(source, path)))
     return actions
 
 
@@ -215,8 +218,9 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout, pa
         "focus": lambda: focus_section(state, scene, layout),
         "aperture": lambda: aperture_section(state, scene, layout, palette),
         "light": lambda: light_section(state, layout),
+        "depth": lambda: depth_section(state, scene, layout),
         "inspect": lambda: inspect_section(state, scene, layout),
-        "scene": lambda: [*scene_section(state, scene, layout), *_recent_elsewhere(state, layout)],
+        "scene": lambda: [*scene_section(scene, layout), *_recent_elsewhere(state, layout)],
     }
     is_open = section in state.preferences.open_sections
     toggled: list[Action] = [ToggleSection(section)] if heading(SECTION_WORDS[section], is_open, layout) else []
@@ -229,4 +233,4 @@ def _recent_elsewhere(state: AppState, layout: Layout) -> list[Action]:
     if not others:
         return []
     gap(layout, 2)
-    return _recent(others, layout)
+    return _recent(others, state.source, layout)

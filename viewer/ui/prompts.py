@@ -6,21 +6,11 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from viewer.actions import Action, DoTask, OpenPath, ShowPrompt
+from viewer.actions import Action, DoTask, ShowPrompt
+from viewer.choices import chosen
 from viewer.commands import COMMANDS, commands_matching
 from viewer.layout import Layout
-from viewer.state import (
-    AppState,
-    PalettePrompt,
-    PathPrompt,
-    Prompt,
-    ReadMaskTask,
-    ReadTruthTask,
-    SavePrompt,
-    SaveTask,
-    Source,
-    Task,
-)
+from viewer.state import AppState, PalettePrompt, PathPrompt, Prompt, SavePrompt, SaveTask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
 
@@ -35,13 +25,17 @@ MOUSE = (
     ("Arrow keys", "Move the viewpoint"),
     ("Drop", "Open a photo, a folder, a disparity map"),
     ("Ctrl+click a slider", "Type a value"),
-    ("Esc", "Close, then quit"),
+    ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
+    ("Esc", "Close, put the brush away, then quit"),
 )
+MAP_ENDINGS = "The name's ending decides: .pfm, .exr, .npy, or .png (16 bits, scaled)."
 PATH_WORDS = {
     "photo": "Open a photo",
     "folder": "Open a folder of views",
     "mask": "Image for the aperture; white lets light through",
     "truth": "Ground truth: a folder of views",
+    "map": "A disparity map for this photo",
+    "model": "The folder of a depth model",
 }
 _FLAGS = (
     imgui.WindowFlags_.no_title_bar
@@ -63,8 +57,12 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
     imgui.begin(f"prompt {type(prompt).__name__}", None, _FLAGS)
+    # A field that is typed in takes Esc for itself; one Esc is to close all of it.
+    is_left = imgui.get_io().want_text_input and imgui.is_key_pressed(imgui.Key.escape, False)
     actions = _contents(prompt, state, layout)
     imgui.end()
+    if is_left:
+        return [ShowPrompt(None)]
     return actions
 
 
@@ -73,7 +71,7 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case SavePrompt():
             return _save(prompt, state, layout)
         case PathPrompt():
-            return _path(prompt, layout)
+            return _path(prompt, state, layout)
         case PalettePrompt():
             return _palette(prompt, state, layout)
         case _:
@@ -82,33 +80,41 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
 
 def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     """File and size; the picture's shape is kept."""
-    imgui.text("Save the picture")
+    is_map = prompt.what == "map"
+    imgui.text("Save the depth map" if is_map else "Save the picture")
     gap(layout, 2)
     _focus_on_appearing()
     label("File", layout)
     path, entered = _text_field("path", prompt.path)
-    label("Width", layout, "Pixels; the height follows.")
-    changed, width = imgui.input_int("##width", prompt.size_px[0], 0, 0)
     edited = replace(prompt, path=path, already_there=prompt.already_there and path == prompt.path)
-    if changed and state.scene is not None:
-        width = min(max(width, 1), LARGEST_SIDE)
-        edited = replace(edited, size_px=(width, max(round(width * state.scene.height / state.scene.width), 1)))
-    label("Height", layout)
-    imgui.align_text_to_frame_padding()
-    imgui.text(str(edited.size_px[1]))
+    edited = edited if is_map else _resized(edited, state, layout)
     gap(layout, 2)
-    quiet("The name's ending decides: .png, or .exr in linear light.")
+    quiet(MAP_ENDINGS if is_map else "The name's ending decides: .png, or .exr in linear light.")
     if prompt.already_there:
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
         imgui.text_wrapped("There is a file of this name already.")
         imgui.pop_style_color()
     pressed, closed = _buttons("Replace" if prompt.already_there else "Save", layout)
     if pressed or entered:
-        return [DoTask(SaveTask(edited.path, edited.size_px, may_replace=prompt.already_there)), ShowPrompt(None)]
+        task = SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what)
+        return [DoTask(task), ShowPrompt(None)]
     return _closed_or_edited(closed, edited, prompt)
 
 
-def _path(prompt: PathPrompt, layout: Layout) -> list[Action]:
+def _resized(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
+    """Rows for width and height."""
+    label("Width", layout, "Pixels; the height follows.")
+    changed, width = imgui.input_int("##width", prompt.size_px[0], 0, 0)
+    if changed and state.scene is not None:
+        width = min(max(width, 1), LARGEST_SIDE)
+        prompt = replace(prompt, size_px=(width, max(round(width * state.scene.height / state.scene.width), 1)))
+    label("Height", layout)
+    imgui.align_text_to_frame_padding()
+    imgui.text(str(prompt.size_px[1]))
+    return prompt
+
+
+def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
     imgui.text(PATH_WORDS[prompt.what])
     gap(layout, 2)
     _focus_on_appearing()
@@ -117,9 +123,7 @@ def _path(prompt: PathPrompt, layout: Layout) -> list[Action]:
     quiet("This system has no file dialog (zenity or kdialog): type a path, or drop a file on the window.")
     pressed, closed = _buttons("Open", layout)
     if (pressed or entered) and path.strip():
-        path = path.strip()
-        tasks: dict[str, Task] = {"mask": ReadMaskTask(path), "truth": ReadTruthTask(path)}
-        return [ShowPrompt(None), DoTask(tasks[prompt.what]) if prompt.what in tasks else OpenPath(Source(path))]
+        return [ShowPrompt(None), chosen(prompt.what, path.strip(), state)]
     return _closed_or_edited(closed, replace(prompt, path=path), prompt)
 
 

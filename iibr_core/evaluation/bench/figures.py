@@ -31,7 +31,7 @@ from iibr_core.evaluation.bench.variants import (
 from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generate import generate
 from iibr_core.plan import RAY_US, TOTAL_PARALLAX, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
-from iibr_core.types import Disparity, GridShape, Photo, Quality
+from iibr_core.types import DEFAULT_QUALITY, Disparity, GridShape, Photo, Quality
 
 CORES = os.cpu_count() or 1
 MEGAPIXEL_SIDE = 1024
@@ -141,16 +141,17 @@ def measure_scene(
 
 
 def _planned(scene: BenchScene, variants: Sequence[Variant]) -> str:
-    """The default quality with about as many stored views as the plan chooses for this parallax."""
+    """The default quality with as few stored views as the plan finds enough for this parallax."""
     low, high = (float(p) for p in np.percentile(scene.disparity, (1, 99)))
     width = scene.photo.shape[1]
     strength = (high - low) * 2 * scene.reach / (TOTAL_PARALLAX * width)
     photo, disparity = Photo(scene.photo, float(width), scene.name), Disparity(scene.disparity, "bench")
     side = plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=max(strength, 1e-6))).grid.columns
-    plain = [variant for variant in variants if replace(variant, name="", every=1) == replace(REFERENCE, name="")]
+    default = Variant("", DEFAULT_QUALITY)
+    plain = [variant for variant in variants if replace(variant, name="", every=1) == default]
     with_sides = {v.name: 2 * scene.reach // v.every + 1 for v in plain if v.every > 0}
     enough = {name: stored for name, stored in with_sides.items() if stored >= min(side, 2 * scene.reach + 1)}
-    return min(enough, key=lambda name: enough[name])
+    return min(enough, key=lambda name: enough[name], default=REFERENCE.name)
 
 
 def foretell(scene: BenchScene, qualities: Sequence[Quality], tell: Tell) -> list[Foretold]:

@@ -96,7 +96,7 @@ def markdown_of(bench: Bench) -> str:
         "",
         f"Made by `{bench.command}`. {bench.machine}.",
         "",
-        "Time is of the whole field, processor time against the reference's in the same round (median of rounds).",
+        "Time is of the whole field, processor time against that of *fast* in the same round (median of rounds).",
         "Seconds by the clock depend on what else the machine does. Memory is what a run takes beyond what was there:",
         f"rays, views in flight and those kept. {FRONT_MARK}: on the Pareto front, where nothing else is as cheap and",
         "better, or as good and cheaper. What the renderer trades is in [optics.md](optics.md).",
@@ -141,7 +141,7 @@ def means_table(scenes: Sequence[SceneFigures]) -> Table:
         )
         for mean in found
     )
-    return Table(("variant", "front", "time / reference", "PSNR against reference, dB", "FLIP"), rows)
+    return Table(("variant", "front", "time / fast", "PSNR against fast, dB", "FLIP"), rows)
 
 
 def scene_table(scene: SceneFigures) -> Table:
@@ -159,7 +159,7 @@ def scene_table(scene: SceneFigures) -> Table:
         )
         for m in scene.measured
     )
-    return Table(("variant", "front", "time / reference", "s by the clock", "peak MiB", "PSNR dB", "FLIP"), rows)
+    return Table(("variant", "front", "time / fast", "s by the clock", "peak MiB", "PSNR dB", "FLIP"), rows)
 
 
 def foretold_table(foretold: Sequence[Foretold]) -> Table:
@@ -257,8 +257,8 @@ def _draw_panel(axis: Axes, title: str, points: dict[str, tuple[float, float]], 
     axis.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_title(title, fontsize=9)
-    axis.set_xlabel("time / reference")
-    axis.set_ylabel("PSNR against reference, dB")
+    axis.set_xlabel("time / fast")
+    axis.set_ylabel("PSNR against fast, dB")
     axis.grid(alpha=0.25, which="both")
 
 

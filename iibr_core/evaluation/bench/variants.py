@@ -50,7 +50,7 @@ class Variant:
     every: int = 1
 
 
-REFERENCE = Variant("fast (default)")
+REFERENCE = Variant("fast")
 VARIANTS = (
     REFERENCE,
     Variant("balanced", "balanced"),
@@ -66,6 +66,7 @@ VARIANTS = (
     Variant("every 2nd view stored", every=2),
     Variant("every 2nd view stored, balanced", "balanced", every=2),
     Variant("every 4th view stored", every=4),
+    Variant("every 4th view stored, balanced", "balanced", every=4),
     Variant("centre and corners stored", every=0),
 )
 

@@ -1,0 +1,156 @@
+"""The cases of fuzzing: who reads which damaged files.
+
+A case is a pure function of (reader, seed, number), so that a finding is told by three words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import fuzz_seeds as seeds
+from benchmarks.fuzz_damage import Seed, damaged, mended_png
+from iibr_core.types import InputError
+
+MAX_PIXELS = 100_000
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Who reads the files: `read` gets the path of a damaged one; `prepare` puts beside it what it needs."""
+
+    seeds: Callable[[], list[Seed]]
+    read: Callable[[Path], object]
+    prepare: Callable[[Path], None] = lambda folder: None
+
+
+def case(name: str, seed: int, number: int) -> tuple[str, bytes]:
+    """File name and bytes of a case."""
+    return damaged(_seeds_of(name), np.random.default_rng([seed, number, *name.encode()]))
+
+
+def _read_photo(path: Path) -> None:
+    from iibr_core.formats.photo import read_photo
+
+    pixels = read_photo(path, MAX_PIXELS).pixels
+    assert pixels.ndim == 3
+    assert pixels.shape[0] * pixels.shape[1] <= MAX_PIXELS
+    assert np.isfinite(pixels).all()
+    assert (pixels >= 0).all()
+
+
+def _read_map(path: Path) -> None:
+    from iibr_core.depth.sidecar import read_disparity
+
+    assert np.isfinite(read_disparity(path, seeds.SIZE).values).all()
+
+
+def _open_with_depth(path: Path) -> None:
+    from iibr_core.depth.source import open_with_depth
+
+    found = open_with_depth(path, max_pixels=MAX_PIXELS)
+    assert found.disparity.values.shape == found.photo.size
+    assert np.isfinite(found.disparity.values).all()
+
+
+def _read_field(path: Path) -> None:
+    from iibr_core.formats.grid_folder import read_grid_folder
+    from iibr_core.formats.hci import read_light_field
+
+    refused = None
+    for read in (read_light_field, read_grid_folder):
+        try:
+            found = read(path.parent)
+            if isinstance(found, tuple):
+                assert len(list(found[1])) == 4
+                assert 0 < found[0].focal_px < np.inf
+        except InputError as error:
+            refused = error
+    if refused:
+        raise refused
+
+
+def _four_views(folder: Path) -> None:
+    for k in range(4):
+        (folder / f"input_Cam{k:03d}.png").write_bytes(seeds.by_pillow("PNG"))
+
+
+def _read_settings(path: Path) -> None:
+    from viewer.saved_settings import read_settings
+
+    read_settings(path)
+
+
+def _read_mask(path: Path) -> None:
+    from viewer.aperture_mask import read_mask
+
+    read_mask(path)
+
+
+def _read_poses(path: Path) -> None:
+    from iibr_core.formats.llff import read_llff
+
+    scene = read_llff(path.parent)
+    assert scene is None or all(np.isfinite(view.offset).all() for view in scene.views)
+
+
+def _read_preferences(path: Path) -> None:
+    from viewer.kept import with_kept
+    from viewer.state import AppState
+
+    if with_kept(AppState(), path.parent).notices:
+        raise InputError("told in a notice")
+
+
+def _read_estimate(path: Path) -> None:
+    from iibr_core.depth import estimate_cache
+
+    estimate_cache.cache_folder = lambda: path.parent
+    if estimate_cache.load(path.stem) is None:
+        raise InputError("as if there were none")
+
+
+def _read_model_config(path: Path) -> None:
+    from iibr_core.depth.model_config import read_preparation
+
+    read_preparation(path.parent, "depth_anything")
+
+
+def _read_weights(path: Path) -> None:
+    from iibr_core.ray_weights import TrainedWeights
+
+    TrainedWeights(path)
+
+
+READERS: dict[str, Reader] = {
+    "jpeg": Reader(seeds.jpegs, _read_photo),
+    "png": Reader(seeds.pngs, _read_photo),
+    "tiff": Reader(seeds.tiffs, _read_photo),
+    "exr": Reader(seeds.exrs, _read_photo),
+    "hdr": Reader(lambda: [Seed("a.hdr", seeds.written("hdr", seeds.sample(3, np.float32), "float"))], _read_photo),
+    "webp": Reader(lambda: [Seed("a.webp", seeds.by_pillow("WEBP", lossless=x)) for x in (True, False)], _read_photo),
+    "pnm": Reader(seeds.pnms, _read_photo),
+    "other": Reader(seeds.others, _read_photo),
+    "heic": Reader(seeds.heics, _open_with_depth),
+    "embedded": Reader(seeds.photos_with_depth, _open_with_depth),
+    "pfm": Reader(seeds.pfms, _read_map),
+    "npy": Reader(seeds.npys, _read_map),
+    "map-png": Reader(lambda: [Seed("a_depth.png", seeds.by_pillow("PNG", "L"), mended_png)], _read_map),
+    "cfg": Reader(seeds.cfgs, _read_field, _four_views),
+    "poses": Reader(seeds.poses, _read_poses, _four_views),
+    "preferences": Reader(seeds.preferences, _read_preferences),
+    "estimates": Reader(seeds.estimates, _read_estimate),
+    "model-config": Reader(seeds.model_configs, _read_model_config),
+    "settings": Reader(seeds.saved_settings, _read_settings),
+    "mask": Reader(seeds.pngs, _read_mask),
+    "weights": Reader(seeds.weights, _read_weights),
+}
+
+
+@cache
+def _seeds_of(name: str) -> list[Seed]:
+    return READERS[name].seeds()

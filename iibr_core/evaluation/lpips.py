@@ -1,0 +1,71 @@
+"""LPIPS (Zhang et al. 2018) on AlexNet, from local files: the network of torchvision, the weights of its layers' errors
+of LPIPS 0.1. Neither package is needed.
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from iibr_core.types import FloatImage, InputError
+
+LAYERS = ((0, 64, 4, 2), (3, 192, 1, 2), (6, 384, 1, 1), (8, 256, 1, 1), (10, 256, 1, 1))
+"""Of AlexNet: number in torchvision's file, channels, stride, padding; a pooling before the second and the third."""
+POOLED = (3, 6)
+SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
+LEAST_PX = 64
+FILES = "torchvision's alexnet-owt-*.pth and LPIPS's alex.pth"
+
+
+class Lpips:
+    """Mean distance of two pictures, 0 = alike."""
+
+    def __init__(self, folder: Path) -> None:
+        """folder: holds FILES. Raises InputError, naming the file, where one is missing or something else."""
+        backbone = next(iter(sorted(folder.glob("alexnet*.pth"))), folder / "alexnet-owt-7be5be79.pth")
+        kinds = ("weight", "bias")
+        names = [f"features.{number}.{kind}" for number, *_ in LAYERS for kind in kinds]
+        stored = _tensors(backbone, names)
+        self._convolutions = [(stored[2 * k], stored[2 * k + 1]) for k in range(len(LAYERS))]
+        self._shares = _tensors(folder / "alex.pth", [f"lin{k}.model.1.weight" for k in range(len(LAYERS))])
+        for path, tensors in ((backbone, stored[::2]), (folder / "alex.pth", self._shares)):
+            found = [tensor.shape[0 if path == backbone else 1] for tensor in tensors if tensor.ndim == 4]
+            if found != [channels for _, channels, _, _ in LAYERS]:
+                raise InputError(f"{path}: is another network; --lpips wants a folder with {FILES}")
+
+    def __call__(self, image: FloatImage, truth: FloatImage) -> float:
+        """Of (H, W, 3), sRGB-encoded in 0..1; NaN where they are too small for the network (below LEAST_PX)."""
+        if min(truth.shape[:2]) < LEAST_PX:
+            return math.nan
+        with torch.no_grad():
+            pairs = zip(self._features(image), self._features(truth), self._shares)
+            return float(sum(functional.conv2d((one - two) ** 2, share).mean() for one, two, share in pairs))
+
+    def _features(self, image: FloatImage) -> list[Tensor]:
+        """What each layer sees, of unit length in every place."""
+        shift, scale = (torch.tensor(values).view(1, 3, 1, 1) for values in (SHIFT, SCALE))
+        x = (torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None] * 2 - 1 - shift) / scale
+        found = []
+        for (number, _, stride, padding), (weight, bias) in zip(LAYERS, self._convolutions):
+            if number in POOLED:
+                x = functional.max_pool2d(x, 3, 2)
+            x = functional.relu(functional.conv2d(x, weight, bias, stride, padding))
+            found.append(x / (x.square().sum(dim=1, keepdim=True).sqrt() + 1e-10))
+        return found
+
+
+def _tensors(path: Path, names: list[str]) -> list[Tensor]:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; --lpips wants a folder with {FILES}")
+    try:
+        stored = torch.load(path, map_location="cpu", weights_only=True)
+        return [stored[name].float() for name in names]
+    except (OSError, RuntimeError, KeyError, TypeError, AttributeError, EOFError, pickle.UnpicklingError) as error:
+        reason = str(error).strip().partition("\n")[0][:100] or type(error).__name__
+        raise InputError(f"{path}: cannot be read ({reason}); --lpips wants a folder with {FILES}") from error

@@ -1,0 +1,179 @@
+"""The hard cases of the design, section 8, on the graphics card: extreme apertures, eyes, disparities and grids.
+
+Expected everywhere: no GL error (the `gl` fixture looks), and a picture within the range of what the views show.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.types import GridShape, ViewOffset
+from tests.image_compare import ROUNDING, assert_close
+from tests.viewer.gpu.scenes import TwoPlanes, rms
+from viewer.gpu.context import GLContext
+from viewer.gpu.renderer import Renderer
+from viewer.limits import eye_limits
+from viewer.state import Optics
+
+SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
+SIZE = SCENE.width, SCENE.height
+GRID = GridShape(3, 3)
+COLOR = (10, 130, 250)
+
+
+def picture(renderer: Renderer, optics: Optics, size: tuple[int, int] = SIZE) -> np.ndarray:
+    renderer.render(optics, size)
+    return renderer.read_image().astype(int)
+
+
+def open_constant(renderer: Renderer, grid: GridShape, disparity: float, size: tuple[int, int] = SIZE) -> None:
+    """A field of one colour whose half is near, the other far."""
+    width, height = size
+    renderer.open_field(grid, width, height, hdr=False, with_disparity=True)
+    values = np.where(np.arange(width) < width // 2, disparity, -disparity) * np.ones((height, 1))
+    for row in range(grid.rows):
+        for column in range(grid.columns):
+            colors = np.full((height, width, 3), COLOR, np.uint8)
+            renderer.upload_view(row, column, colors, values.astype(np.float32))
+
+
+def test_aperture_0_is_the_pinhole_picture(renderer: Renderer, tmp_path: Path) -> None:
+    """The stored view, whatever the focus; a negative one is none either."""
+    SCENE.fill(renderer, GRID)
+    view = SCENE.view(ViewOffset(1.0, -1.0))[0]
+    for focus, diameter in ((-1.0, 0.0), (40.0, 0.0), (2.0, -3.0), (2.0, 1e-42)):
+        optics = Optics(ViewOffset(1.0, -1.0), focus_disparity=focus, aperture_diameter=diameter)
+        assert_close(picture(renderer, optics).astype(np.uint8), view, ROUNDING, tmp_path)
+
+
+def test_an_aperture_larger_than_the_grid_sees_all_views(renderer: Renderer) -> None:
+    """Once it holds the whole grid, opening it further changes nothing but what lies beyond the stored views."""
+    SCENE.fill(renderer, GRID)
+    pictures = [picture(renderer, Optics(focus_disparity=2.0, aperture_diameter=d)) for d in (8.0, 1e3, 1e30)]
+    for image in pictures[1:]:
+        assert np.abs(image - pictures[1]).max() <= 1
+        assert rms(image.astype(np.uint8), pictures[0].astype(np.uint8), border=4) < 0.05
+
+
+@pytest.mark.parametrize("far", [1e2, 1e6, 1e30, 3e38])
+def test_view_offset_far_outside_the_grid(renderer: Renderer, far: float) -> None:
+    """What is shown are colours of the scene: the stored views end, so their edges are continued."""
+    open_constant(renderer, GRID, 1.5)
+    for optics in (Optics(ViewOffset(far, -far)), Optics(ViewOffset(-far, 0.0), aperture_diameter=2.0)):
+        assert np.abs(picture(renderer, optics) - COLOR).max() <= 1
+
+
+@pytest.mark.parametrize("disparity", [0.0, 1e-6, 500.0, 1e6, 3e38])
+def test_disparities_of_any_size(renderer: Renderer, disparity: float) -> None:
+    """All equal (0), larger than the image, beyond half floats: through a pinhole one colour stays one colour.
+
+    Through a lens too, up to some 2000 px of defocus a view step; half floats then lose light of what is behind.
+    """
+    open_constant(renderer, GRID, disparity)
+    apertures = (0.0, 2.5) if disparity <= 500 else (0.0,)
+    for focus in (0.0, disparity, -1000.0):
+        for diameter in apertures:
+            optics = Optics(ViewOffset(0.3, -0.6), focus_disparity=focus, aperture_diameter=diameter)
+            assert np.abs(picture(renderer, optics) - COLOR).max() <= 1, optics
+
+
+eyes = st.floats(*eye_limits(3))
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.builds(
+        Optics,
+        st.builds(ViewOffset, eyes, eyes),
+        st.floats(-1, 1),
+        st.floats(-5, 5),
+        st.floats(0, 10),
+        st.tuples(st.floats(-40, 40), st.floats(-40, 40)),
+        st.floats(0, 3),
+    )
+)
+def test_refocus_of_a_constant_photo_is_constant(renderer: Renderer, optics: Optics) -> None:
+    """Whatever the eye, dolly, focus, tilt, range and aperture that the viewer allows: weights are weights."""
+    if renderer.field is None:
+        open_constant(renderer, GRID, 4.0)
+    assert np.abs(picture(renderer, optics) - COLOR).max() <= 1
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 13), (11, 1), (7, 13), (17, 16)])
+def test_tiny_thin_and_prime_sized_views(renderer: Renderer, size: tuple[int, int]) -> None:
+    open_constant(renderer, GRID, 2.0, size)
+    for optics in (Optics(ViewOffset(0.5, -0.5)), Optics(aperture_diameter=3.0, focus_disparity=1.0)):
+        for drawn in (size, (5, 3), (64, 40)):
+            assert np.abs(picture(renderer, optics, drawn) - COLOR).max() <= 1
+
+
+def test_float16_sums_of_289_views(renderer: Renderer) -> None:
+    """Light far beyond white, summed over 17x17 half-float views, does not drift: within two steps of 8 bits."""
+    grid, light = GridShape(17, 17), 3.0
+    renderer.open_field(grid, 8, 6, hdr=True, with_disparity=False)
+    encoded = srgb_from_linear(np.full((6, 8, 3), light)).astype(np.float16)
+    for row in range(17):
+        for column in range(17):
+            renderer.upload_view(row, column, encoded, None)
+    optics = Optics(aperture_diameter=40.0, exposure_stops=math.log2(0.5 / light))
+    expected = 255 * srgb_from_linear(np.array(0.5))
+    assert np.abs(picture(renderer, optics, (8, 6)) - expected).max() <= 2
+    linear = renderer.converged_picture(replace(optics, exposure_stops=0.0), (8, 6), is_linear=True)
+    assert linear == pytest.approx(float(linear_from_srgb(encoded)[0, 0, 0]), rel=2e-3)
+
+
+def test_texture_arrays_over_the_layer_limit_keep_fewer_views(renderer: Renderer, gl: GLContext) -> None:
+    """Of this driver's own limit: every other view is shown, and said."""
+    side = math.isqrt(gl.max_layers) + 1
+    renderer.open_field(GridShape(side, side), 4, 4, hdr=False, with_disparity=False)
+    assert "2nd view across and down" in renderer.note
+    centre = GridShape(side, side).centre
+    renderer.upload_view(*centre, np.full((4, 4, 3), COLOR, np.uint8), None)
+    assert np.abs(picture(renderer, Optics(aperture_diameter=1e3), (4, 4)) - COLOR).max() <= 1
+
+
+@pytest.mark.parametrize("with_disparity", [True, False])
+def test_a_grid_of_1x1(renderer: Renderer, tmp_path: Path, with_disparity: bool) -> None:
+    """The photo through a pinhole; through a lens it stays a picture, of its own brightness."""
+    SCENE.fill(renderer, GridShape(1, 1), with_disparity)
+    photo = SCENE.view(ViewOffset(0.0, 0.0))[0]
+    assert_close(picture(renderer, Optics()).astype(np.uint8), photo, ROUNDING, tmp_path)
+    blurred = picture(renderer, Optics(aperture_diameter=3.0, focus_disparity=2.0))
+    light = linear_from_srgb(blurred / 255).mean() / linear_from_srgb(photo / 255).mean()
+    assert light == pytest.approx(1, abs=0.05)
+
+
+def test_two_surfaces_1e_4_apart(renderer: Renderer) -> None:
+    """No seam between them."""
+    scene = replace(SCENE, back=1.0, front=1.0001)
+    scene.fill(renderer, GRID)
+    eye = ViewOffset(0.5, 0.5)
+    truth = scene.view(eye)[0].astype(int)
+    difference = np.abs(picture(renderer, Optics(eye)) - truth).max(axis=2)[4:-4, 4:-4]
+    y, x = np.indices(truth.shape[:2])
+    rim = np.abs(np.hypot(x - scene.width / 2 + 0.5, y - scene.height / 2 + 0.5) - scene.radius_px) < 2
+    assert difference[~rim[4:-4, 4:-4]].max() <= 4
+
+
+def test_a_one_pixel_wire(renderer: Renderer) -> None:
+    """Between stored views it is still there, about as bright and as wide as it is."""
+    width, height, front = 40, 24, 3.0
+    renderer.open_field(GRID, width, height, hdr=False, with_disparity=True)
+    for row in range(3):
+        for column in range(3):
+            at = round(20 - front * (column - 1))
+            colors, disparity = np.full((height, width, 3), 30, np.uint8), np.zeros((height, width), np.float32)
+            colors[:, at], disparity[:, at] = 220, front
+            renderer.upload_view(row, column, colors, disparity)
+    for s in (0.0, 1.0, 1 / 3):
+        row = picture(renderer, Optics(ViewOffset(0.0, s)), (width, height))[12, :, 0]
+        assert row[round(20 - front * s)] > 180, s
+        assert (row > 100).sum() <= 2

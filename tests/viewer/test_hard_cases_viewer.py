@@ -1,0 +1,253 @@
+"""Hard cases and faults seen from the viewer: each ends in a scene or in one line, and the viewer goes on.
+
+Beside these: a worker that is lost (test_worker.py, test_window_everyday.py), preferences that cannot be kept
+(test_kept.py), memory of the graphics card (gpu/test_light_field_texture.py), contexts (gpu/test_context.py).
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.formats.hci import HciWriter
+from iibr_core.formats.photo import write_image
+from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from tests.viewer.conftest import write_scene
+from tests.viewer.test_worker import Desk
+from viewer.actions import MoveEye, SetAperture
+from viewer.headless import HeadlessViewer
+from viewer.kept import keep, with_kept
+from viewer.saved_settings import read_settings, settings_text_in
+from viewer.saving import save_picture
+from viewer.state import CENTRE, AppState, SaveTask, Source
+from viewer.worker import Failed, Request, SceneReady, ViewReady, results_of
+
+GRID = GridShape(3, 3)
+
+
+@contextmanager
+def full_disk(room: int) -> Iterator[None]:
+    """Files cannot grow beyond this many bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def desk() -> Iterator[Desk]:
+    made = Desk()
+    yield made
+    made.worker.close()
+
+
+def failure(desk: Desk, request: Request) -> str:
+    """What the worker says of a job that must fail; then it carries out another."""
+    desk.worker.submit(request)
+    while not isinstance(result := desk.next(), Failed):
+        assert not isinstance(result, SceneReady | ViewReady)
+    assert "\n" not in result.message
+    return result.message
+
+
+def goes_on(desk: Desk, folder: Path, generation: int) -> None:
+    """The worker makes a whole field of a good photo."""
+    photo = write_scene(folder, "good")
+    desk.worker.submit(Request(generation, Source(str(photo), grid=GridShape(1, 2))))
+    while not (isinstance(result := desk.next(), ViewReady) and result.progress.done == 2):
+        assert not isinstance(result, Failed)
+
+
+def garbage(path: Path) -> None:
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (Path.unlink, "no such file"),
+        (lambda path: path.write_bytes(b""), "empty"),
+        (garbage, "cut off"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-40]), "cut off"),
+    ],
+    ids=["deleted", "emptied", "garbage", "cut off"],
+)
+def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
+    desk: Desk, tmp_path: Path, damage: Callable[[Path], None], reason: str
+) -> None:
+    photo = write_scene(tmp_path)
+    damage(photo)
+    message = failure(desk, Request(1, Source(str(photo))))
+    assert "scene.png" in message
+    assert reason in message
+    goes_on(desk, tmp_path, 2)
+
+
+def test_too_little_memory_is_one_line_and_the_worker_goes_on(desk: Desk, tmp_path: Path) -> None:
+    message = failure(desk, Request(1, Source(str(write_scene(tmp_path)), memory_bytes=10_000)))
+    assert "raise --memory or lower --max-pixels" in message
+    goes_on(desk, tmp_path, 2)
+
+
+def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(tmp_path: Path) -> None:
+    """Truly, not by a budget: an array that no machine has room for, in the midst of the views."""
+
+    def work(request: Request, should_stop: Callable[[], bool], eye: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+        for result in results_of(request, should_stop, eye):
+            yield result  # type: ignore[misc]
+            if request.generation == 1 and isinstance(result, ViewReady):
+                np.zeros(1 << 56, np.uint8)
+
+    desk = Desk(work)
+    try:
+        desk.worker.submit(Request(1, Source(str(write_scene(tmp_path)), grid=GRID)))
+        while not isinstance(result := desk.next(), Failed):
+            pass
+        assert "MemoryError" in result.message
+        assert "\n" not in result.message
+        goes_on(desk, tmp_path, 2)
+    finally:
+        desk.worker.close()
+
+
+def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) -> None:
+    """The views that were read stay; the one that is gone is named."""
+    with HciWriter(tmp_path / "field", GRID, 50.0, "field") as writer:
+        for row in range(3):
+            for column in range(3):
+                writer.add(ViewUpdate(row, column, np.full((8, 9, 3), 90, np.uint8), None))
+    results = results_of(Request(1, Source(str(tmp_path / "field"))), lambda: False, lambda: CENTRE)
+    assert isinstance(next(results), SceneReady)
+    (tmp_path / "field" / "input_Cam008.png").unlink()
+    seen = []
+    with pytest.raises(InputError, match=r"input_Cam008\.png: no such file"):
+        seen += list(results)
+    message = failure(desk, Request(2, Source(str(tmp_path / "field"))))
+    assert "input_Cam008.png: this view is missing" in message
+    goes_on(desk, tmp_path, 3)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (7, 1), (5, 13)])
+def test_photos_of_any_size_and_depth_become_scenes(tmp_path: Path, size: tuple[int, int]) -> None:
+    """With a map of NaN, infinity, an outlier and negative values beside them."""
+    random = np.random.default_rng(0)
+    write_image(tmp_path / "a.png", random.integers(0, 256, (*size, 3), dtype=np.uint8))
+    values = random.uniform(-3, 3, size).astype(np.float32)
+    values.flat[: min(values.size - 1, 4)] = [np.nan, np.inf, 1e6, -np.inf][: values.size - 1]
+    np.save(tmp_path / "a_disparity.npy", values)
+    results = list(results_of(Request(1, Source(str(tmp_path / "a.png"), grid=GRID)), lambda: False, lambda: CENTRE))
+    assert isinstance(results[0], SceneReady)
+    views = [result.view for result in results if isinstance(result, ViewReady)]
+    assert len(views) == 9
+    assert all(view.disparity is not None and np.isfinite(view.disparity).all() for view in views)
+
+
+@pytest.fixture
+def viewer(tmp_path: Path) -> Iterator[HeadlessViewer]:
+    try:
+        made = HeadlessViewer("egl")
+    except InputError as error:
+        pytest.skip(str(error))
+    with made:
+        made.open(Source(str(write_scene(tmp_path)), grid=GRID), 1.0, lambda progress: None)
+        yield made
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+def test_a_full_disk_while_a_picture_is_saved(viewer: HeadlessViewer, tmp_path: Path, name: str) -> None:
+    """One line, nothing half-written, what was there stays; with room again the same picture is saved."""
+    path = tmp_path / name
+    path.write_bytes(b"mine")
+    task = SaveTask(str(path), (96, 64), may_replace=True)
+    others = set(tmp_path.iterdir())
+    with full_disk(900), pytest.raises(InputError, match=f"{name}: cannot be written"):
+        save_picture(viewer._stage, viewer.state, task)
+    assert path.read_bytes() == b"mine"
+    assert set(tmp_path.iterdir()) == others
+    save_picture(viewer._stage, viewer.state, task)
+    assert read_settings(path).size_px == (96, 64)
+
+
+def test_the_photo_may_go_once_it_is_open(viewer: HeadlessViewer, tmp_path: Path) -> None:
+    before = viewer.picture()
+    (tmp_path / "scene.png").unlink()
+    (tmp_path / "scene_disparity.npy").unlink()
+    viewer.do(MoveEye(ViewOffset(0.5, 0.5)), SetAperture(2.0))
+    assert (viewer.picture() != before).any()
+    with pytest.raises(InputError, match=r"scene\.png: no such file"):
+        viewer.open(Source(str(tmp_path / "scene.png")), 1.0, lambda progress: None)
+
+
+def test_preferences_on_a_full_disk_keep_the_old_ones(tmp_path: Path) -> None:
+    state = replace(AppState(), recent=("/a.png",))
+    keep(state, tmp_path)
+    with full_disk(10), pytest.raises(InputError, match="cannot be written"):
+        keep(replace(state, recent=("/b.png",)), tmp_path)
+    assert with_kept(AppState(), tmp_path).recent == ("/a.png",)
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_settings_that_are_no_text(tmp_path: Path) -> None:
+    """Found by fuzzing: bytes that are no UTF-8 where the settings stand."""
+    write_image(tmp_path / "a.exr", np.zeros((4, 4, 3), np.uint8), {"iibr:settings": "{some text}"})
+    data = (tmp_path / "a.exr").read_bytes()
+    assert settings_text_in(tmp_path / "a.exr") == "{some text}"
+    (tmp_path / "a.exr").write_bytes(data.replace(b"{some text}", b"{\xff\xfe\xfd text}"))
+    with pytest.raises(InputError, match=r"a\.exr: its settings are damaged"):
+        read_settings(tmp_path / "a.exr")
+
+
+def test_a_refused_gl_context_is_one_line(tmp_path: Path) -> None:
+    """EGL without any driver."""
+    photo = write_scene(tmp_path)
+    command = [
+        sys.executable,
+        "-m",
+        "viewer",
+        "screenshot",
+        str(photo),
+        "--backend",
+        "egl",
+        "-o",
+        str(tmp_path / "o.png"),
+    ]
+    nowhere = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent.json", "LIBGL_DRIVERS_PATH": "/nonexistent"}
+    done = subprocess.run(command, env={**os.environ, **nowhere}, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.strip().splitlines()[-1].startswith("iibr: no OpenGL 3.3 without a display: egl")
+    assert not (tmp_path / "o.png").exists()
+
+
+STARVED = """
+import resource, sys
+import psutil
+from viewer.cli import main
+import iibr_core.generate, viewer.worker, iibr_core.formats.photo, iibr_core.depth.source
+room = psutil.Process().memory_info().vms + (160 << 20)
+resource.setrlimit(resource.RLIMIT_AS, (room, room))
+main()
+"""
+
+
+def test_memory_that_runs_out_of_a_command_is_one_line(tmp_path: Path) -> None:
+    """The system gives no more: nothing is written, and the way out is named."""
+    write_image(tmp_path / "large.png", np.zeros((3000, 4000, 3), np.uint8))
+    given = ["generate", "large.png", "--depth", "flat", "--max-pixels", "12000000", "--grid", "3", "--out", "field"]
+    done = subprocess.run(
+        [sys.executable, "-c", STARVED, *given], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2, done.stderr
+    assert "out of memory" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {"large.png"}
