@@ -139,7 +139,7 @@ def ablations(data: Path, scenes: int, steps: int) -> list[str]:
         "frame, PSNR in dB (12 outer views of antinous, the right views of the Middlebury pairs).",
         "",
         "| variant | held out | " + " | ".join(SCENES) + " |",
-        "| --- | " + " --- |" * (1 + len(SCENES)),
+        "| --- |" + " --- |" * (1 + len(SCENES)),
         *(f"| {name} | {gain:+.2f} | " + " | ".join(f"{v:.2f}" for v in values) + " |" for name, gain, values in rows),
         "",
     ]

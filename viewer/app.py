@@ -267,8 +267,9 @@ class App:
 
     def _preview_depth(self) -> None:
         """While depth is edited, show it; the views of what it was before need not be made."""
-        if is_depth_ahead(self.state, self._work):
-            self._worker.cancel()
+        if not is_depth_ahead(self.state, self._work):
+            return
+        self._worker.cancel()
         try:
             self._depth.update(self.state)
         except InputError as error:

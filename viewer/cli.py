@@ -263,8 +263,7 @@ def screenshot(
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
         with progress_shown("reading") as show:
-            tell = lambda progress: show(progress.done, progress.total, progress.doing)  # noqa: E731
-            viewer.open(source, depth_strength, tell, edits)
+            viewer.open(source, depth_strength, lambda made: show(made.done, made.total, made.doing), edits)
         if viewer.state.scene is not None:
             print_depth(viewer.state.scene.depth_origin)
             print_notes(viewer.state.scene.notes)

@@ -10,7 +10,7 @@ from viewer.actions import Action, AskForPath, DismissNotice, Notify, SetApertur
 from viewer.choices import chosen
 from viewer.dialogs import Dialog, has_dialogs
 from viewer.inspection import GroundTruth, TruthRead
-from viewer.saving import AlreadyThereError, save_map, save_picture
+from viewer.saving import MAX_PIXELS, AlreadyThereError, save_map, save_picture
 from viewer.stage import Stage
 from viewer.state import AppState, ChooseTask, Notice, ReadMaskTask, ReadTruthTask, SavePrompt, SaveTask, Task
 
@@ -66,8 +66,9 @@ class Errands:
 
     def _must_announce(self, task: SaveTask) -> bool:
         """Whether the notice about it has not been on the screen for some turns."""
-        if task.what == "map" or task.size_px[0] * task.size_px[1] < LARGE_PIXELS:
-            return False
+        pixels = task.size_px[0] * task.size_px[1]
+        if task.what == "map" or not LARGE_PIXELS <= pixels <= MAX_PIXELS:
+            return False  # what is too large is refused at once
         turns = self._announced[1] + 1 if self._announced is not None and self._announced[0] == task else 0
         self._announced = task, turns
         return turns < TURNS_ANNOUNCED

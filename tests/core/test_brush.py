@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from iibr_core.depth.brush import (
     CONTOUR_CONTRAST,
+    LIKENESS,
     DepthCanvas,
     edited,
     falloff,
     smoothed,
     stroke_distance,
-    texture_contrast,
+    touched_colours,
 )
 from iibr_core.depth.edit import BRUSH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
 from iibr_core.types import InputError
@@ -51,7 +52,9 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
     distance = np.ones((height, width))
     distance[row, column] = hypot(column - (x * width - 0.5), row - (y * height - 0.5)) / radius
     waiting = [(distance[row, column], row, column)]
-    noise = texture_contrast(photo)
+    colors = touched_colours(photo, stroke, 0)
+    away = np.linalg.norm(photo[:, :, None] - colors, axis=3).min(axis=2)
+    unlike = np.maximum(away - LIKENESS, 0)  # of blocks of 5 x 5: there are no specks but at the window's border
     while waiting:
         here, row, column = heapq.heappop(waiting)
         if here > distance[row, column]:
@@ -62,8 +65,7 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
                 if other == (row, column) or not (0 <= other[0] < height and 0 <= other[1] < width):
                     continue
                 length = hypot(down, across)
-                contrast = float(np.linalg.norm(photo[row, column].astype(float) - photo[other]))
-                way = here + length / radius + max(contrast - noise * length, 0) / CONTOUR_CONTRAST
+                way = here + length / radius + max(unlike[other] - unlike[row, column], 0) / CONTOUR_CONTRAST
                 if way < distance[other]:
                     distance[other] = way
                     heapq.heappush(waiting, (way, *other))
@@ -74,7 +76,7 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
 @given(st.integers(0, 1000), st.floats(0.05, 0.25), st.floats(0.1, 0.9), st.floats(0.1, 0.9))
 def test_distances_are_shortest_ways(seed: int, radius: float, x: float, y: float) -> None:
     rng = np.random.default_rng(seed)
-    photo = rng.uniform(0, 0.2, (HEIGHT // 5, WIDTH // 5, 3)).repeat(5, 0).repeat(5, 1).astype(np.float32)
+    photo = rng.uniform(0, 0.4, (HEIGHT // 5, WIDTH // 5, 3)).repeat(5, 0).repeat(5, 1).astype(np.float32)
     stroke = dab(x=x, y=y, radius=radius)
     np.testing.assert_allclose(stroke_distance(photo, stroke), slow_distance(photo, stroke), atol=1e-5)
 
@@ -108,6 +110,16 @@ def test_noise_is_no_contour() -> None:
     photo = np.clip(0.5 + rng.normal(0, 0.005, (HEIGHT, WIDTH, 3)), 0, 1).astype(np.float32)
     plain = stroke_distance(np.full_like(photo, 0.5), dab())
     assert np.abs(falloff(stroke_distance(photo, dab())) - falloff(plain)).max() < 0.15
+
+
+def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
+    photo = plain_photo(0.9, 0.9)
+    photo[:, : WIDTH // 2 : 2] = 0.1
+    photo[:, 1 : WIDTH // 2 : 2] = 0.4
+    near = falloff(stroke_distance(photo, dab(x=0.25)))
+    plain = falloff(stroke_distance(np.full_like(photo, 0.5), dab(x=0.25)))
+    np.testing.assert_allclose(near[:, : WIDTH // 2], plain[:, : WIDTH // 2], atol=1e-5)
+    assert not near[:, WIDTH // 2 :].any()
 
 
 def test_smoothing_is_its_slow_twin_along_a_row_and_keeps_a_constant() -> None:

@@ -43,7 +43,8 @@ def test_three_steps_write_weights_that_say_where_they_come_from(
     assert run(monkeypatch, *WORDS, "--steps", 3, "--out", out) == 0
     assert capsys.readouterr().out == f"{out}: {out.stat().st_size / 1000:.1f} kB after 3 steps\n"
     assert names(tmp_path) == WRITTEN
-    assert load_weights(out, RayTransformer())["command"] == f"iibr train --device cpu --seed 3 --steps 3 --out {out.name}"
+    expected = f"iibr train --device cpu --seed 3 --steps 3 --out {out.name}"
+    assert load_weights(out, RayTransformer())["command"] == expected
     assert len((tmp_path / "w.csv").read_text().splitlines()) == 4
 
 
