@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test bench install clean
+.PHONY: run test bench fuzz install clean
 
 run: install
 	@.ci/system-libraries run
@@ -23,6 +23,10 @@ test: install
 bench: install
 	@.ci/system-libraries test
 	$(BIN)/python -m benchmarks.report
+
+fuzz: install
+	@.ci/system-libraries test
+	$(BIN)/python -m benchmarks.fuzz
 
 install: $(READY)
 

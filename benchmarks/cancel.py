@@ -2,23 +2,57 @@
 
     python -m benchmarks.cancel [--pixels 4000000] [--times 20] [--quality fast balanced exact]
 
-The word comes at random moments of generating. The viewer's worker then drops the job. Target: 100 ms. The machine's
-load counts: the time that one row band of a view takes without being cancelled stands beside it.
+The word comes at random moments of generating. The viewer's worker then drops the job. Target: 100 ms. Other programs
+lengthen that, so the longest pieces of work between two questions whether to stop stand beside it, in processor time of
+their thread: of views, and of what finds depth before them.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
+from itertools import islice
 
 import numpy as np
 
+from iibr_core.bands import ShouldStop
+from iibr_core.depth.offline import estimate_offline
+from iibr_core.depth.refine import refine
 from iibr_core.generate import generate
 from iibr_core.plan import plan_literal
-from iibr_core.types import Disparity, GridShape, Photo
+from iibr_core.types import Disparity, GridShape, Photo, Quality, ViewUpdate
 
 GRID = GridShape(9, 9)
+LAST_S = 4.0
+"""The word comes within so many seconds."""
+WATCHED_VIEWS = 16
+"""The photo's own, the farthest, and some of the others."""
+BLUR_PX = 9
+
+
+class Watch:
+    """A should_stop that never says so. longest_ms: processor time of the longest pieces, by where they end."""
+
+    def __init__(self) -> None:
+        self.longest_ms: dict[str, float] = {}
+        self._threads = threading.local()
+
+    def __call__(self) -> bool:
+        """Ends a piece of the thread that asks, and begins its next."""
+        now = time.thread_time()
+        piece = 1e3 * (now - getattr(self._threads, "last", now))
+        place = _asker()
+        self.longest_ms[place] = max(self.longest_ms.get(place, 0.0), piece)
+        self._threads.last = time.thread_time()
+        return False
+
+    def told(self, count: int = 3) -> str:
+        """The longest pieces in words."""
+        longest = sorted(self.longest_ms.items(), key=lambda item: -item[1])[:count]
+        return ", ".join(f"{ms:.0f} ms before {place}" for place, ms in longest)
 
 
 def main() -> None:
@@ -37,6 +71,17 @@ def main() -> None:
             f" {given.times}); over 100 ms: {(waits > 100).sum()}",
             flush=True,
         )
+        watch = Watch()
+        for _ in islice(field(photo, disparity, watch, quality), WATCHED_VIEWS):
+            watch()
+        print(f"{'':9} longest pieces, processor time: {watch.told()}", flush=True)
+    for name, work in depth_work(photo, disparity).items():
+        work(lambda: False)
+        watch = Watch()
+        watch()
+        work(watch)
+        watch()
+        print(f"{name:9} {size}: longest pieces, processor time: {watch.told()}", flush=True)
 
 
 def scene(pixels: int) -> tuple[Photo, Disparity]:
@@ -48,28 +93,53 @@ def scene(pixels: int) -> tuple[Photo, Disparity]:
     return Photo(colors, 1000.0, "blocks"), Disparity(blocks[:height, :width].astype(np.float32), "blocks")
 
 
-def compiled(quality: str) -> None:
+def field(photo: Photo, disparity: Disparity, should_stop: ShouldStop, quality: Quality) -> Iterator[ViewUpdate]:
+    """The views of the whole field, so far as they are taken."""
+    return generate(photo, disparity, plan_literal(photo, disparity, GRID), should_stop, quality=quality)
+
+
+def depth_work(photo: Photo, disparity: Disparity) -> dict[str, Callable[[ShouldStop], object]]:
+    """What is done to depth before there are views: soft edges with holes refined, depth guessed from the photo."""
+    soft = np.lib.stride_tricks.sliding_window_view(disparity.values, BLUR_PX, axis=1).mean(axis=-1)
+    soft = np.pad(soft, ((0, 0), (BLUR_PX // 2, BLUR_PX // 2)), mode="edge").astype(np.float32)
+    soft[np.random.default_rng(0).random(soft.shape) < 0.1] = np.nan
+    return {
+        "refine": lambda should_stop: refine(photo.pixels, soft, should_stop=should_stop),
+        "guess": lambda should_stop: estimate_offline(photo, should_stop),
+    }
+
+
+def compiled(quality: Quality) -> None:
     """Everything that is needed, on a small photo."""
     photo, disparity = scene(5_000)
-    list(generate(photo, disparity, plan_literal(photo, disparity, GridShape(3, 3)), quality=quality))  # type: ignore[arg-type]
+    list(generate(photo, disparity, plan_literal(photo, disparity, GridShape(3, 3)), quality=quality))
 
 
-def wait_ms(photo: Photo, disparity: Disparity, quality: str, share: float) -> float:
+def wait_ms(photo: Photo, disparity: Disparity, quality: Quality, share: float) -> float:
     """Cancel at some moment of the first seconds; how long until the generator ends."""
-    plan = plan_literal(photo, disparity, GRID)
     stop, told = threading.Event(), []
 
     def cancel() -> None:
         told.append(time.perf_counter())
         stop.set()
 
-    timer = threading.Timer(0.05 + 4 * share, cancel)
+    views = field(photo, disparity, stop.is_set, quality)
+    timer = threading.Timer(0.05 + LAST_S * share, cancel)
     timer.start()
-    for _ in generate(photo, disparity, plan, stop.is_set, quality=quality):  # type: ignore[arg-type]
+    for _ in views:
         pass
     end = time.perf_counter()
     timer.join()
     return 1e3 * (end - told[0]) if told and end > told[0] else 0.0
+
+
+def _asker() -> str:
+    """Who asks whether to stop: a function of the core, or a thread about to begin its next band."""
+    frame = sys._getframe(2)
+    while frame.f_back and (frame.f_code.co_filename.endswith("bands.py") or frame.f_code.co_name == "_should_stop"):
+        frame = frame.f_back
+    is_of_core = "iibr_core" in frame.f_code.co_filename
+    return f"{frame.f_code.co_name}:{frame.f_lineno}" if is_of_core else "the next band of a thread"
 
 
 if __name__ == "__main__":

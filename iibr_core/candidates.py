@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.kernels import kernel, nearest_pixel
-from iibr_core.rays import RaySet
+from iibr_core.rays import CELL_PX, RaySet
+from iibr_core.smooth_cells import find_smooth_cells, follow_back, land_on_rough
 from iibr_core.types import FloatImage, ViewOffset
 
 SAME_SURFACE_PX = 0.5
 """Rays of one source whose colour look-ups lie closer than this are one candidate."""
 SEALED_GAP_PX = 0.75
 """A gap between landing neighbours up to this wide is no disocclusion: their footprints stretch to meet."""
-REACH_PX = 0.5 + 0.5 * (1 + SEALED_GAP_PX)
-"""A ray that lands farther than this from a pixel's centre does not touch the pixel."""
 LEAST_OVERLAP = 1e-4
 
 
@@ -33,7 +32,7 @@ class Candidates:
 
     count: (N, W), how many of the K slots are used. coverage: (K, N, W), the area of the target pixel their
     footprints cover (may exceed 1). disparity: (K, N, W), coverage-weighted mean. source: (K, N, W), index into the
-    ray set. Slots beyond count are undefined.
+    ray set. Slots beyond count are undefined. smooth: cells that one smooth surface fills (`find_smooth_cells`).
     """
 
     offset: ViewOffset
@@ -42,6 +41,7 @@ class Candidates:
     coverage: FloatImage
     disparity: FloatImage
     source: NDArray[np.uint8]
+    smooth: NDArray[np.bool_]
 
 
 def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], most: int = 5) -> Candidates:
@@ -50,6 +50,7 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     At most `most` for each ray, the front-most kept.
     """
     first_row, last_row = rows
+    smooth, about = find_smooth_cells(rays, offset, rows)
     shape = (most, last_row - first_row, rays.size[1])
     found = Candidates(
         offset,
@@ -58,15 +59,22 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
         np.empty(shape, np.float32),
         np.empty(shape, np.float32),
         np.empty(shape, np.uint8),
+        smooth,
     )
-    offsets, _, disparity, coverage, _, row_disparity, row_columns = rays.arrays
+    offsets, _, disparity, coverage, _ = rays.arrays
+    cells = rays.cells
     for k in range(len(rays)):
         t, s = offset.t - offsets[k, 0], offset.s - offsets[k, 1]
+        needed = land_on_rough(cells.low[k], cells.high[k], t, s, rows, smooth)
         _land(
-            disparity[k], coverage[k], row_disparity[k], row_columns[k], k, s, t, first_row,
+            disparity[k], coverage[k], needed, k, s, t, first_row,
             found.count, found.coverage, found.disparity, found.source,
         )  # fmt: skip
     _mean_disparity(found.count, found.coverage, found.disparity)
+    follow_back(
+        disparity[0], *offset, first_row, smooth, about,
+        found.count, found.coverage, found.disparity, found.source,
+    )  # fmt: skip
     return found
 
 
@@ -77,84 +85,68 @@ def _half_extent(gap):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _footprints(disparity, y, first, last, s, t, footprints):  # type: ignore[no-untyped-def]
-    """Where the rays of row y, columns [first, last), land: (left, right, top, bottom) edges in target pixels."""
-    height, width = disparity.shape
-    for x in range(first, last):
-        d = disparity[y, x]
-        left = right = top = bottom = 0.5
-        if x > 0:
-            left = _half_extent((disparity[y, x - 1] - d) * s)
-        if x + 1 < width:
-            right = _half_extent((d - disparity[y, x + 1]) * s)
-        if y > 0:
-            top = _half_extent((disparity[y - 1, x] - d) * t)
-        if y + 1 < height:
-            bottom = _half_extent((d - disparity[y + 1, x]) * t)
-        footprints[x, 0], footprints[x, 1] = x - d * s - left, x - d * s + right
-        footprints[x, 2], footprints[x, 3] = y - d * t - top, y - d * t + bottom
-
-
-@kernel
 def _land(  # type: ignore[no-untyped-def]
-    ray_disparity, ray_coverage, row_disparity, row_columns, index, s, t, first_row,
-    count, coverage, disparity, source,
+    ray_disparity, ray_coverage, needed, index, s, t, first_row, count, coverage, disparity, source
 ):  # fmt: skip
-    """Let all rays of one source land on the target rows. Until `_mean_disparity`, `disparity` holds sums weighted by
-    coverage.
+    """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, `disparity`
+    holds sums weighted by coverage.
 
     A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives
     way.
     """
     slots, rows, width = coverage.shape
-    footprints = np.empty((width, 4))
+    height = len(ray_disparity)
     tolerance = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
-    for y in range(ray_disparity.shape[0]):
-        low, high = y - row_disparity[y, 1] * t - first_row, y - row_disparity[y, 0] * t - first_row
-        if not (max(low, high) > -REACH_PX and min(low, high) < rows - 1 + REACH_PX):
-            continue
-        first, last = row_columns[y]
-        _footprints(ray_disparity, y, first, last, s, t, footprints)
-        for x in range(first, last):
-            filled = ray_coverage[y, x]
-            left, right = footprints[x, 0], footprints[x, 1]
-            top, bottom = footprints[x, 2] - first_row, footprints[x, 3] - first_row
-            if not (filled > 0 and right > -0.5 and left < width and bottom > -0.5 and top < rows):
+    for y in range(height):
+        for cell in range(needed.shape[1]):
+            if not needed[y // CELL_PX, cell]:
                 continue
-            d = ray_disparity[y, x]
-            for row in range(max(nearest_pixel(top), 0), min(ceil(bottom - 0.5) + 1, rows)):
-                overlap_y = filled * (min(bottom, row + 0.5) - max(top, row - 0.5))
-                for column in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
-                    overlap = np.float32(overlap_y * (min(right, column + 0.5) - max(left, column - 0.5)))
-                    if not overlap > LEAST_OVERLAP:
-                        continue
-                    used = np.int64(count[row, column])
-                    slot = 0
-                    while slot < used:
-                        c = coverage[slot, row, column]
-                        if (
-                            source[slot, row, column] == index
-                            and abs(disparity[slot, row, column] - d * c) <= tolerance * c
-                        ):
-                            break
-                        slot += 1
-                    if slot < used:
-                        coverage[slot, row, column] += overlap
-                        disparity[slot, row, column] += overlap * d
-                        continue
-                    if used < slots:
-                        count[row, column] = used + 1
-                    else:
-                        slot = 0
-                        for k in range(1, slots):
-                            ahead = disparity[slot, row, column] * coverage[k, row, column]
-                            if disparity[k, row, column] * coverage[slot, row, column] < ahead:
-                                slot = k
-                        if disparity[slot, row, column] >= d * coverage[slot, row, column]:
+            for x in range(cell * CELL_PX, min((cell + 1) * CELL_PX, width)):
+                filled = ray_coverage[y, x]
+                if not filled > 0:
+                    continue
+                d = ray_disparity[y, x]
+                landed_x, landed_y = x - d * s, y - d * t
+                left = landed_x - _half_extent((ray_disparity[y, max(x - 1, 0)] - d) * s)
+                right = landed_x + _half_extent((d - ray_disparity[y, min(x + 1, width - 1)]) * s)
+                top = landed_y - _half_extent((ray_disparity[max(y - 1, 0), x] - d) * t)
+                bottom = landed_y + _half_extent((d - ray_disparity[min(y + 1, height - 1), x]) * t)
+                if not (right > -0.5 and left < width and bottom > first_row - 0.5 and top < first_row + rows):
+                    continue
+                first_y, last_y = max(nearest_pixel(top), first_row), min(ceil(bottom - 0.5), first_row + rows - 1)
+                for row in range(first_y - first_row, last_y - first_row + 1):
+                    overlap_y = filled * (min(bottom, first_row + row + 0.5) - max(top, first_row + row - 0.5))
+                    for column in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
+                        overlap = np.float32(overlap_y * (min(right, column + 0.5) - max(left, column - 0.5)))
+                        if not overlap > LEAST_OVERLAP:
                             continue
-                    coverage[slot, row, column] = overlap
-                    disparity[slot, row, column] = overlap * d
-                    source[slot, row, column] = index
+                        used = np.int64(count[row, column])
+                        slot = 0
+                        while slot < used:
+                            c = coverage[slot, row, column]
+                            if (
+                                source[slot, row, column] == index
+                                and abs(disparity[slot, row, column] - d * c) <= tolerance * c
+                            ):
+                                break
+                            slot += 1
+                        if slot < used:
+                            coverage[slot, row, column] += overlap
+                            disparity[slot, row, column] += overlap * d
+                            continue
+                        if used < slots:
+                            count[row, column] = used + 1
+                        else:
+                            slot = 0
+                            for k in range(1, slots):
+                                ahead = disparity[slot, row, column] * coverage[k, row, column]
+                                if disparity[k, row, column] * coverage[slot, row, column] < ahead:
+                                    slot = k
+                            if disparity[slot, row, column] >= d * coverage[slot, row, column]:
+                                continue
+                        coverage[slot, row, column] = overlap
+                        disparity[slot, row, column] = overlap * d
+                        source[slot, row, column] = index
 
 
 @kernel

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from iibr_core.candidates import Candidates
 from iibr_core.kernels import kernel, linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.lookup import cubic, look_up
-from iibr_core.rays import RaySet
+from iibr_core.rays import CELL_PX, RaySet
 from iibr_core.types import FloatImage, ViewOffset
 
 HYPOTHESES = 6
@@ -33,6 +33,7 @@ AROUND = np.array(
     ]
 )  # fmt: skip
 """Where, in pixels down and right: this is enough to meet every surface that is not a sliver."""
+AROUND_DISTANCE = np.hypot(*AROUND.T)
 AROUND_SHARP = 12
 SOFT = 0.5
 """Where depth edges are softer than this, all of AROUND is looked at, else the first AROUND_SHARP."""
@@ -91,15 +92,16 @@ def find_contested(
     shape = (last - first) * candidates.count.shape[1], hypotheses
     pixel, number = np.empty((shape[0], 2), np.int64), np.zeros(shape[0], np.int64)
     disparity, source, share = np.empty(shape, np.float32), np.empty(shape, np.uint8), np.empty(shape, np.float32)
-    offsets, _, surfaces, coverage, _, _, _ = rays.arrays
+    offsets, _, surfaces, coverage, _ = rays.arrays
     around = rays.surroundings
     from_sources = np.array(candidates.offset) - offsets
     parallax = max(*map(abs, candidates.offset), 1e-9)
     is_soft = around.softness > SOFT
     looks = len(AROUND) if is_soft else AROUND_SHARP
+    certain = candidates.smooth & (not every and not is_soft)
     count = _lay_out(
-        candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step, from_sources,
-        rays.photo_images, parallax, is_soft, looks, candidates.first_row, first, last, every,
+        certain, candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step,
+        from_sources, rays.photo_images, parallax, is_soft, looks, candidates.first_row, first, last, every,
         pixel, number, disparity, source, share,
     )  # fmt: skip
     pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
@@ -177,17 +179,22 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
 
 @kernel
 def _lay_out(  # type: ignore[no-untyped-def]
-    count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
+    certain, count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
     photo_images, parallax, is_soft, looks, first_row, first, last, every,
     pixel, number, disparity, source, share,
 ):  # fmt: skip
-    """Select contested rays; pick the surfaces on each, then again and again the one around it farthest from those."""
+    """Select contested rays, none in certain cells; pick the surfaces on each, then again and again the one around it
+    farthest from those.
+    """
     _, rows, width = surface.shape
     height = step.shape[1]
     near_d, near_k = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64)
     found = 0
     for y in range(first, last):
+        certain_cells = certain[(y + first_row % CELL_PX) // CELL_PX]
         for x in range(width):
+            if certain_cells[x // CELL_PX]:
+                continue
             heavy = 0
             covered = 0.0
             for k in range(np.int64(count[y, x])):
@@ -274,8 +281,19 @@ def _describe(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     _, height, width = surfaces.shape
     rows = count.shape[0]
+    steps = np.empty_like(offsets)
+    for image in range(len(offsets)):
+        steps[image] = offsets[image] / max(np.hypot(offsets[image, 0], offsets[image, 1]), 1e-9)
+    log_parallax = np.log1p(parallax)
+    landed, distances = np.empty(len(AROUND)), np.empty(len(AROUND))
     for n in range(len(pixel)):
         y, x = pixel[n]
+        near = 0
+        for i in range(looks):
+            v, u = y + AROUND[i, 0], x + AROUND[i, 1]
+            if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
+                landed[near], distances[near] = shown_disparity[v, u], AROUND_DISTANCE[i]
+                near += 1
         front = back = disparity[n, 0]
         for a in range(number[n]):
             front, back = max(front, disparity[n, a]), min(back, disparity[n, a])
@@ -300,9 +318,8 @@ def _describe(  # type: ignore[no-untyped-def]
                         own, total = own + w * surfaces[k, v, u], total + w
             own = own / total if total > 0 else d
 
-            along = max(np.hypot(s, t), 1e-9)
             for i in range(len(PROFILE_PX)):
-                step_x, step_y = PROFILE_PX[i] * s / along, PROFILE_PX[i] * t / along
+                step_x, step_y = PROFILE_PX[i] * steps[k, 1], PROFILE_PX[i] * steps[k, 0]
                 for j in range(2):
                     v = min(max(nearest_pixel(source_y + (step_x if j else step_y)), 0), height - 1)
                     u = min(max(nearest_pixel(source_x + (-step_y if j else step_x)), 0), width - 1)
@@ -310,12 +327,9 @@ def _describe(  # type: ignore[no-untyped-def]
 
             # The nearest landing of this surface.
             nearest = 0.0 if share[n, a] > 0 else REACH_PX + 1.0
-            for i in range(looks):
-                v, u = y + AROUND[i, 0], x + AROUND[i, 1]
-                if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
-                    continue
-                if abs(shown_disparity[v, u] - d) * parallax < CONTESTED_PX:
-                    nearest = min(nearest, np.sqrt(AROUND[i, 0] ** 2 + AROUND[i, 1] ** 2))
+            for i in range(near):
+                if abs(landed[i] - d) * parallax < CONTESTED_PX:
+                    nearest = min(nearest, distances[i])
 
             v, u = min(max(nearest_pixel(source_y), 0), height - 1), min(max(nearest_pixel(source_x), 0), width - 1)
             around_low, around_high = min(low[k, v, u], d), max(high[k, v, u], d)
@@ -329,7 +343,7 @@ def _describe(  # type: ignore[no-untyped-def]
             out[SHARE] = share[n, a]
             out[7] = nearest / (REACH_PX + 1.0)
             out[8] = 1.0 if k >= photo_images else 0.0
-            out[9] = np.log1p(parallax)
+            out[9] = log_parallax
             out[10] = coverage[k, v, u]
             out[11] = softness
             out[12] = max(uncovered, 0.0)

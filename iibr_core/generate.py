@@ -6,16 +6,18 @@ the same content there. Then the ray set is final, and the remaining views may c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 
 import numpy as np
 
+from iibr_core.bands import Cancelled, ShouldStop, in_bands, never
 from iibr_core.color import stored_from_encoded
 from iibr_core.contested import Contested
 from iibr_core.plan import ScenePlan
 from iibr_core.rays import RaySet
 from iibr_core.resources import resource_folder
-from iibr_core.synthesis import Cancelled, RenderedView, ViewSynthesis, rays_of_photo
+from iibr_core.synthesis import RenderedView, ViewSynthesis, rays_of_photo
 from iibr_core.types import (
     DEFAULT_QUALITY,
     Disparity,
@@ -24,6 +26,7 @@ from iibr_core.types import (
     InputError,
     Photo,
     Quality,
+    StoredColors,
     ViewOffset,
     ViewUpdate,
 )
@@ -33,15 +36,15 @@ def generate(
     photo: Photo,
     disparity: Disparity,
     plan: ScenePlan,
-    should_stop: Callable[[], bool] = lambda: False,
+    should_stop: ShouldStop = never,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
     quality: Quality = DEFAULT_QUALITY,
-) -> Iterator[ViewUpdate]:
+) -> Generator[ViewUpdate, None, None]:
     """Yield every view of `plan.grid` once: the photo's own first, then the farthest, then those nearest to
     `nearest_to()`.
 
-    disparity is the field's (`plan.field_disparity(given)`). should_stop is asked between row bands of a view; once
-    it is true the generator returns. Pixels do not depend on the order of the views. quality: "fast" weighs by the
+    disparity is the field's (`plan.field_disparity(given)`). should_stop is asked every few milliseconds; once it
+    is true the generator returns. Pixels do not depend on the order of the views. quality: "fast" weighs by the
     closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for every ray;
     the farthest views then come with the others, once the ray set is complete.
 
@@ -49,36 +52,46 @@ def generate(
     """
     if disparity.values.shape != photo.size:
         raise ValueError(f"disparity is {disparity.values.shape}, the photo {photo.size} (height, width)")
+    with suppress(Cancelled):
+        yield from _views(photo, disparity, plan, should_stop, nearest_to, quality)
+
+
+def _views(
+    photo: Photo,
+    disparity: Disparity,
+    plan: ScenePlan,
+    should_stop: ShouldStop,
+    nearest_to: Callable[[], ViewOffset],
+    quality: Quality,
+) -> Iterator[ViewUpdate]:
     grid = plan.grid
-    yield ViewUpdate(
-        *grid.centre,
-        stored_from_encoded(photo.pixels, photo.is_hdr),
-        disparity.values,
-        np.zeros(photo.size, np.bool_),
-    )
+    colors = _stored(photo.pixels, photo.is_hdr, should_stop)
+    yield ViewUpdate(*grid.centre, colors, disparity.values, np.zeros(photo.size, np.bool_))
     remaining = [(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
     if not remaining:
         return
-    try:
-        transformer = transformer_for(quality)
-        rays, farthest_views = ray_set(photo, disparity, plan, should_stop)
-        for index, view in farthest_views:
-            if transformer is None:
-                remaining.remove(index)
-                yield _update(index, view, photo.is_hdr)
-        # At every quality the ray set is the closed form's: its disparity is smoother, and so is what is inpainted.
-        with ViewSynthesis(should_stop, transformer, quality == "exact") as synthesis:
 
-            def made(index: tuple[int, int]) -> ViewUpdate:
-                return _update(index, synthesis.render_alone(rays, grid.offset(*index)), photo.is_hdr)
+    def update(index: tuple[int, int], view: RenderedView, threads: int | None = None) -> ViewUpdate:
+        colors = _stored(view.colors, photo.is_hdr, should_stop, threads)
+        return ViewUpdate(*index, colors, view.disparity, view.inpainted)
 
-            yield from synthesis.side_by_side(made, _in_order(grid, remaining, nearest_to))
-    except Cancelled:
-        return
+    transformer = transformer_for(quality)
+    rays, farthest_views = ray_set(photo, disparity, plan, should_stop)
+    for index, view in farthest_views:
+        if transformer is None:
+            remaining.remove(index)
+            yield update(index, view)
+    # At every quality the ray set is the closed form's: its disparity is smoother, and so is what is inpainted.
+    with ViewSynthesis(should_stop, transformer, quality == "exact") as synthesis:
+
+        def made(index: tuple[int, int]) -> ViewUpdate:
+            return update(index, synthesis.render_alone(rays, grid.offset(*index)), threads=1)
+
+        yield from synthesis.side_by_side(made, _in_order(grid, remaining, nearest_to))
 
 
 def ray_set(
-    photo: Photo, disparity: Disparity, plan: ScenePlan, should_stop: Callable[[], bool] = lambda: False
+    photo: Photo, disparity: Disparity, plan: ScenePlan, should_stop: ShouldStop = never
 ) -> tuple[RaySet, Iterator[tuple[tuple[int, int], RenderedView]]]:
     """The rays that every view of `plan.grid` is made of, and the farthest views by their indices.
 
@@ -88,19 +101,19 @@ def ray_set(
     grid = plan.grid
     farthest = max(*map(abs, grid.offset(0, 0)), *map(abs, grid.offset(grid.rows - 1, grid.columns - 1)), 1.0)
     indices = _farthest_views(grid) if plan.has_disocclusion else []
-    rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(indices))
+    rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(indices), should_stop)
     return rays, _completing(rays, grid, indices, should_stop)
 
 
 def _completing(
-    rays: RaySet, grid: GridShape, indices: list[tuple[int, int]], should_stop: Callable[[], bool]
+    rays: RaySet, grid: GridShape, indices: list[tuple[int, int]], should_stop: ShouldStop
 ) -> Iterator[tuple[tuple[int, int], RenderedView]]:
     with ViewSynthesis(should_stop) as synthesis:
         for index in indices:
             offset = grid.offset(*index)
             view = synthesis.render(rays, offset)
             if view.occluded.any():
-                rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
+                rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32), should_stop)
             yield index, view
 
 
@@ -143,5 +156,12 @@ def _in_order(
         yield index
 
 
-def _update(index: tuple[int, int], view: RenderedView, is_hdr: bool) -> ViewUpdate:
-    return ViewUpdate(*index, stored_from_encoded(view.colors, is_hdr), view.disparity, view.inpainted)
+def _stored(encoded: FloatImage, is_hdr: bool, should_stop: ShouldStop, threads: int | None = None) -> StoredColors:
+    """`stored_from_encoded`, in bands."""
+    stored = np.empty(encoded.shape, np.float16 if is_hdr else np.uint8)
+
+    def band(first: int, last: int) -> None:
+        stored[first:last] = stored_from_encoded(encoded[first:last], is_hdr)
+
+    in_bands(band, (encoded.shape[0], encoded.shape[1]), should_stop, threads)
+    return stored

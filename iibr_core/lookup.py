@@ -26,6 +26,8 @@ SOLE = 1 - 1e-6
 """A candidate with at least this share of the weights is the only one."""
 LEAST_TAP_WEIGHT = 0.3
 """Less cubic weight than this on the own surface: take its nearest pixel instead."""
+ONE, TWO = np.uint64(1), np.uint64(2)
+"""Unsigned indices need no test for counting from the end."""
 
 
 def look_up_colors(
@@ -38,12 +40,16 @@ def look_up_colors(
     shape = candidates.count.shape
     colors, disparity = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
     source = np.zeros(shape, np.uint8)
-    if wanted is None:
-        wanted = np.ones(shape, np.bool_)
-    offsets, images, surfaces, _, near_edge, _, _ = rays.arrays
+    remaining = np.ones(shape, np.bool_) if wanted is None else wanted.copy()
+    offsets, images, surfaces, _, near_edge = rays.arrays
+    from_sources = np.array(candidates.offset) - offsets
+    _gather_plain(
+        images, near_edge, from_sources, candidates.first_row,
+        candidates.count, candidates.disparity[0], candidates.source[0], remaining, colors, disparity, source,
+    )  # fmt: skip
     _gather(
-        images, surfaces, near_edge, np.array(candidates.offset) - offsets, candidates.first_row,
-        candidates.count, candidates.disparity, candidates.source, weights, wanted, colors, disparity, source,
+        images, surfaces, near_edge, from_sources, candidates.first_row,
+        candidates.count, candidates.disparity, candidates.source, weights, remaining, colors, disparity, source,
     )  # fmt: skip
     return colors, disparity, source
 
@@ -64,6 +70,19 @@ def _keys(f):  # type: ignore[no-untyped-def]
         a * f * g * g,
         1.0 - f * f * (a + 3.0 - (a + 2.0) * f),
         1.0 - g * g * (a + 3.0 - (a + 2.0) * g),
+        a * g * f * f,
+    )
+
+
+@kernel
+def _keys_single(f):  # type: ignore[no-untyped-def]
+    """The same in single precision."""
+    one, a = np.float32(1.0), np.float32(KEYS_A)
+    g = one - f
+    return (
+        a * f * g * g,
+        one - f * f * (a + np.float32(3.0) - (a + np.float32(2.0)) * f),
+        one - g * g * (a + np.float32(3.0) - (a + np.float32(2.0)) * g),
         a * g * f * f,
     )
 
@@ -136,6 +155,45 @@ def look_up(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-unty
         min(max(green / total, low_g), high_g),
         min(max(blue / total, low_b), high_b),
     )
+
+
+@kernel
+def _gather_plain(  # type: ignore[no-untyped-def]
+    images, near_edge, offsets, first_row, count, candidate_disparity, candidate_source, remaining,
+    colors, disparity, source,
+):  # fmt: skip
+    """What `_gather` does, for the rays that are easiest, and most: one candidate, no edge and no border near it.
+
+    They are struck off from remaining. This is `cubic` written out, in single precision and without tests.
+    """
+    _, height, width, _ = images.shape
+    for row in range(count.shape[0]):
+        for x in range(count.shape[1]):
+            if count[row, x] != 1 or not remaining[row, x]:
+                continue
+            d, k = candidate_disparity[row, x], np.uint64(candidate_source[row, x])
+            source_x, source_y = x + d * offsets[k, 1], first_row + row + d * offsets[k, 0]
+            if not (1 <= source_x < width - 2 and 1 <= source_y < height - 2):
+                continue
+            u, v = np.uint64(source_x), np.uint64(source_y)
+            if near_edge[k, v, u]:
+                continue
+            remaining[row, x] = False
+            disparity[row, x], source[row, x] = d, k
+            x0, x1, x2, x3 = _keys_single(np.float32(source_x - u))
+            y0, y1, y2, y3 = _keys_single(np.float32(source_y - v))
+            for c in range(3):
+                colors[row, x, c] = max(
+                    y0 * (x0 * images[k, v - ONE, u - ONE, c] + x1 * images[k, v - ONE, u, c]
+                          + x2 * images[k, v - ONE, u + ONE, c] + x3 * images[k, v - ONE, u + TWO, c])
+                    + y1 * (x0 * images[k, v, u - ONE, c] + x1 * images[k, v, u, c]
+                            + x2 * images[k, v, u + ONE, c] + x3 * images[k, v, u + TWO, c])
+                    + y2 * (x0 * images[k, v + ONE, u - ONE, c] + x1 * images[k, v + ONE, u, c]
+                            + x2 * images[k, v + ONE, u + ONE, c] + x3 * images[k, v + ONE, u + TWO, c])
+                    + y3 * (x0 * images[k, v + TWO, u - ONE, c] + x1 * images[k, v + TWO, u, c]
+                            + x2 * images[k, v + TWO, u + ONE, c] + x3 * images[k, v + TWO, u + TWO, c]),
+                    np.float32(0.0),
+                )  # fmt: skip
 
 
 @kernel

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from iibr_core.bands import ShouldStop, in_bands, never
 from iibr_core.kernels import kernel, linear_scalar, srgb_scalar
 from iibr_core.types import FloatImage
 
@@ -24,18 +25,23 @@ DIAGONAL = 0.99
 
 
 def split_mixed_pixels(
-    colors: FloatImage, disparity: FloatImage, edge_step: float
+    colors: FloatImage, disparity: FloatImage, edge_step: float, should_stop: ShouldStop = never
 ) -> tuple[FloatImage, FloatImage, FloatImage, FloatImage]:
     """The photo's own rays and its fringe, for a photo (H, W, 3), its disparity (H, W) and the step that counts as a
     depth edge.
 
     Returns (own colours (H, W, 3), fringe colours (H, W, 3), fringe disparity (H, W), fringe coverage (H, W)); where
-    there is no fringe its coverage is 0 and its disparity NaN.
+    there is no fringe its coverage is 0 and its disparity NaN. Raises Cancelled once should_stop is true.
     """
-    own, fringe = colors.copy(), colors.copy()
-    fringe_disparity = np.full_like(disparity, np.nan)
-    coverage = np.zeros_like(disparity)
-    _split(colors, disparity, edge_step, own, fringe, fringe_disparity, coverage)
+    own, fringe = np.empty_like(colors, order="C"), np.empty_like(colors, order="C")
+    fringe_disparity, coverage = np.empty_like(disparity, order="C"), np.empty_like(disparity, order="C")
+
+    def band(first: int, last: int) -> None:
+        own[first:last] = fringe[first:last] = colors[first:last]
+        fringe_disparity[first:last], coverage[first:last] = np.nan, 0.0
+        _split(colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage)
+
+    in_bands(band, disparity.shape, should_stop)
     return own, fringe, fringe_disparity, coverage
 
 
@@ -57,10 +63,13 @@ def _towards_front(disparity, x, y, edge_step):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _split(colors, disparity, edge_step, own, fringe, fringe_disparity, coverage):  # type: ignore[no-untyped-def]
+def _split(  # type: ignore[no-untyped-def]
+    colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage,
+):  # fmt: skip
+    """Rows [first, last) of what `split_mixed_pixels` returns, which hold the photo where nothing is split."""
     height, width = disparity.shape
     front, back, here = np.empty(3), np.empty(3), np.empty(3)
-    for y in range(2, height - 2):
+    for y in range(max(first, 2), min(last, height - 2)):
         for x in range(2, width - 2):
             i, j = _towards_front(disparity, x, y, edge_step)
             if (i == 0 and j == 0) or abs(disparity[y - j, x - i] - disparity[y, x]) > edge_step:

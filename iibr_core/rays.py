@@ -5,11 +5,32 @@ The photo comes first; the fringe (what mixed pixels hold of the surface in fron
 
 from __future__ import annotations
 
-import numpy as np
+import threading
+from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.bands import ShouldStop, in_bands, never
 from iibr_core.kernels import kernel
 from iibr_core.surroundings import Surroundings, surroundings_of
 from iibr_core.types import FloatImage, ViewOffset
+
+CELL_PX = 4
+"""Side of the cells that rays are summed up by."""
+SMOOTH_SHARE = 0.8
+"""A smooth surface's steps stay below this share of the step between surfaces."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Rays of S images summed up by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
+    disparity, (inf, -inf) without rays. rough (M, N): whether the photo is there anything but one smooth surface.
+    """
+
+    low: FloatImage
+    high: FloatImage
+    rough: NDArray[np.bool_]
 
 
 class RaySet:
@@ -18,8 +39,6 @@ class RaySet:
     All arrays are (S, ...) for the S images added so far. offsets (S, 2): the view (t, s) each is seen from. colors
     (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN where there is no surface. coverage (S, H, W): how much of
     its pixel a ray fills, 0 = no ray. near_edge (S, H, W) bool: True where a 4x4 look-up may meet another surface.
-    row_disparity (S, H, 2): least and greatest of each row's rays. row_columns (S, H, 2): first and behind-last
-    column of each row's rays.
     """
 
     def __init__(self, capacity: int, size: tuple[int, int], surface_step: float, farthest_views: float = 1.0) -> None:
@@ -31,23 +50,48 @@ class RaySet:
         self._surface_step = surface_step
         self._farthest_views = farthest_views
         self._surroundings: Surroundings | None = None
+        self._surveying = threading.Lock()
         self._offsets = np.empty((capacity, 2))
         self._colors = np.empty((capacity, *size, 3), np.float32)
         self._disparity = np.empty((capacity, *size), np.float32)
         self._coverage = np.empty((capacity, *size), np.float32)
         self._near_edge = np.empty((capacity, *size), np.bool_)
-        self._row_disparity = np.empty((capacity, size[0], 2))
-        self._row_columns = np.empty((capacity, size[0], 2), np.int64)
+        in_cells = -(-size[0] // CELL_PX), -(-size[1] // CELL_PX)
+        self._low, self._high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
+        self._rough = np.ones(in_cells, np.bool_)
 
-    def add(self, offset: ViewOffset, colors: FloatImage, disparity: FloatImage, coverage: FloatImage) -> None:
-        """Add the rays of one image (H, W)."""
+    def add(
+        self,
+        offset: ViewOffset,
+        colors: FloatImage,
+        disparity: FloatImage,
+        coverage: FloatImage,
+        should_stop: ShouldStop = never,
+    ) -> None:
+        """Add the rays of one image (H, W). Raises Cancelled once should_stop is true; then nothing is added."""
         k = self._count
+
+        def band(first: int, last: int) -> None:
+            rows = slice(first, last)
+            self._colors[k, rows], self._disparity[k, rows] = colors[rows], disparity[rows]
+            self._coverage[k, rows] = coverage[rows]
+            _near_edge(disparity, self._surface_step, first, last, self._near_edge[k])
+            _sum_up(disparity, coverage, first, last, self._low[k], self._high[k])
+            if k == 0:
+                _find_rough(disparity, SMOOTH_SHARE * self._surface_step, first, last, self._rough)
+
+        in_bands(band, self.size, should_stop)
         self._offsets[k] = offset
-        self._colors[k], self._disparity[k], self._coverage[k] = colors, disparity, coverage
-        _near_edge(disparity, self._surface_step, self._near_edge[k])
-        _row_extents(disparity, coverage, self._row_disparity[k], self._row_columns[k])
         self._count += 1
         self._surroundings = None
+
+    def survey(self, should_stop: ShouldStop = never) -> Surroundings:
+        """`surroundings`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
+        with self._surveying:
+            if self._surroundings is None:
+                disparity = self._disparity[: self._count]
+                self._surroundings = surroundings_of(disparity, self._farthest_views, should_stop)
+            return self._surroundings
 
     def __len__(self) -> int:
         return self._count
@@ -59,19 +103,19 @@ class RaySet:
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """(offsets, colors, disparity, coverage, near_edge, row_disparity, row_columns) of the images added so far."""
-        everything = (
-            self._offsets, self._colors, self._disparity, self._coverage,
-            self._near_edge, self._row_disparity, self._row_columns,
-        )  # fmt: skip
+        """(offsets, colors, disparity, coverage, near_edge) of the images added so far."""
+        everything = (self._offsets, self._colors, self._disparity, self._coverage, self._near_edge)
         return tuple(array[: self._count] for array in everything)
+
+    @property
+    def cells(self) -> Cells:
+        """The rays added so far, summed up."""
+        return Cells(self._low[: self._count], self._high[: self._count], self._rough)
 
     @property
     def surroundings(self) -> Surroundings:
         """What lies around the rays added so far; made when first asked for after the last was added."""
-        if self._surroundings is None:
-            self._surroundings = surroundings_of(self._disparity[: self._count], self._farthest_views)
-        return self._surroundings
+        return self._surroundings or self.survey()
 
     @property
     def photo_images(self) -> int:
@@ -85,28 +129,50 @@ class RaySet:
 
 
 @kernel
-def _row_extents(disparity, coverage, row_disparity, row_columns):  # type: ignore[no-untyped-def]
-    """A row without rays has an empty range of disparities and of columns."""
+def _sum_up(disparity, coverage, first, last, low, high):  # type: ignore[no-untyped-def]
+    """Of the cells that begin in rows [first, last)."""
     height, width = disparity.shape
-    for y in range(height):
-        low, high, first, last = np.inf, -np.inf, width, 0
-        for x in range(width):
-            if coverage[y, x] > 0:
-                low, high = min(low, disparity[y, x]), max(high, disparity[y, x])
-                first, last = min(first, x), x + 1
-        row_disparity[y, 0], row_disparity[y, 1] = low, high
-        row_columns[y, 0], row_columns[y, 1] = first, last
+    for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
+        low[v], high[v] = np.inf, -np.inf
+        for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
+            for x in range(width):
+                d, u = disparity[y, x], x // CELL_PX
+                if coverage[y, x] > 0 and d == d:
+                    low[v, u], high[v, u] = min(low[v, u], d), max(high[v, u], d)
 
 
 @kernel
-def _near_edge(disparity, surface_step, near_edge):  # type: ignore[no-untyped-def]
-    """True where the 4x4 pixels from (x - 1, y - 1) to (x + 2, y + 2) hold a larger step, or no surface."""
+def _find_rough(disparity, smooth_step, first, last, rough):  # type: ignore[no-untyped-def]
+    """Of the cells that begin in rows [first, last): True on either side of a step larger than smooth_step, of a pixel
+    without surface, of the border.
+    """
     height, width = disparity.shape
-    near_edge[:] = False
-    for y in range(height):
+    for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
+        rough[v] = False
+        for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
+            for x in range(width):
+                is_smooth = 0 < y < height - 1 and 0 < x < width - 1
+                if is_smooth:
+                    here = disparity[y, x]
+                    is_smooth &= abs(disparity[y, x - 1] - here) <= smooth_step
+                    is_smooth &= abs(disparity[y, x + 1] - here) <= smooth_step
+                    is_smooth &= abs(disparity[y - 1, x] - here) <= smooth_step
+                    is_smooth &= abs(disparity[y + 1, x] - here) <= smooth_step
+                if not is_smooth:
+                    rough[v, x // CELL_PX] = True
+
+
+@kernel
+def _near_edge(disparity, surface_step, first, last, near_edge):  # type: ignore[no-untyped-def]
+    """Of rows [first, last): True where the 4x4 pixels from (x - 1, y - 1) to (x + 2, y + 2) hold a larger step, or no
+    surface.
+    """
+    height, width = disparity.shape
+    near_edge[first:last] = False
+    for y in range(max(first - 2, 0), min(last + 2, height)):
         for x in range(width):
             here = disparity[y, x]
             right = disparity[y, min(x + 1, width - 1)]
             below = disparity[min(y + 1, height - 1), x]
             if not (abs(right - here) <= surface_step and abs(below - here) <= surface_step):
-                near_edge[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3] = True
+                near_edge[max(y - 2, first) : min(y + 3, last), max(x - 2, 0) : x + 3] = True

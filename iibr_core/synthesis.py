@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core import bands
+from iibr_core.bands import ShouldStop, go_on, in_bands, never
 from iibr_core.candidates import Candidates, find_candidates
 from iibr_core.contested import HYPOTHESES, REACH_PX, Contested, decide, find_contested
 from iibr_core.inpaint.background import fill_background
@@ -24,19 +25,13 @@ from iibr_core.rays import RaySet
 from iibr_core.types import FloatImage, ViewOffset
 from iibr_core.weights import closed_form_weights
 
-MOST_BAND_PIXELS = 1 << 17
-"""Of a row band: a cancelled view stops after one, within some 30 ms."""
 EDGE_PX = 2.0
 """A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
-
-THREADS = os.cpu_count() or 1
+EVERY_COST = 8
+"""How many times as long a band takes where the transformer is asked for every ray."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
-
-class Cancelled(Exception):
-    """The caller's should_stop became true within a view."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +50,20 @@ class RenderedView:
     entropy: FloatImage | None = None
 
 
-def rays_of_photo(colors: FloatImage, disparity: FloatImage, farthest_views: float, more: int) -> RaySet:
+def rays_of_photo(
+    colors: FloatImage, disparity: FloatImage, farthest_views: float, more: int, should_stop: ShouldStop = never
+) -> RaySet:
     """The ray set of a photo: its own rays, and the fringe of its mixed pixels, with room for `more` images.
 
     farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
+    Raises Cancelled once should_stop is true.
     """
-    centre = ViewOffset(0.0, 0.0)
-    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, EDGE_PX / farthest_views)
+    centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
+    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
     rays = RaySet(2 + more, disparity.shape, OWN_SURFACE_PX / farthest_views, farthest_views)
-    rays.add(centre, own, disparity, np.ones_like(disparity))
+    rays.add(centre, own, disparity, np.ones_like(disparity), should_stop)
     if coverage.any():
-        rays.add(centre, fringe, fringe_disparity, coverage)
+        rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
     return rays
 
 
@@ -74,7 +72,7 @@ class ViewSynthesis:
 
     def __init__(
         self,
-        should_stop: Callable[[], bool] = lambda: False,
+        should_stop: ShouldStop = never,
         transformer: Callable[[Contested], FloatImage] | None = None,
         every: bool = False,
         slots: int = 5,
@@ -86,10 +84,10 @@ class ViewSynthesis:
         slots: candidates kept a ray. keeps_entropy: whether views bring the entropy of their weights. hypotheses: the
         transformer's K.
         """
-        self._should_stop = should_stop
+        self._asked_to_stop, self._is_over = should_stop, False
         self._transformer, self._every = transformer, every
         self._slots, self._hypotheses, self._keeps_entropy = slots, hypotheses, keeps_entropy
-        self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rows")
+        self._threads = ThreadPoolExecutor(bands.THREADS, thread_name_prefix="iibr-views")
 
     def __enter__(self) -> ViewSynthesis:
         return self
@@ -97,6 +95,8 @@ class ViewSynthesis:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Wait for the threads; views under way stop at their next band."""
+        self._is_over = True
         self._threads.shutdown(cancel_futures=True)
 
     def render(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
@@ -104,39 +104,62 @@ class ViewSynthesis:
 
         Raises Cancelled once should_stop is true, ValueError for an offset that is not finite.
         """
-        return self._filled(rays, offset, self._threads.map(self._band(rays, offset), self._rows(rays, THREADS)))
+        return self._view(rays, offset, bands.THREADS)
 
     def render_alone(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
         """The same view, its row bands one after the other in the calling thread: the way for many views."""
-        return self._filled(rays, offset, map(self._band(rays, offset), self._rows(rays, 1)))
+        return self._view(rays, offset, 1)
 
     def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """The results of work on all items, in their order. An item is only taken when a thread is free for it."""
         items, running = iter(items), deque[Future[Result]]()
         while True:
-            running.extend(self._threads.submit(work, item) for item in islice(items, THREADS - len(running)))
+            running.extend(self._threads.submit(work, item) for item in islice(items, bands.THREADS - len(running)))
             if not running:
                 return
-            if self._should_stop():
-                raise Cancelled
+            go_on(self._should_stop)
             yield running.popleft().result()
 
-    def _seen(self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
-        """Colours, disparity, source and occlusion of rows [first, last) of the view, holes not filled yet; then the
-        entropy if it is kept.
-        """
+    def _should_stop(self) -> bool:
+        return self._is_over or self._asked_to_stop()
+
+    def _view(self, rays: RaySet, offset: ViewOffset, threads: int) -> RenderedView:
+        if not np.isfinite(offset).all():
+            raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
+        if self._transformer:
+            rays.survey(self._should_stop)
+        view = _blank(rays.size, self._keeps_entropy)
+        most_pixels = bands.MOST_BAND_PIXELS // (EVERY_COST if self._every else 1)
+        in_bands(
+            lambda first, last: self._render_rows(rays, offset, (first, last), view),
+            rays.size, self._should_stop, threads, most_pixels,
+        )  # fmt: skip
+        if view.occluded.any():
+            fill_background(
+                view.colors, view.disparity, view.occluded, rays.photo_disparity, offset, self._should_stop, threads
+            )
+        return view
+
+    def _render_rows(self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: RenderedView) -> None:
+        """Write rows [first, last) of the view, holes not filled yet."""
         around = REACH_PX if self._transformer else 0
         above = min(rows[0], around)
         candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + around, rays.size[0])), self._slots)
+        go_on(self._should_stop)
         weights = closed_form_weights(candidates)
         occluded = occlusion_mask(weights)
         inner = slice(above, above + rows[1] - rows[0])
+        go_on(self._should_stop)
         if self._transformer:
             colors, disparity, source = self._decided(rays, candidates, weights, inner)
         else:
             colors, disparity, source = look_up_colors(rays, candidates, weights)
-        kept = (entropy(weights)[inner],) if self._keeps_entropy else ()
-        return colors[inner], disparity[inner], source[inner], occluded[inner], *kept
+        shown = slice(*rows)
+        view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
+        view.occluded[shown] = occluded[inner]
+        view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
+        if view.entropy is not None:
+            view.entropy[shown] = entropy(weights)[inner]
 
     def _decided(
         self, rays: RaySet, candidates: Candidates, weights: FloatImage, inner: slice
@@ -150,34 +173,20 @@ class ViewSynthesis:
         wanted = np.zeros(candidates.count.shape, np.bool_)
         wanted[inner] = True
         wanted[at] = False
+        go_on(self._should_stop)
         colors, disparity, source = look_up_colors(rays, candidates, weights, wanted)
-        colors[at], disparity[at], source[at] = decide(rays, contested, self._transformer(contested))
+        chosen = self._transformer(contested)
+        go_on(self._should_stop)
+        colors[at], disparity[at], source[at] = decide(rays, contested, chosen)
         return colors, disparity, source
 
-    def _band(self, rays: RaySet, offset: ViewOffset) -> Callable[[tuple[int, int]], tuple[NDArray[Any], ...]]:
-        """What renders rows [first, last) of this view."""
-        if not np.isfinite(offset).all():
-            raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
-        if self._transformer:
-            rays.surroundings  # noqa: B018 - made before the threads ask for it
 
-        def band(rows: tuple[int, int]) -> tuple[NDArray[Any], ...]:
-            if self._should_stop():
-                raise Cancelled
-            return self._seen(rays, offset, rows)
-
-        return band
-
-    @staticmethod
-    def _rows(rays: RaySet, least_bands: int) -> Iterator[tuple[int, int]]:
-        height, width = rays.size
-        rows = max(min(MOST_BAND_PIXELS // width, -(-height // least_bands)), 1)
-        return ((first, min(first + rows, height)) for first in range(0, height, rows))
-
-    @staticmethod
-    def _filled(rays: RaySet, offset: ViewOffset, bands: Iterable[tuple[NDArray[Any], ...]]) -> RenderedView:
-        colors, disparity, source, occluded, *entropies = (np.concatenate(part) for part in zip(*bands))
-        if occluded.any():
-            fill_background(colors, disparity, occluded, rays.photo_disparity, offset)
-        inpainted = occluded | (source >= rays.photo_images)
-        return RenderedView(colors, disparity, occluded, inpainted, entropies[0] if entropies else None)
+def _blank(size: tuple[int, int], with_entropy: bool) -> RenderedView:
+    """A view (height, width) to be written to."""
+    return RenderedView(
+        np.empty((*size, 3), np.float32),
+        np.empty(size, np.float32),
+        np.empty(size, np.bool_),
+        np.empty(size, np.bool_),
+        np.empty(size, np.float32) if with_entropy else None,
+    )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
+from contextlib import closing
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -37,7 +39,7 @@ from viewer.options import (
     size_from_text,
     view_from_text,
 )
-from viewer.terminal import print_depth, print_notes, progress_shown
+from viewer.terminal import Commands, print_depth, print_notes, progress_shown
 
 if TYPE_CHECKING:
     from viewer.state import Source
@@ -51,7 +53,12 @@ DEMO_FOLDER = Path("out")
 DEMO_SIZE = (1280, 800)
 
 app = typer.Typer(
-    name="iibr", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich"
+    name="iibr",
+    cls=Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
 )
 app.add_typer(models, name="models")
 app.command()(evaluate)
@@ -73,7 +80,8 @@ class Format(StrEnum):
 
 
 def main() -> None:
-    """Run the command line. Bad input ends in one line on stderr and exit code 2."""
+    """Run the command line. Bad input ends in one line on stderr and exit code 2, Ctrl-C or SIGTERM in one and 130."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         sys.exit(app(standalone_mode=False) or 0)
     except UsageError as error:
@@ -179,8 +187,8 @@ def generate(
     with (
         HciWriter(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         progress_shown("making views") as show,
+        closing(generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality)) as views,
     ):
-        views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality)
         seconds = 0.0
         for done in range(1, total + 1):
             start = time.perf_counter()

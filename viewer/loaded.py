@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from iibr_core.bands import ShouldStop, never
 from iibr_core.depth.edit import UNEDITED, Levels, levels_of
 from iibr_core.depth.origin import DepthChoice, DepthOrigin
 from iibr_core.plan import ROBUST_PERCENTILES, PlanOverrides, ScenePlan, plan_for_viewing
@@ -51,14 +52,14 @@ class Loaded:
 
 def load(
     source: Source,
-    should_stop: Callable[[], bool] = lambda: False,
+    should_stop: ShouldStop = never,
     tell: Callable[[Progress], None] = lambda progress: None,
     work: DepthWork | None = None,
 ) -> Loaded:
     """Read a photo and find its disparity, telling what is going on, not more often than people can see.
 
-    work: what to make of the disparity, None for what the source says. Raises InputError, and StoppedError where
-    should_stop says so.
+    work: what to make of the disparity, None for what the source says. Raises InputError, and Cancelled once
+    should_stop is true.
     """
     from iibr_core.depth.source import open_with_depth
     from iibr_core.formats.heic import is_heic
@@ -90,15 +91,18 @@ def load(
     )
     # This program saves no HEIC.
     settings = "" if is_heic(path) else settings_text_in(path)
-    return _with_work(found, settings, _models_here(), work or DepthWork(source.refine))
+    return _with_work(found, settings, _models_here(), work or DepthWork(source.refine), should_stop)
 
 
-def worked(loaded: Loaded, work: DepthWork) -> Loaded:
-    """The same with something else made of its disparity; only what changed is worked out. Raises InputError."""
+def worked(loaded: Loaded, work: DepthWork, should_stop: ShouldStop = never) -> Loaded:
+    """The same with something else made of its disparity; only what changed is worked out.
+
+    Raises InputError, and Cancelled once should_stop is true.
+    """
     if loaded.work == work:
         return loaded
     if loaded.work.refine != work.refine:
-        loaded = _refined(loaded, work.refine)
+        loaded = _refined(loaded, work.refine, should_stop)
     values = loaded.canvas.shown(work.edits)
     return replace(loaded, work=work, disparity=replace(loaded.refined, values=values))
 
@@ -131,7 +135,9 @@ def prepare_brush() -> None:
     DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).shown(DepthEdits(strokes=strokes))
 
 
-def _with_work(found: PhotoWithDepth, settings: str, models: tuple[str, ...], work: DepthWork) -> Loaded:
+def _with_work(
+    found: PhotoWithDepth, settings: str, models: tuple[str, ...], work: DepthWork, should_stop: ShouldStop
+) -> Loaded:
     from iibr_core.depth.brush import DepthCanvas
 
     values = found.disparity
@@ -139,16 +145,16 @@ def _with_work(found: PhotoWithDepth, settings: str, models: tuple[str, ...], wo
     as_found = DepthWork(NOT_YET)
     levels = levels_of(values.values)
     loaded = Loaded(found.photo, values, found.origin, settings, models, as_found, values, values, levels, canvas)
-    return worked(loaded, work)
+    return worked(loaded, work, should_stop)
 
 
-def _refined(loaded: Loaded, strength: float) -> Loaded:
+def _refined(loaded: Loaded, strength: float, should_stop: ShouldStop) -> Loaded:
     from iibr_core.depth.brush import DepthCanvas
     from iibr_core.depth.refine import refine
 
     values = loaded.found.values
     if strength > 0:
-        values = refine(loaded.photo.pixels, values, strength)
+        values = refine(loaded.photo.pixels, values, strength, should_stop)
     canvas = DepthCanvas(loaded.photo.pixels, values)
     return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)
 

@@ -197,7 +197,7 @@ class SecondLook:
         self._thread.shutdown(cancel_futures=True)
 
     def _carry_out(self, inquiry: Inquiry, inputs: Inputs) -> None:
-        from iibr_core.synthesis import Cancelled
+        from iibr_core.bands import Cancelled
 
         try:
             for seen in self._looker.seen(inquiry, inputs, lambda: self.wanted != inquiry):

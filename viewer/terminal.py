@@ -5,8 +5,23 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
 
 from iibr_core.depth.origin import DepthOrigin
+
+
+class Commands(TyperGroup):
+    """Typer ends without a word when it is interrupted; this one aborts, and whoever runs it says so."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command. Raises typer.Abort for KeyboardInterrupt."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise typer.Abort from error
 
 
 def print_notes(notes: tuple[str, ...]) -> None:

@@ -208,7 +208,7 @@ def results_of(
 ) -> Iterator[SceneReady | ViewReady]:
     """Everything a job has to say, in order: the scene, then each of its views. tell: what it does until then.
 
-    Raises InputError for a file that cannot be opened, StoppedError where should_stop says so while it is read.
+    Raises InputError for a file that cannot be opened, Cancelled where should_stop says so while it is read.
     """
     from iibr_core.formats.hci import is_light_field_folder
 
@@ -263,7 +263,9 @@ def _results_of_photo(
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
     work = request.work or DepthWork(source.refine)
-    loaded = load(source, should_stop, tell, work) if request.loaded is None else worked(request.loaded, work)
+    loaded = (
+        load(source, should_stop, tell, work) if request.loaded is None else worked(request.loaded, work, should_stop)
+    )
     plan = planned(source, loaded, request.depth_strength)
     disparity = plan.field_disparity(loaded.disparity)
     colors = stored_from_encoded(loaded.photo.pixels, loaded.photo.is_hdr)

@@ -16,11 +16,12 @@ import numpy as np
 import psutil
 from safetensors import SafetensorError
 
+from iibr_core.bands import ShouldStop, go_on, never
 from iibr_core.depth import estimate_cache
 from iibr_core.depth.estimate import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.model_config import Preparation, read_config, read_preparation
 from iibr_core.depth.models import TRANSFORMERS, LocalModel, bytes_of, weight_files
-from iibr_core.depth.origin import StoppedError, Tell
+from iibr_core.depth.origin import Tell
 from iibr_core.depth.resample import resample_surfaces
 from iibr_core.types import FloatImage, InputError, Photo
 
@@ -59,13 +60,13 @@ def estimate_with(
     model: LocalModel,
     photo: Photo,
     memory_bytes: int | None = None,
-    should_stop: Callable[[], bool] = lambda: False,
+    should_stop: ShouldStop = never,
     tell: Tell = lambda doing, share: None,
 ) -> Estimate:
     """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
 
     memory_bytes: what the model may take; its input is made smaller for it. Raises InputError where the model cannot
-    be used or its result is of no use, StoppedError where should_stop says so.
+    be used or its result is of no use, Cancelled where should_stop says so.
     """
     _require_weights(model.folder)
     tell(f"looking for what {model.title} said before", 0.0)
@@ -141,9 +142,7 @@ def _width_of(config: dict[str, Any]) -> int:
     return width if isinstance(width, int) and width > 0 else 1024
 
 
-def _run(
-    model: LocalModel, photo: Photo, network_input: _Input, should_stop: Callable[[], bool], tell: Tell
-) -> Estimate:
+def _run(model: LocalModel, photo: Photo, network_input: _Input, should_stop: ShouldStop, tell: Tell) -> Estimate:
     tell(f"loading {model.title}", 0.0)
     import torch
 
@@ -181,9 +180,7 @@ def _loaded(model: LocalModel) -> Any:
 class _Watch:
     """While it is entered, a network asks before each of its layers whether to go on, and tells how far it is."""
 
-    def __init__(
-        self, network: torch.nn.Module, should_stop: Callable[[], bool], tell: Callable[[float], None]
-    ) -> None:
+    def __init__(self, network: torch.nn.Module, should_stop: ShouldStop, tell: Callable[[float], None]) -> None:
         self._layers = [layer for layer in network.modules() if not any(layer.children())]
         self._should_stop, self._tell = should_stop, tell
         self._seen = 0
@@ -196,8 +193,7 @@ class _Watch:
             hook.remove()
 
     def _before(self, *_: object) -> None:
-        if self._should_stop():
-            raise StoppedError
+        go_on(self._should_stop)
         self._seen += 1
         self._tell(min(self._seen / len(self._layers), 1.0))
 

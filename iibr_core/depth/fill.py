@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from iibr_core.bands import ShouldStop, go_on, never
 from iibr_core.kernels import kernel
 from iibr_core.types import FloatImage
 
@@ -18,13 +19,13 @@ OPEN_LINE = 12
 SHORTNESS = 8
 
 
-def fill_from_background(values: FloatImage) -> FloatImage:
+def fill_from_background(values: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
     """Replace the NaN of an (H, W) disparity map; known values stay as they are.
 
     On each of four lines through an unknown pixel, the farther (smaller) of the two nearest known values counts; the
     lines are averaged by 1 / span**8, span being the way across the hole. Lines on which the hole reaches the frame
     have one end only and count little. All results lie within the known values.
-    Raises ValueError if nothing is known.
+    Raises ValueError if nothing is known, Cancelled once should_stop is true.
     """
     filled = np.array(values, np.float32, order="C")
     unknown = np.isnan(filled)
@@ -33,9 +34,12 @@ def fill_from_background(values: FloatImage) -> FloatImage:
     while (count := int(unknown.sum())) > 0:
         near = np.empty((2, count, 4), np.float32)
         steps = np.empty((2, count, 4), np.int32)
+        go_on(should_stop)
         _nearest_before(filled, near[0], steps[0])
+        go_on(should_stop)
         # The same, seen from the last pixel: everything that comes after.
         _nearest_before(filled[::-1, ::-1], near[1, ::-1], steps[1, ::-1])
+        go_on(should_stop)
         filled[unknown] = _farther_side(near, steps, np.array(STEP_LENGTHS))
         unknown = np.isnan(filled)  # pixels with no known value on any line; the second round reaches them
     return filled

@@ -13,6 +13,8 @@ from math import sqrt
 import numpy as np
 import OpenImageIO as oiio
 
+from iibr_core import bands
+from iibr_core.bands import ShouldStop, go_on, in_bands, never
 from iibr_core.depth.estimate import RelativeInverseDepth
 from iibr_core.kernels import kernel
 from iibr_core.types import FloatImage, Photo
@@ -33,19 +35,22 @@ GUIDE_CONTRAST = 0.03
 """Brightness that varies by less than this (standard deviation) draws no edge of depth."""
 
 
-def estimate_offline(photo: Photo) -> RelativeInverseDepth:
+def estimate_offline(photo: Photo, should_stop: ShouldStop = never) -> RelativeInverseDepth:
     """Rough inverse depth (H, W) of a photo, finite; 0 everywhere where the picture gives no hint (one row of pixels).
 
     On teddy, moebius, motorcycle and antinous its correlation with the true disparity is 0.5 to 0.86 (docs/depth.md).
+    Raises Cancelled once should_stop is true.
     """
     pixels = np.clip(photo.pixels, 0, 1)
-    small = _resized(pixels, _small_size(photo.size), "box")
+    small = _resized(pixels, _small_size(photo.size), "box", should_stop)
     smooth = small
     for _ in range(3):
         smooth = _averaged(smooth, DETAIL_PX)
+    go_on(should_stop)
     way = _way_from_top(smooth)
+    go_on(should_stop)
     depth = _standardised(np.indices(way.shape, np.float32)[0]) + WAY_SHARE * _standardised(way)
-    return RelativeInverseDepth(_guided(depth, small.mean(axis=2), pixels))
+    return RelativeInverseDepth(_guided(depth, small.mean(axis=2), pixels, should_stop))
 
 
 def _small_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -53,14 +58,26 @@ def _small_size(size: tuple[int, int]) -> tuple[int, int]:
     return max(round(size[0] * ratio), 1), max(round(size[1] * ratio), 1)
 
 
-def _resized(image: FloatImage, size: tuple[int, int], filter_name: str) -> FloatImage:
+def _resized(image: FloatImage, size: tuple[int, int], filter_name: str, should_stop: ShouldStop) -> FloatImage:
     """(H, W, C) at another (height, width)."""
     if image.shape[:2] == size:
         return image
-    source = oiio.ImageBuf(np.ascontiguousarray(image, np.float32))
-    roi = oiio.ROI(0, size[1], 0, size[0], 0, 1, 0, image.shape[2])
-    resized = oiio.ImageBufAlgo.resize(source, filtername=filter_name, roi=roi)
-    return np.asarray(resized.get_pixels(oiio.FLOAT), np.float32).reshape(*size, image.shape[2])
+    channels = image.shape[2]
+    source, resized = (oiio.ImageBuf(oiio.ImageSpec(w, h, channels, oiio.FLOAT)) for h, w in (image.shape[:2], size))
+
+    def put(first: int, last: int) -> None:
+        rows = oiio.ROI(0, image.shape[1], first, last, 0, 1, 0, channels)
+        source.set_pixels(rows, np.ascontiguousarray(image[first:last], np.float32))
+
+    def resize(first: int, last: int) -> None:
+        rows = oiio.ROI(0, size[1], first, last, 0, 1, 0, channels)
+        oiio.ImageBufAlgo.resize(resized, source, filtername=filter_name, roi=rows)
+
+    # OpenImageIO has threads of its own. A pixel of a smaller picture takes as long as all that it is the mean of.
+    in_bands(put, (image.shape[0], image.shape[1]), should_stop, threads=1)
+    shrinkage = max(image.shape[0] * image.shape[1] / (size[0] * size[1]), 1.0)
+    in_bands(resize, size, should_stop, threads=1, most_pixels=int(bands.MOST_BAND_PIXELS / shrinkage))
+    return np.asarray(resized.get_pixels(oiio.FLOAT), np.float32).reshape(*size, channels)
 
 
 def _way_from_top(image: FloatImage) -> FloatImage:
@@ -88,7 +105,7 @@ def _standardised(values: FloatImage) -> FloatImage:
     return (values - values.mean()) / np.float32(spread) if spread > 1e-9 else np.zeros_like(values)
 
 
-def _guided(values: FloatImage, guide: FloatImage, pixels: FloatImage) -> FloatImage:
+def _guided(values: FloatImage, guide: FloatImage, pixels: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
     """The map (h, w), guided by a picture (h, w), at the size of the photo (H, W, 3), which guides it there.
 
     He et al., Guided Image Filtering, PAMI 2013, in its fast form: the linear model is enlarged, not the map.
@@ -97,8 +114,15 @@ def _guided(values: FloatImage, guide: FloatImage, pixels: FloatImage) -> FloatI
     mean, guide_mean, product, square = np.moveaxis(_averaged(products, GUIDE_PX), 2, 0)
     gain = (product - guide_mean * mean) / (square - guide_mean**2 + GUIDE_CONTRAST**2)
     model = _averaged(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
-    model = _resized(model, pixels.shape[:2], "triangle")
-    return model[..., 0] * pixels.mean(axis=2) + model[..., 1]
+    model = _resized(model, pixels.shape[:2], "triangle", should_stop)
+    guided = np.empty(pixels.shape[:2], np.float32)
+
+    def band(first: int, last: int) -> None:
+        rows = slice(first, last)
+        guided[rows] = model[rows, :, 0] * pixels[rows].mean(axis=2) + model[rows, :, 1]
+
+    in_bands(band, (pixels.shape[0], pixels.shape[1]), should_stop)
+    return guided
 
 
 @kernel

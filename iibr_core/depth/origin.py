@@ -57,7 +57,3 @@ class DepthChoice:
     model: str | None = None
     refine: float = 1.0
     memory_bytes: int | None = None
-
-
-class StoppedError(Exception):
-    """The caller asked to stop."""

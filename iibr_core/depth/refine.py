@@ -6,12 +6,12 @@ are changed, so exact maps and slanted surfaces stay as they are.
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from math import ceil, floor, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
+from iibr_core.bands import ShouldStop, in_bands, never
 from iibr_core.depth.fill import fill_from_background
 from iibr_core.kernels import kernel
 from iibr_core.types import FloatImage, InputError
@@ -49,42 +49,42 @@ STEPS_A_SIGMA = 2.5
 """Ramps are walked in steps so fine, or of a pixel."""
 FINE_STRENGTH = 1e-3
 
-THREADS = os.cpu_count() or 1
 
-
-def refine(photo: FloatImage, disparity: FloatImage, strength: float = 1.0) -> FloatImage:
+def refine(
+    photo: FloatImage, disparity: FloatImage, strength: float = 1.0, should_stop: ShouldStop = never
+) -> FloatImage:
     """The disparity with its soft edges snapped to the photo's edges; no values between foreground and background.
 
     photo: (H, W, 3), sRGB-encoded. disparity: (H, W), any unit in which larger is closer; what is not finite is filled
     from its background side. strength: 0 changes nothing, 1 makes steps, between them the slopes are shortened.
     Returns (H, W) float32, within the range of what was given but for a slope's continuation.
-    Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known.
+    Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known, Cancelled
+    once should_stop is true.
     """
     if photo.shape != (*disparity.shape, 3):
         raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
     if not 0 <= strength <= 1:
         raise InputError(f"refinement strength {strength}: give a number from 0 (off) to 1")
-    values = _known_everywhere(disparity)
-    sigma = edge_blur_px(values) if strength > 0 else 0.0
+    values = _known_everywhere(disparity, should_stop)
+    sigma = edge_blur_px(values, should_stop) if strength > 0 else 0.0
     if sigma < SHARP_PX:
         return values
     refined = np.empty_like(values)
     colors = np.ascontiguousarray(photo, np.float32)
     least_edge, softness = LEAST_EDGE * _extent(values), max(1.0 - strength, FINE_STRENGTH)
-    rows = -(-len(values) // (4 * THREADS))
 
-    def band(first: int) -> None:
-        _refine(values, colors, least_edge, sigma, softness, first, min(first + rows, len(values)), refined)
+    def band(first: int, last: int) -> None:
+        _refine(values, colors, least_edge, sigma, softness, first, last, refined)
 
-    with ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-refine") as threads:
-        list(threads.map(band, range(0, len(values), rows)))
+    in_bands(band, (values.shape[0], values.shape[1]), should_stop)
     return refined
 
 
-def edge_blur_px(disparity: FloatImage) -> float:
+def edge_blur_px(disparity: FloatImage, should_stop: ShouldStop = never) -> float:
     """Standard deviation (px) of the blur that made the depth edges of an (H, W) map as soft as they are.
 
     The median over its larger edges, each counting by its height. About 0.4 for exact maps; 0 without edges.
+    Raises Cancelled once should_stop is true.
     """
     height, width = disparity.shape
     extent = _extent(disparity)
@@ -92,23 +92,34 @@ def edge_blur_px(disparity: FloatImage) -> float:
         return 0.0
     coarser = 0
     while True:
-        step = max(1, ceil(sqrt(disparity.size / MEASURED_PIXELS)))
-        sigmas, heights = np.empty((2, disparity.size // step + disparity.shape[1]), np.float32)
-        count = _measure_edges(disparity, MEASURED_EDGE * extent, MEASURING_REACH_PX, step, sigmas, heights)
-        sigma = _weighted_median(sigmas[:count], heights[:count]) * 2**coarser
+        sigmas, heights = _edges(disparity, MEASURED_EDGE * extent, should_stop)
+        sigma = _weighted_median(sigmas, heights) * 2**coarser
         # A ramp as long as the reach of the search is measured on a smaller map.
-        measured = count and sigma < MEASURING_REACH_PX / 5 * 2**coarser
+        measured = len(sigmas) and sigma < MEASURING_REACH_PX / 5 * 2**coarser
         if measured or min(disparity.shape) < 4 * MEASURING_REACH_PX:
             return min(sigma, WIDEST_SIGMA_PX)
         disparity = _halved(disparity)
         coarser += 1
 
 
-def _known_everywhere(disparity: FloatImage) -> FloatImage:
+def _edges(disparity: FloatImage, least_edge: float, should_stop: ShouldStop) -> NDArray[np.float32]:
+    """(2, N): blur (sigma, px) and height of edges; looks at as many rows as hold MEASURED_PIXELS."""
+    step = max(1, ceil(sqrt(disparity.size / MEASURED_PIXELS)))
+    height, width = -(-disparity.shape[0] // step), disparity.shape[1]
+
+    def band(first: int, last: int) -> NDArray[np.float32]:
+        found = np.empty((2, (last - first) * width), np.float32)
+        count = _measure_edges(disparity, least_edge, MEASURING_REACH_PX, step, first, last, *found)
+        return found[:, :count].copy()
+
+    return np.concatenate(in_bands(band, (height, width), should_stop), axis=1)
+
+
+def _known_everywhere(disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
     known = np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32)
     if known.size and np.isnan(known).all():
         raise InputError("refining depth edges: no disparity is known; give another map")
-    return fill_from_background(known) if np.isnan(known).any() else known
+    return fill_from_background(known, should_stop) if np.isnan(known).any() else known
 
 
 def _extent(disparity: FloatImage) -> float:
@@ -182,14 +193,15 @@ def _walk(values, x, y, across, down, sign, reach, pace, beyond):  # type: ignor
 
 
 @kernel
-def _measure_edges(values, least_edge, reach, step, sigmas, heights):  # type: ignore[no-untyped-def]
+def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights):  # type: ignore[no-untyped-def]
     """At the steepest places of edges: their blur (sigma, px) and height; returns how many.
 
-    Looks at every step-th row.
+    Looks at every step-th row, from the first-th to before the last-th of those.
     """
-    height, width = values.shape
+    width = values.shape[1]
     count = 0
-    for y in range(0, height, step):
+    for row in range(first, last):
+        y = row * step
         for x in range(width):
             across, down = _uphill(values, x, y)
             slope = sqrt(across * across + down * down)

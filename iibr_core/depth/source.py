@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.bands import ShouldStop, go_on, never
 from iibr_core.depth.align import disparity_from
 from iibr_core.depth.embedded import read_embedded
 from iibr_core.depth.estimate import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.fill import fill_from_background
 from iibr_core.depth.offline import estimate_offline
-from iibr_core.depth.origin import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin, StoppedError, Tell
+from iibr_core.depth.origin import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin, Tell
 from iibr_core.depth.pictures import picture_file
 from iibr_core.depth.refine import refine
 from iibr_core.depth.resample import resample_surfaces
@@ -61,26 +62,26 @@ def open_with_depth(
     choice: DepthChoice | None = None,
     max_pixels: int = DEFAULT_MAX_PIXELS,
     grid: GridShape | None = None,
-    should_stop: Callable[[], bool] = lambda: False,
+    should_stop: ShouldStop = never,
     tell: Tell = lambda doing, share: None,
 ) -> PhotoWithDepth:
     """Read a photo and find its disparity; every photo gets one.
 
     A photo that the camera blurred is replaced by the sharp picture beside it, where its own depth comes with one.
-    Raises InputError for a bad photo and for a bad file that `choice` names, StoppedError where should_stop says so.
+    Raises InputError for a bad photo and for a bad file that `choice` names, Cancelled where should_stop says so.
     """
     choice, path = choice or DepthChoice(), Path(path)
     photo = read_photo(path, max_pixels)
     search = _Search(path, photo, choice, max_pixels, should_stop, tell)
     if choice.file is not None:
-        return _finished(search.of_file(Path(choice.file)), choice, grid)
+        return _finished(search.of_file(Path(choice.file)), choice, grid, should_stop)
     failures: tuple[str, ...] = ()
     for kind, find in search.sources():
         try:
             found = find()
             if found is not None:
                 found = replace(found, origin=replace(found.origin, failures=failures))
-                return _finished(found, choice, grid)
+                return _finished(found, choice, grid, should_stop)
         except InputError as error:
             failures += (f"{NOT_USED[kind]}: {error}",)
     return _flat(photo, failures)
@@ -94,7 +95,7 @@ class _Search:
     photo: Photo
     choice: DepthChoice
     max_pixels: int
-    should_stop: Callable[[], bool]
+    should_stop: ShouldStop
     tell: Tell
 
     def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _Found | None]]]:
@@ -111,8 +112,7 @@ class _Search:
 
     def go_on(self) -> None:
         """Asked before work that takes long."""
-        if self.should_stop():
-            raise StoppedError
+        go_on(self.should_stop)
 
     def of_file(self, path: Path) -> _Found:
         disparity = read_disparity(path, self.photo.size, self.choice.file_scale)
@@ -149,10 +149,10 @@ class _Search:
         self.go_on()
         self.tell("guessing depth", 0.0)
         origin = DepthOrigin("rough", "rough, guessed without a model", advice=BETTER_WAYS)
-        return _Found(self.photo, origin, estimate_offline(self.photo))
+        return _Found(self.photo, origin, estimate_offline(self.photo, self.should_stop))
 
 
-def _finished(found: _Found, choice: DepthChoice, grid: GridShape | None) -> PhotoWithDepth:
+def _finished(found: _Found, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
     """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
     photo, origin = found.photo, found.origin
     notes = origin.failures + ((f"{origin.line} {origin.advice}",) if origin.advice else ())
@@ -162,9 +162,9 @@ def _finished(found: _Found, choice: DepthChoice, grid: GridShape | None) -> Pho
         values = disparity_from(resized(found.depth, photo.size), grid or USUAL_GRID)
         if np.isnan(values).all():
             raise InputError("it knows no depth anywhere")
-        values = fill_from_background(values)
+        values = fill_from_background(values, should_stop)
     if choice.refine > 0:
-        values = refine(photo.pixels, values, choice.refine)
+        values = refine(photo.pixels, values, choice.refine, should_stop)
     return PhotoWithDepth(photo, Disparity(values, origin.words, notes), origin)
 
 

@@ -13,11 +13,22 @@ from PIL import Image
 from iibr_core.color import encoded_from_stored
 from iibr_core.evaluation.metrics import flip_picture
 from iibr_core.evaluation.protocol import TRUTH, Bytes, Judgement
-from iibr_core.evaluation.tables import Table, about, consistency_table, figures_table, heading, summary_table
+from iibr_core.evaluation.refocus import LENS
+from iibr_core.evaluation.tables import (
+    ABOUT_CONSISTENCY,
+    Table,
+    about,
+    about_refocus,
+    consistency_table,
+    figures_table,
+    heading,
+    refocus_table,
+    summary_table,
+)
 
 WIDEST_PX = 480
 """Pictures are shown no wider: a page with many scenes must stay one that can be opened."""
-JPEG_QUALITY = 88
+WEBP_QUALITY = 82
 STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #888; }
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 76rem; padding: 0 1rem; }
@@ -29,6 +40,7 @@ table { border-collapse: collapse; margin: .8rem 0; font-variant-numeric: tabula
 th, td { padding: .25rem .7rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); gap: .9rem; }
+.refocus { display: grid; grid-template-columns: repeat(3, 1fr); gap: .9rem; }
 figure { margin: 0; } figcaption { font-size: .85rem; color: var(--soft); }
 figure img { width: 100%; display: block; }
 .epis { display: grid; grid-template-columns: 8rem 1fr; gap: .3rem .8rem; align-items: center; font-size: .85rem; }
@@ -46,6 +58,8 @@ def page_of(judgements: Sequence[Judgement], command: str) -> str:
         f"<h1>Evaluation</h1><p>Made by <code>{escape(command)}</code>. Mean PSNR of the full frame in dB:</p>",
         _table(summary_table(judgements)),
     ]
+    if any(judgement.consistency for judgement in judgements):
+        parts.append(f"<p>{escape(ABOUT_CONSISTENCY)}</p>")
     for judgement in judgements:
         parts.extend(_section(judgement))
     return "\n".join([*parts, "</body></html>"]) + "\n"
@@ -56,6 +70,9 @@ def _section(judgement: Judgement) -> Iterator[str]:
     yield _table(figures_table(judgement))
     if judgement.consistency:
         yield _table(consistency_table(judgement))
+    if judgement.refocus:
+        yield f"<p>{escape(about_refocus(judgement))}</p>"
+        yield _table(refocus_table(judgement))
     if judgement.notes:
         yield "<ul>" + "".join(f"<li>{escape(note)}</li>" for note in judgement.notes) + "</ul>"
     pictures = judgement.pictures
@@ -65,8 +82,7 @@ def _section(judgement: Judgement) -> Iterator[str]:
     for method, image in pictures.by_method.items():
         yield _figure(method, image)
         if method != TRUTH:
-            error = flip_picture(encoded_from_stored(image), encoded_from_stored(truth))
-            yield _figure(f"{method}, error", (np.clip(error, 0, 1) * 255 + 0.5).astype(np.uint8))
+            yield _figure(f"{method}, error", _error(image, truth))
     yield "</div>"
     if pictures.epis:
         yield f"<p>EPIs of pixel row {pictures.epi_row}, leftmost view on top:</p>"
@@ -74,6 +90,19 @@ def _section(judgement: Judgement) -> Iterator[str]:
         for method, epi in pictures.epis.items():
             yield f'<span>{escape(method)}</span><img alt="EPI, {escape(method)}" src="{_png(epi)}">'
         yield "</div>"
+    if judgement.refocus:
+        yield '<p>Refocused, of each focus: made, as it should be, FLIP error map:</p><div class="refocus">'
+        for found in judgement.refocus:
+            name = found.focus.name
+            yield _figure(f"{name}, {found.shown}", found.made)
+            yield _figure(name if name == LENS else f"{name}, {TRUTH}", found.expected)
+            yield _figure(f"{name}, error", _error(found.made, found.expected))
+        yield "</div>"
+
+
+def _error(image: Bytes, truth: Bytes) -> Bytes:
+    error = flip_picture(encoded_from_stored(image), encoded_from_stored(truth))
+    return (np.clip(error, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
 def _table(table: Table) -> str:
@@ -83,14 +112,14 @@ def _table(table: Table) -> str:
 
 
 def _figure(caption: str, image: Bytes) -> str:
-    source = _jpeg(image)
+    source = _webp(image)
     return f'<figure><img alt="{escape(caption)}" src="{source}"><figcaption>{escape(caption)}</figcaption></figure>'
 
 
-def _jpeg(image: Bytes) -> str:
+def _webp(image: Bytes) -> str:
     picture = Image.fromarray(image)
     picture.thumbnail((WIDEST_PX, 4 * WIDEST_PX), Image.Resampling.LANCZOS)
-    return _data_of(picture, "jpeg", quality=JPEG_QUALITY)
+    return _data_of(picture, "webp", quality=WEBP_QUALITY)
 
 
 def _png(image: Bytes) -> str:

@@ -22,13 +22,16 @@ from iibr_core.depth.origin import DepthChoice
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
 from iibr_core.evaluation.datasets import read_view
+from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
 from iibr_core.evaluation.metrics import Mask, flip, psnr, ssim
 from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
-from iibr_core.evaluation.trials import DisparityFrom, Given, Trial, given_of, trials_of
+from iibr_core.evaluation.refocus import FocalStack, Refocused, foci_of, lens_focus
+from iibr_core.evaluation.refocus import judged as refocus_judged
+from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Given, Trial, given_of, trials_of
 from iibr_core.evaluation.views import ViewMaker, as_stored
 from iibr_core.formats.multi_view import MultiView
 from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
-from iibr_core.types import Disparity, FloatImage, Quality, ViewOffset
+from iibr_core.types import DEFAULT_QUALITY, Disparity, FloatImage, Quality, ViewOffset
 
 if TYPE_CHECKING:
     from iibr_core.evaluation.lpips import Lpips
@@ -56,6 +59,7 @@ class Options:
     most_views: int | None = None
     lpips: Path | None = None
     with_consistency: bool = True
+    with_refocus: bool = True
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ class Pictures:
 class Judgement:
     """One trial with one disparity map. consistency: by quality, and of the truth's EPIs where it has a row of views.
 
-    hole_share: of the pixels, mean over views. seconds: for everything.
+    refocus: of grids, from the centre view. hole_share: of the pixels, mean over views. seconds: for everything.
     """
 
     scene: str
@@ -107,6 +111,7 @@ class Judgement:
     disparity: str
     rows: tuple[Row, ...]
     consistency: Mapping[str, Consistency]
+    refocus: tuple[Refocused, ...]
     pictures: Pictures
     hole_share: float
     notes: tuple[str, ...]
@@ -121,7 +126,7 @@ def evaluate(
 ) -> list[Judgement]:
     """Judge a scene by the paper's trials: one judgement for each trial and disparity map.
 
-    Raises InputError where the scene or an option is bad, Cancelled or StoppedError once should_stop is true.
+    Raises InputError where the scene or an option is bad, Cancelled once should_stop is true.
     """
     options = options or Options()
     lpips = None if options.lpips is None else _lpips(options.lpips)
@@ -165,6 +170,9 @@ class _Judge:
         self.epis: dict[str, list[tuple[float, FloatImage]]] = {}
         self.shown: tuple[str, dict[str, Bytes]] = ("", {})
         self.epi_row = _row_to_show(disparity.values)
+        self.lens: LensPicture | None = None
+        self.notes = (*trial.scene.notes, *given.notes, *disparity.notes)
+        self.stacks = self._stacks() if options.with_refocus and trial.name == CENTRE_TRIAL else {}
         self.farthest = max(trial.judged, key=lambda k: math.hypot(*trial.offset(k)))
 
     def judged(self) -> Judgement:
@@ -188,9 +196,10 @@ class _Judge:
             self.disparity.source,
             rows,
             agreement,
+            self._refocused(),
             Pictures(*self.shown, self._epis(), self.epi_row),
             float(np.mean(self.hole_shares)),
-            tuple(dict.fromkeys((*scene.notes, *self.given.notes, *self.disparity.notes))),
+            tuple(dict.fromkeys(self.notes)),
             time.perf_counter() - start,
         )
 
@@ -215,6 +224,32 @@ class _Judge:
         if index == self.farthest:
             self.shown = view.name, {method: _bytes(image) for method, image in pictures.items()}
         self._keep_row(offset, pictures, judge)
+        list(pool.map(lambda method: self.stacks[method].add(offset, pictures[method]), self.stacks))
+
+    def _stacks(self) -> dict[str, FocalStack]:
+        """Of each method's light field and of the true one; none where the views are no grid."""
+        trial, photo = self.trial, self.given.photo
+        if any(view.turned is not None for view in trial.scene.views):
+            return {}
+        offsets = [trial.offset(index) for index in trial.judged]
+        foci = foci_of(offsets, self.given.judge.values)
+        if foci and trial.given == trial.scene.centre:
+            self.lens = read_lens_picture(trial.scene, self.options.max_pixels)
+            through = self.lens and lens_focus(self.lens, offsets)
+            foci += [through] if through else []
+            if self.lens and not through:
+                self.notes += ("The lens's picture is left out: it needs every view of its aperture.",)
+        stacks = {method: FocalStack(foci) for method in (TRUTH, IDENTITY, REFERENCE, *self.options.qualities) if foci}
+        for stack in stacks.values():
+            stack.add(ViewOffset(0.0, 0.0), photo)
+        return stacks
+
+    def _refocused(self) -> tuple[Refocused, ...]:
+        if not self.stacks:
+            return ()
+        qualities = self.options.qualities
+        shown = DEFAULT_QUALITY if DEFAULT_QUALITY in qualities else (*qualities, REFERENCE)[0]
+        return refocus_judged(self.stacks, TRUTH, shown, self.lens)
 
     def _warped(self, offset: ViewOffset) -> dict[str, tuple[FloatImage, float]]:
         start = time.perf_counter()

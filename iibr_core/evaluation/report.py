@@ -11,12 +11,16 @@ from typing import Any
 
 from iibr_core.evaluation.page import page_of
 from iibr_core.evaluation.protocol import Judgement
+from iibr_core.evaluation.refocus import Refocused
 from iibr_core.evaluation.tables import (
+    ABOUT_CONSISTENCY,
     Table,
     about,
+    about_refocus,
     consistency_table,
     figures_table,
     heading,
+    refocus_table,
     summary_table,
 )
 from iibr_core.formats.files import written_whole
@@ -56,9 +60,15 @@ def json_of(judgements: Sequence[Judgement], command: str) -> str:
         fields = {name: value for name, value in vars(judgement).items() if name != "pictures"}
         fields["rows"] = [asdict(replace(row, of_views=dict(row.of_views))) for row in judgement.rows]
         fields["consistency"] = {name: asdict(found) for name, found in judgement.consistency.items()}
+        fields["refocus"] = [_plain_refocus(found) for found in judgement.refocus]
         fields["size"] = {"height": judgement.size[0], "width": judgement.size[1]}
         plain.append(fields)
     return json.dumps(_finite({"command": command, "judgements": plain}), indent=1, allow_nan=False) + "\n"
+
+
+def _plain_refocus(found: Refocused) -> dict[str, Any]:
+    figures = {method: asdict(of_method) for method, of_method in found.figures.items()}
+    return {**asdict(found.focus), "views": found.views, "methods": figures}
 
 
 def _finite(value: Any) -> Any:
@@ -73,10 +83,14 @@ def _finite(value: Any) -> Any:
 def markdown_of(judgements: Sequence[Judgement], command: str) -> str:
     """Tables of all judgements, a summary first."""
     lines = ["# Evaluation", "", f"Made by `{command}`.", "", *markdown_table(summary_table(judgements))]
+    if any(judgement.consistency for judgement in judgements):
+        lines += ["", ABOUT_CONSISTENCY]
     for judgement in judgements:
         lines += ["", f"## {heading(judgement)}", "", about(judgement), "", *markdown_table(figures_table(judgement))]
         if judgement.consistency:
             lines += ["", *markdown_table(consistency_table(judgement))]
+        if judgement.refocus:
+            lines += ["", about_refocus(judgement), "", *markdown_table(refocus_table(judgement))]
         if judgement.notes:
             lines += ["", *(f"- {note}" for note in judgement.notes)]
     return "\n".join(lines) + "\n"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from iibr_core.evaluation.protocol import Judgement
+from iibr_core.evaluation.refocus import LENS
 from iibr_core.evaluation.trials import CENTRE_TRIAL
 
 NO_FIGURE = "–"
@@ -44,11 +45,20 @@ def figures_table(judgement: Judgement) -> Table:
 
 def consistency_table(judgement: Judgement) -> Table:
     """How far the views agree with each other, one row a quality; the truth's own EPIs where it has some."""
-    head = ("views of", "holes, rms / 255", "surfaces, rms / 255", "EPI lines, rms / 255", "off the line, px")
+    head = (
+        "views of",
+        "holes, rms / 255",
+        "their pixels",
+        "surfaces, rms / 255",
+        "EPI lines, rms / 255",
+        "off the line, px",
+    )
+    judged = {row.method for row in judgement.rows}
     rows = [
         (
             name,
             number(found.hole_rms, 2),
+            str(found.hole_pixels) if name in judged else NO_FIGURE,
             number(found.surface_rms, 2),
             number(found.line_rms, 2),
             number(found.line_off_px, 3),
@@ -56,6 +66,43 @@ def consistency_table(judgement: Judgement) -> Table:
         for name, found in judgement.consistency.items()
     ]
     return Table(head, tuple(rows))
+
+
+ABOUT_CONSISTENCY = (
+    'The tables "views of" tell whether views agree with each other. What one view shows, carried by its disparity to'
+    " the view half-way to the given one, has to look the same there: what was inpainted in both (holes), and what the"
+    " photo shows (surfaces). In EPIs of the given view's row, each of its points has to lie on a straight line of its"
+    " own colour; the truth's figures there are what gloss and noise make of it. All 0 = they agree."
+)
+
+
+def refocus_table(judgement: Judgement) -> Table:
+    """PSNR and FLIP of the refocused pictures, two columns a focus, one row a method."""
+    methods = dict.fromkeys(method for found in judgement.refocus for method in found.figures)
+    head = ["refocused views of"]
+    for found in judgement.refocus:
+        head += [f"{found.focus.name} ({number(found.focus.disparity, 2)} px), dB", "FLIP"]
+    rows = []
+    for method in methods:
+        cells = [method]
+        for found in judgement.refocus:
+            figures = found.figures.get(method)
+            cells += [number(figures.db, 2), number(figures.flip, 4)] if figures else [NO_FIGURE, NO_FIGURE]
+        rows.append(tuple(cells))
+    return Table(tuple(head), tuple(rows))
+
+
+def about_refocus(judgement: Judgement) -> str:
+    """What the refocused pictures are, in a line."""
+    views = {found.views for found in judgement.refocus}
+    of = f"{max(views)}" if len(views) == 1 else f"{min(views)} to {max(views)}"
+    widest = 2 * max(found.focus.radius for found in judgement.refocus)
+    with_lens = any(found.focus.name == LENS for found in judgement.refocus)
+    lens = " Against the path-traced lens, the true views err too: they are few."
+    return (
+        f"Refocus: {of} views through an aperture {number(widest, 1)} view steps wide, added up in linear light,"
+        f" against the true views added up the same way.{lens if with_lens else ''}"
+    )
 
 
 def summary_table(judgements: Sequence[Judgement]) -> Table:

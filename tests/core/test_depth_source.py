@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.bands import Cancelled
 from iibr_core.depth import estimate_cache
 from iibr_core.depth.estimate import DisparityMap, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.origin import DepthChoice, DepthStart, StoppedError
+from iibr_core.depth.origin import DepthChoice, DepthStart
 from iibr_core.depth.source import PhotoWithDepth, open_with_depth, resized
 from iibr_core.types import InputError
 from tests.core import embedded_files as files
@@ -209,7 +210,7 @@ def test_a_heic_portrait(tmp_path: Path) -> None:
 
 
 def test_it_stops_before_what_takes_long(tmp_path: Path) -> None:
-    with pytest.raises(StoppedError):
+    with pytest.raises(Cancelled):
         open_with_depth(photo_file(tmp_path, None), should_stop=lambda: True)
 
 

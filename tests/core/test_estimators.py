@@ -15,6 +15,7 @@ import pytest
 import torch
 import transformers
 
+from iibr_core.bands import Cancelled
 from iibr_core.depth import estimate_cache
 from iibr_core.depth.estimate import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.estimators import estimate_with, input_size
@@ -27,7 +28,6 @@ from iibr_core.depth.models import (
     known_model,
     model_to_use,
 )
-from iibr_core.depth.origin import StoppedError
 from iibr_core.types import InputError, Photo
 
 RNG = np.random.default_rng(3)
@@ -341,7 +341,7 @@ def test_it_stops_between_layers_and_tells_how_far_it_is(tmp_path: Path, own_cac
     for path in own_cache.glob("*"):
         path.unlink()
     told: list[float] = []
-    with pytest.raises(StoppedError):
+    with pytest.raises(Cancelled):
         estimate_with(model, PHOTO, None, lambda: len(told) >= 20, lambda doing, share: told.append(share))
     assert len(told) == 20
     assert not list(own_cache.glob("*"))

@@ -14,18 +14,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.bands import Cancelled
 from iibr_core.depth.origin import DepthChoice
 from iibr_core.evaluation import report
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.evaluation.protocol import Judgement, Options, evaluate
 from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
 from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, given_of, trials_of
 from iibr_core.evaluation.views import ViewMaker, as_stored, outer_views
 from iibr_core.formats.multi_view import MultiView
 from iibr_core.formats.photo import read_photo
 from iibr_core.generate import generate
-from iibr_core.synthesis import Cancelled
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 from tests.core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid, write_numbered
 from tests.core.scenes import disparity_of, literal_plan, photo_of
@@ -207,8 +208,11 @@ def test_the_markdown_has_a_table_for_each_judgement(judgements: list[Judgement]
         assert len(re.findall(rf"(?m)^\| {method} \|", text)) >= len(judgements)
     for line in text.splitlines():
         assert "nan" not in line
+    assert text.count(ABOUT_CONSISTENCY) == 1
+    assert ABOUT_CONSISTENCY not in report.markdown_of([replace(judgements[0], consistency={})], "x")
+    assert f"| fast | – | {judgements[0].consistency['fast'].hole_pixels} |" in text
     blocks = re.findall(r"(?m)(?:^\|.*\n?)+", text)
-    assert len(blocks) == 1 + 2 * len(judgements)
+    assert len(blocks) == 1 + sum(2 + bool(judgement.refocus) for judgement in judgements)
     for block in blocks:
         assert len({line.count("|") for line in block.strip().splitlines()}) == 1
 
@@ -221,10 +225,14 @@ def test_the_page_needs_nothing_else(judgements: list[Judgement]) -> None:
     per_judgement = 1 + 2 * len(ALWAYS)
     epis = len(judgements[0].pictures.epis)
     assert epis == len(ALWAYS)  # the truth and all but identity
-    assert len(images) == per_judgement * len(judgements) + epis
+    refocused = ("near", "middle", "far")
+    assert len(images) == per_judgement * len(judgements) + epis + 3 * len(refocused)
     for name, data in images:
         picture = Image.open(io.BytesIO(base64.b64decode(data)))
         picture.load()
+        if name.startswith(refocused):
+            assert picture.width < WIDTH
+            continue
         assert picture.size == ((WIDTH, 3) if name.startswith("EPI") else (WIDTH, HEIGHT))
 
 

@@ -100,33 +100,41 @@ def write_field(folder, grid):
                 writer.add(ViewUpdate(row, column, NOISE, NOISE[..., 0].astype(np.float32)))
 
 
+def generating(folder):
+    """`iibr generate` in a process of its own, in the midst of writing views to `field` in this folder."""
+    write_image(folder / "photo.png", NOISE)
+    words = ["generate", "photo.png", "--grid", "31", "--out", "field", "--depth", "flat"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "viewer", *words],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    end = time.monotonic() + DEADLINE_S
+    while not list(folder.glob(".field.*/input_Cam*.png")):
+        assert process.poll() is None
+        assert time.monotonic() < end
+    return process
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_process_asked_to_end_leaves_nothing(tmp_path, number):
+    process = generating(tmp_path)
+    process.send_signal(number)
+    said = process.communicate(timeout=DEADLINE_S)[1]
+    assert process.returncode == 130
+    assert [line for line in said.splitlines() if line and not line.startswith("note: ")] == ["iibr: interrupted"]
+    assert [path.name for path in tmp_path.iterdir()] == ["photo.png"]
+
+
 def test_a_killed_process_leaves_nothing_under_the_name_it_was_to_write(tmp_path):
     """Killed in the midst of its views; the light field that was there is whole. What is left is hidden beside it."""
     write_field(tmp_path / "field", GridShape(1, 1))
     before = {path.name: path.read_bytes() for path in (tmp_path / "field").iterdir()}
-    write_image(tmp_path / "photo.png", NOISE)
-    command = [
-        sys.executable,
-        "-m",
-        "viewer",
-        "generate",
-        "photo.png",
-        "--grid",
-        "31",
-        "--out",
-        "field",
-        "--depth",
-        "flat",
-    ]
-    process = subprocess.Popen(
-        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": os.getcwd()}, stderr=subprocess.DEVNULL
-    )
-    end = time.monotonic() + DEADLINE_S
-    while not list(tmp_path.glob(".field.*/input_Cam*.png")):
-        assert process.poll() is None
-        assert time.monotonic() < end
+    process = generating(tmp_path)
     process.send_signal(signal.SIGKILL)
-    process.wait()
+    process.communicate()
     assert {path.name: path.read_bytes() for path in (tmp_path / "field").iterdir()} == before
     assert len(list(read_light_field(tmp_path / "field")[1])) == 1
     assert all(

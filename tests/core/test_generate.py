@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iibr_core import synthesis
+from iibr_core import bands
 from iibr_core.generate import generate
 from iibr_core.synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.types import GridShape, ViewOffset, ViewUpdate
@@ -68,8 +68,8 @@ def test_order_and_bands_do_not_change_a_pixel(monkeypatch):
     photo, disparity = square_before_wall()
     reference = views_of(photo, disparity, 5)
     other_order = views_of(photo, disparity, 5, nearest_to=lambda: ViewOffset(2.0, -2.0))
-    monkeypatch.setattr(synthesis, "MOST_BAND_PIXELS", 7 * 80)
-    monkeypatch.setattr(synthesis, "THREADS", 3)
+    monkeypatch.setattr(bands, "MOST_BAND_PIXELS", 7 * 80)
+    monkeypatch.setattr(bands, "THREADS", 3)
     small_bands = views_of(photo, disparity, 5)
     for other in (other_order, small_bands):
         assert other.keys() == reference.keys()

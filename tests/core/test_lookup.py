@@ -57,7 +57,15 @@ def test_surfaces_that_share_a_pixel_blend_in_linear_light():
         )
     half = np.full((2, 1, 3), 0.5, np.float32)
     slots = np.broadcast_to(np.uint8([[[0]], [[1]]]), (2, 1, 3)).copy()
-    candidates = Candidates(ViewOffset(0, 0), 1, np.full((1, 3), 2, np.uint8), half, np.float32(slots == 0), slots)
+    candidates = Candidates(
+        ViewOffset(0, 0),
+        1,
+        np.full((1, 3), 2, np.uint8),
+        half,
+        np.float32(slots == 0),
+        slots,
+        np.zeros((1, 1), np.bool_),
+    )
     colors, _, _ = look_up_colors(rays, candidates, half)
     assert colors[0, 1] == pytest.approx(
         srgb_from_linear((linear_from_srgb(red) + linear_from_srgb(blue)) / 2), abs=1e-5

@@ -121,7 +121,7 @@ def test_results_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.Monk
     photo, disparity, _ = disc_before_slope()
     soft = blurred(disparity, 2.0)
     reference = refine(photo, soft)
-    monkeypatch.setattr("iibr_core.depth.refine.THREADS", 7)
+    monkeypatch.setattr("iibr_core.bands.THREADS", 7)
     np.testing.assert_array_equal(refine(photo, soft), reference)
 
 

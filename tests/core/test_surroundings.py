@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.surroundings import AROUND_PX, STEP_AROUND_PX, edge_softness, surroundings_of
+from iibr_core.surroundings import AROUND_PX, EDGE_WINDOW_PX, STEP_AROUND_PX, edge_softness, surroundings_of
 from iibr_core.training.degrade import blurred
 
 
@@ -43,6 +43,26 @@ def square(size: int = 64) -> np.ndarray:
     disparity = np.zeros((size, size), np.float32)
     disparity[16:48, 16:48] = 3
     return disparity
+
+
+def slow_softness(disparity: np.ndarray, least_edge: float) -> float:
+    left, total = [], []
+    for values in (*disparity, *disparity.T):
+        for x in range(len(values) - EDGE_WINDOW_PX):
+            steps = np.abs(np.diff(values[x : x + EDGE_WINDOW_PX + 1]))
+            change = abs(values[x + EDGE_WINDOW_PX] - values[x])
+            if change >= least_edge:
+                total.append(change)
+                left.append(np.fmax(change - steps.max(), 0))
+    return sum(left) / sum(total) if total else 0.0
+
+
+@pytest.mark.parametrize("shape", [(23, 31), (9, 8), (8, 9), (8, 8)])
+@pytest.mark.parametrize("unknown", [0.0, 0.02])
+def test_softness_against_a_slow_twin(shape: tuple[int, int], unknown: float):
+    disparity = np.cumsum(random_disparity(np.random.default_rng(4), shape, 0.0), axis=1)
+    disparity[np.random.default_rng(5).random(shape) < unknown] = np.nan
+    assert edge_softness(disparity, 1.5) == pytest.approx(slow_softness(disparity, 1.5), rel=1e-5)
 
 
 def test_softness_tells_steps_from_slopes():

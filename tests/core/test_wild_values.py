@@ -14,7 +14,18 @@ import numpy as np
 import pytest
 
 import iibr_core
-from iibr_core import candidates, color, contested, geometry, lookup, mixed_pixels, occlusion, plan, surroundings
+from iibr_core import (
+    candidates,
+    color,
+    contested,
+    geometry,
+    lookup,
+    mixed_pixels,
+    occlusion,
+    plan,
+    smooth_cells,
+    surroundings,
+)
 from iibr_core import generate as generating
 from iibr_core.depth import align, apple, fill, gdepth, offline, refine, resample, sidecar, source
 from iibr_core.depth.estimate import DisparityMap, MetricDepth, RelativeInverseDepth
@@ -135,6 +146,11 @@ def field_on_disk(folder, value):
     return header, list(views)
 
 
+def cells_of(value):
+    cells = rays(value).cells
+    return cells.low, cells.high
+
+
 FINITE = {
     "candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
     "contested.decide": lambda v, _: decided(v),
@@ -185,6 +201,16 @@ FINITE = {
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(focus_disparity=v)).field_disparity(scene()[1]),
     ],
     "plan.plan_literal": lambda v, _: plan.plan_literal(scene()[0], Disparity(depths(v), "wild"), GRID),
+    "smooth_cells.find_smooth_cells": lambda v, _: [
+        smooth_cells.find_smooth_cells(rays(v), ViewOffset(0.5, -1.0), (0, SIZE[0])),
+        smooth_cells.find_smooth_cells(rays(1.0), ViewOffset(v, 0.5), (0, SIZE[0])),
+    ],
+    "smooth_cells.land_on_rough": lambda v, _: [
+        smooth_cells.land_on_rough(
+            rays(v).cells.low[0], rays(v).cells.high[0], t, 0.5, (0, 4), np.eye(1, 4, dtype=bool)
+        )
+        for t in (0.5, v)
+    ],
     "surroundings.edge_softness": lambda v, _: surroundings.edge_softness(depths(v), 0.5),
     "surroundings.surroundings_of": lambda v, _: surroundings.surroundings_of(depths(v)[None], 1.0).softness,
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
@@ -256,9 +282,9 @@ READS_OR_TELLS = {
     "formats.weights_file": "load_weights read_weights read_tensors require_shapes",
     "generate": "transformer_for",
     "resources": "resource_folder",
-    "synthesis": "ViewSynthesis Cancelled",
+    "bands": "Cancelled never go_on in_pieces in_bands",
+    "synthesis": "ViewSynthesis",
     "types": "ViewOffset GridShape InputError",
-    "depth.origin": "StoppedError",
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 

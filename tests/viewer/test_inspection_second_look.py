@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.bands import Cancelled
 from iibr_core.formats.hci import HciWriter, read_light_field, read_view
 from iibr_core.formats.photo import write_image
 from iibr_core.generate import generate, ray_set
 from iibr_core.plan import plan_for_viewing, plan_literal
-from iibr_core.synthesis import Cancelled, ViewSynthesis
+from iibr_core.synthesis import ViewSynthesis
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import write_scene
 from viewer.inquiry import Inquiry

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.bands import Cancelled
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from viewer.state import CENTRE, Progress, Source
 from viewer.worker import (
@@ -152,18 +153,26 @@ def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path
 
 
 def test_generating_stops_between_row_bands(photo_path: Path) -> None:
-    """Asked to stop within the first view, it ends without another result."""
+    """Asked to stop once the scene is there, it ends without another view."""
+    kinds: list[type] = []
     asked = []
 
     def should_stop() -> bool:
-        asked.append(None)
-        return True
+        asked.append(len(kinds))
+        return bool(kinds)
 
-    results = results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE)
-    kinds = [type(result) for result in results]
-    assert asked
+    for result in results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE):
+        kinds.append(type(result))
+    assert asked[-1] > 0
     assert kinds[0] is SceneReady
     assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
+
+
+def test_reading_stops_too(photo_path: Path) -> None:
+    """Asked to stop while it refines depth."""
+    request = Request(1, Source(str(photo_path), grid=GridShape(3, 3)))
+    with pytest.raises(Cancelled):
+        next(results_of(request, lambda: True, lambda: CENTRE))
 
 
 def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> None:

@@ -83,9 +83,11 @@ class LightFieldTexture:
             return
         keeps_disparity = disparity is not None and self.disparities.size == self.colors.size
         if disparity is not None and keeps_disparity:
+            # Half floats hold no more, and differences of the largest floats are infinite.
+            disparity = np.clip(disparity, -HALF_MAX, HALF_MAX)
             if not self.has_disparity.any():
                 self.range_px = _range_of(disparity)
-            half = np.clip(disparity, -HALF_MAX, HALF_MAX).astype(np.float16)
+            half = disparity.astype(np.float16)
             self.disparities.write(half, self._viewport(row, column))
             blocks = _block_ranges(half)
             self.blocks.write(blocks, (0, 0, self.layer(row, column), blocks.shape[1], blocks.shape[0], 1))

@@ -41,6 +41,24 @@ def test_stray_disparities_do_not_stretch_the_range(gl: GLContext) -> None:
     field.release()
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("hdr", [False, True])
+@pytest.mark.parametrize("wild", [3e38, -3e38, 3.4e38])
+def test_the_largest_disparities_stay_finite(gl: GLContext, wild: float, hdr: bool) -> None:
+    field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr, with_disparity=True)
+    colors = np.zeros((4, 8, 3), np.float16 if hdr else np.uint8)
+    disparity = np.tile(np.float32([wild, -wild, 0, 1, 2, 3, 4, 5]), (4, 1))
+    for column in range(2):
+        field.upload(0, column, colors, disparity)
+    stored = np.frombuffer(field.disparities.read(), np.float16).reshape(6, 4, 8)[1].astype(np.float32)
+    assert (stored == np.clip(disparity, -65504, 65504)).all()
+    assert np.isfinite(field.range_px).all()
+    alpha = np.frombuffer(field.colors.read(), np.float16 if hdr else np.uint8).reshape(6, 4, 8, 4)[1, 0, :, 3]
+    assert alpha[2] < alpha[int(wild < 0)]
+    assert alpha[2] > alpha[int(wild > 0)]
+    field.release()
+
+
 def test_hdr_keeps_light_beyond_white(gl: GLContext) -> None:
     field = LightFieldTexture(gl.ctx, GRID, 2, 1, hdr=True, with_disparity=False)
     colors = np.array([[[0.5, 1.0, 3.0], [0.0, 20.0, 65504.0]]], np.float16)
