@@ -114,12 +114,13 @@ def _land(  # type: ignore[no-untyped-def]
                 if not (right > -0.5 and left < width and bottom > first_row - 0.5 and top < first_row + rows):
                     continue
                 first_y, last_y = max(nearest_pixel(top), first_row), min(ceil(bottom - 0.5), first_row + rows - 1)
-                for row in range(first_y - first_row, last_y - first_row + 1):
-                    overlap_y = filled * (min(bottom, first_row + row + 0.5) - max(top, first_row + row - 0.5))
-                    for column in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
-                        overlap = np.float32(overlap_y * (min(right, column + 0.5) - max(left, column - 0.5)))
+                for target_y in range(first_y, last_y + 1):
+                    overlap_y = filled * (min(bottom, target_y + 0.5) - max(top, target_y - 0.5))
+                    for target_x in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
+                        overlap = np.float32(overlap_y * (min(right, target_x + 0.5) - max(left, target_x - 0.5)))
                         if not overlap > LEAST_OVERLAP:
                             continue
+                        row, column = np.uint64(target_y - first_row), np.uint64(target_x)  # never count from the end
                         used = np.int64(count[row, column])
                         slot = 0
                         while slot < used:

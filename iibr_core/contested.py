@@ -29,19 +29,21 @@ REACH_PX = 6
 AROUND = np.array(
     [
         (0, 1), (0, -1), (1, 0), (-1, 0), (2, 2), (2, -2), (-2, 2), (-2, -2), (0, 3), (0, -3), (3, 0), (-3, 0),
-        (0, 6), (0, -6), (6, 0), (-6, 0), (4, 4), (4, -4), (-4, 4), (-4, -4),
+        (4, 4), (4, -4), (-4, 4), (-4, -4), (0, 6), (0, -6), (6, 0), (-6, 0),
     ]
 )  # fmt: skip
-"""Where, in pixels down and right: this is enough to meet every surface that is not a sliver."""
+"""Where, in pixels down and right, the nearest first: this is enough to meet every surface that is not a sliver."""
 AROUND_DISTANCE = np.hypot(*AROUND.T)
 AROUND_SHARP = 12
 SOFT = 0.5
 """Where depth edges are softer than this, all of AROUND is looked at, else the first AROUND_SHARP."""
-CONTESTED_PX = 0.75
+CONTESTED_PX = 1.5
 """A step of disparity that moves its sides apart by less than this does not contest a ray."""
+OWN_LANDING_PX = 0.75
+"""What lands near by at less than this from a hypothesis is of its surface."""
 CONTESTED_AROUND_PX = 1.5
 """Where edges are soft there are no steps: there a surface within REACH_PX contests a ray if it is this far off."""
-DISTINCT_PX = 0.3
+DISTINCT_PX = 0.5
 """Hypotheses closer than this are one; a ray whose surfaces all are has nothing to decide."""
 LEAST_WEIGHT = 0.02
 LEAST_VOTE = 0.004
@@ -91,7 +93,8 @@ def find_contested(
     first, last = rows
     shape = (last - first) * candidates.count.shape[1], hypotheses
     pixel, number = np.empty((shape[0], 2), np.int64), np.zeros(shape[0], np.int64)
-    disparity, source, share = np.empty(shape, np.float32), np.empty(shape, np.uint8), np.empty(shape, np.float32)
+    disparity, source = np.empty(shape, np.float32), np.empty(shape, np.uint8)
+    share, nearest = np.empty(shape, np.float32), np.empty(shape, np.float32)
     offsets, _, surfaces, coverage, _ = rays.arrays
     around = rays.surroundings
     from_sources = np.array(candidates.offset) - offsets
@@ -102,14 +105,14 @@ def find_contested(
     count = _lay_out(
         certain, candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step,
         from_sources, rays.photo_images, parallax, is_soft, looks, candidates.first_row, first, last, every,
-        pixel, number, disparity, source, share,
+        pixel, number, disparity, source, share, nearest,
     )  # fmt: skip
     pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
     features = np.zeros((count, hypotheses, FEATURES), np.float32)
     _describe(
         surfaces, coverage, around.low, around.high, around.step, around.softness, from_sources, rays.photo_images,
-        candidates.count, *shown, weights, candidates.first_row, parallax, looks,
-        pixel, number, disparity, source, share[:count], features,
+        candidates.count, weights, candidates.first_row, parallax,
+        pixel, number, disparity, source, share[:count], nearest[:count], features,
     )  # fmt: skip
     pixel[:, 0] += candidates.first_row
     mask = np.arange(hypotheses) < number[:, None]
@@ -181,14 +184,14 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
 def _lay_out(  # type: ignore[no-untyped-def]
     certain, count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
     photo_images, parallax, is_soft, looks, first_row, first, last, every,
-    pixel, number, disparity, source, share,
+    pixel, number, disparity, source, share, nearest,
 ):  # fmt: skip
     """Select contested rays, none in certain cells; pick the surfaces on each, then again and again the one around it
-    farthest from those.
+    farthest from those. nearest: how many pixels away each surface lands.
     """
     _, rows, width = surface.shape
     height = step.shape[1]
-    near_d, near_k = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64)
+    near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
     found = 0
     for y in range(first, last):
         certain_cells = certain[(y + first_row % CELL_PX) // CELL_PX]
@@ -225,7 +228,7 @@ def _lay_out(  # type: ignore[no-untyped-def]
             for i in range(looks):
                 v, u = y + AROUND[i, 0], x + AROUND[i, 1]
                 if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
-                    near_d[n], near_k[n] = shown_disparity[v, u], shown_source[v, u]
+                    near_d[n], near_k[n], near_px[n] = shown_disparity[v, u], shown_source[v, u], AROUND_DISTANCE[i]
                     n += 1
             if picked == 0 and n > 0:
                 front = np.argmax(near_d[:n])
@@ -259,6 +262,14 @@ def _lay_out(  # type: ignore[no-untyped-def]
                 disparity[found, picked], source[found, picked] = disparity[found, mixed], source[found, mixed] + PLAIN
                 share[found, picked] = 0.0
                 picked += 1
+                for j in range(picked):
+                    nearest[found, j] = 0.0 if share[found, j] > 0 else REACH_PX + 1.0
+                    if share[found, j] > 0:
+                        continue
+                    for i in range(n):
+                        if abs(near_d[i] - disparity[found, j]) * parallax < OWN_LANDING_PX:
+                            nearest[found, j] = near_px[i]
+                            break
                 pixel[found, 0], pixel[found, 1], number[found] = y, x, picked
                 found += 1
     return found
@@ -267,7 +278,7 @@ def _lay_out(  # type: ignore[no-untyped-def]
 @kernel
 def _squashed(px):  # type: ignore[no-untyped-def]
     """Pixels on a scale of -4..4 where small differences count most; 0 where there is no difference to tell."""
-    if np.isnan(px):
+    if px != px:
         return 0.0
     px = min(max(px, -MOST_PX), MOST_PX)
     return px / (1.0 + 0.25 * abs(px))
@@ -276,24 +287,15 @@ def _squashed(px):  # type: ignore[no-untyped-def]
 @kernel
 def _describe(  # type: ignore[no-untyped-def]
     surfaces, coverage, low, high, step, softness, offsets, photo_images,
-    count, shown_disparity, shown_source, weights, first_row, parallax, looks,
-    pixel, number, disparity, source, share, features,
+    count, weights, first_row, parallax, pixel, number, disparity, source, share, nearest, features,
 ):  # fmt: skip
     _, height, width = surfaces.shape
-    rows = count.shape[0]
     steps = np.empty_like(offsets)
     for image in range(len(offsets)):
         steps[image] = offsets[image] / max(np.hypot(offsets[image, 0], offsets[image, 1]), 1e-9)
     log_parallax = np.log1p(parallax)
-    landed, distances = np.empty(len(AROUND)), np.empty(len(AROUND))
     for n in range(len(pixel)):
         y, x = pixel[n]
-        near = 0
-        for i in range(looks):
-            v, u = y + AROUND[i, 0], x + AROUND[i, 1]
-            if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
-                landed[near], distances[near] = shown_disparity[v, u], AROUND_DISTANCE[i]
-                near += 1
         front = back = disparity[n, 0]
         for a in range(number[n]):
             front, back = max(front, disparity[n, a]), min(back, disparity[n, a])
@@ -321,15 +323,9 @@ def _describe(  # type: ignore[no-untyped-def]
             for i in range(len(PROFILE_PX)):
                 step_x, step_y = PROFILE_PX[i] * steps[k, 1], PROFILE_PX[i] * steps[k, 0]
                 for j in range(2):
-                    v = min(max(nearest_pixel(source_y + (step_x if j else step_y)), 0), height - 1)
-                    u = min(max(nearest_pixel(source_x + (-step_y if j else step_x)), 0), width - 1)
+                    v = np.uint64(min(max(nearest_pixel(source_y + (step_x if j else step_y)), 0), height - 1))
+                    u = np.uint64(min(max(nearest_pixel(source_x + (-step_y if j else step_x)), 0), width - 1))
                     features[n, a, PROFILE + 2 * i + j] = _squashed((surfaces[k, v, u] - d) * parallax)
-
-            # The nearest landing of this surface.
-            nearest = 0.0 if share[n, a] > 0 else REACH_PX + 1.0
-            for i in range(near):
-                if abs(landed[i] - d) * parallax < CONTESTED_PX:
-                    nearest = min(nearest, distances[i])
 
             v, u = min(max(nearest_pixel(source_y), 0), height - 1), min(max(nearest_pixel(source_x), 0), width - 1)
             around_low, around_high = min(low[k, v, u], d), max(high[k, v, u], d)
@@ -341,7 +337,7 @@ def _describe(  # type: ignore[no-untyped-def]
             out[4] = _squashed((front - d) * parallax)
             out[5] = _squashed((d - back) * parallax)
             out[SHARE] = share[n, a]
-            out[7] = nearest / (REACH_PX + 1.0)
+            out[7] = nearest[n, a] / (REACH_PX + 1.0)
             out[8] = 1.0 if k >= photo_images else 0.0
             out[9] = log_parallax
             out[10] = coverage[k, v, u]

@@ -16,7 +16,7 @@ from iibr_core.types import FloatImage
 
 AROUND_PX = 2
 """Reach of the range of disparities around a source ray."""
-STEP_AROUND_PX = 3
+STEP_AROUND_PX = 2
 """Reach of the search for a depth edge."""
 EDGE_WINDOW_PX = 8
 """A depth edge softer than this is a slope."""

@@ -19,8 +19,8 @@ from iibr_core.training.batches import training_batch
 from iibr_core.training.loop import Batch, TrainConfig
 from iibr_core.training.losses import LossWeights
 
-LAMBDAS = LossWeights(entropy=0.05)
-"""The paper's 1 for the entropy outweighs the colours where hypotheses share a pixel, and made edges ragged."""
+LAMBDAS = LossWeights(entropy=0.01)
+"""The paper's 1 for the entropy outweighs the colours where hypotheses share a pixel, and makes edges ragged."""
 EXIT_DIVERGED = 1
 EXIT_INTERRUPTED = 130
 
