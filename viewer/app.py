@@ -27,7 +27,7 @@ from viewer.depth_preview import DepthPreview
 from viewer.depth_work import DepthWork, DropStroke
 from viewer.depth_work_edits import is_depth_ahead, work_asked_for
 from viewer.errands import Errands
-from viewer.gpu.context import create_for_window
+from viewer.gpu.glfw_context import create_for_window
 from viewer.input import (
     Pointer,
     actions_from_drop,

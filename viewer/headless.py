@@ -17,15 +17,12 @@ from viewer.depth_work import DepthWork
 from viewer.gpu.context import Backend, create_headless
 from viewer.inquiry import NO_AIDS, Aids, beside_of, wanted_inquiry
 from viewer.inspection import Probed
-from viewer.layout import Layout, Rect, layout_of, letterboxed
+from viewer.layout import BACKGROUND, Layout, Rect, layout_of, letterboxed
 from viewer.light_table import LightTable
 from viewer.saving import drawn_pixels
 from viewer.second_look import Looker
 from viewer.stage import Stage
 from viewer.state import CENTRE, AppState, Progress, Source
-from viewer.ui.host import UiHost
-from viewer.ui.screen import build_screen
-from viewer.ui.style import BACKGROUND, Look
 from viewer.worker import Request, SceneReady, results_of
 
 LAYOUT_FRAMES = 3
@@ -117,6 +114,10 @@ class HeadlessViewer:
 
     def screen(self, size: tuple[int, int]) -> NDArray[np.uint8]:
         """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
+        from viewer.ui.host import UiHost  # pictures alone need no ImGui
+        from viewer.ui.screen import build_screen
+        from viewer.ui.style import Look
+
         scene, preferences = self.state.scene, self.state.preferences
         look = Look(preferences.font_scale, preferences.theme)
         picture_size = (scene.width, scene.height) if scene else None

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+BACKGROUND = 0.07, 0.07, 0.08, 1.0
+"""Behind the picture, where the theme is dark."""
 PANEL_WIDTH = 300.0
 MARGIN = 12.0
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
+from viewer.layout import BACKGROUND
 from viewer.state import Theme
 
 FONT_SIZE = 16.0
@@ -32,7 +33,7 @@ class Palette:
 
 
 DARK = Palette(
-    background=(0.07, 0.07, 0.08, 1.0),
+    background=BACKGROUND,
     panel=(0.115, 0.12, 0.13, 1.0),
     frame=(0.19, 0.20, 0.215, 1.0),
     frame_hovered=(0.24, 0.25, 0.27, 1.0),
@@ -57,7 +58,6 @@ LIGHT = Palette(
     warning=(0.68, 0.42, 0.02, 1.0),
     selected=(0.68, 0.82, 0.89, 1.0),
 )
-BACKGROUND = DARK.background
 
 
 @dataclass(frozen=True)

@@ -56,8 +56,20 @@ def test_failure_names_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_one_glfw_library_is_loaded() -> None:
     """Two copies would not know of each other's windows. In a fresh process: other tests load what they like."""
     code = (
-        "import viewer.gpu.context\n"
+        "import viewer.gpu.glfw_context\n"
         "paths = {line.split()[-1] for line in open('/proc/self/maps') if 'libglfw' in line}\n"
         "assert len(paths) == 1 and 'imgui_bundle' in paths.pop(), paths\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
+
+
+def test_pictures_without_a_window_load_no_window_library() -> None:
+    """They take their time before the first picture."""
+    code = (
+        "import sys\n"
+        "from viewer.headless import HeadlessViewer\n"
+        "HeadlessViewer('egl')\n"
+        "loaded = {'glfw', 'imgui_bundle', 'torch'} & set(sys.modules)\n"
+        "assert not loaded, loaded\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
