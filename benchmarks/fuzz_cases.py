@@ -98,6 +98,23 @@ def _read_poses(path: Path) -> None:
     assert scene is None or all(np.isfinite(view.offset).all() for view in scene.views)
 
 
+def _view_and_lens(folder: Path) -> None:
+    (folder / "views").mkdir(exist_ok=True)
+    for path in (*(folder / "views" / f"v00_u0{u}.png" for u in range(2)), folder / "lens.png"):
+        path.write_bytes(seeds.by_pillow("PNG"))
+
+
+def _read_lens_picture(path: Path) -> None:
+    from iibr_core.evaluation.lens_picture import read_lens_picture
+    from iibr_core.formats.grid_folder import read_grid_folder
+
+    scene = read_grid_folder(path.parent)
+    assert scene is not None
+    found = read_lens_picture(scene, MAX_PIXELS)
+    assert found is not None
+    assert np.isfinite([found.focus_disparity, found.radius_views]).all()
+
+
 def _read_preferences(path: Path) -> None:
     from viewer.kept import with_kept
     from viewer.state import AppState
@@ -142,6 +159,7 @@ READERS: dict[str, Reader] = {
     "map-png": Reader(lambda: [Seed("a_depth.png", seeds.by_pillow("PNG", "L"), mended_png)], _read_map),
     "cfg": Reader(seeds.cfgs, _read_field, _four_views),
     "poses": Reader(seeds.poses, _read_poses, _four_views),
+    "lens": Reader(seeds.lens_pictures, _read_lens_picture, _view_and_lens),
     "preferences": Reader(seeds.preferences, _read_preferences),
     "estimates": Reader(seeds.estimates, _read_estimate),
     "model-config": Reader(seeds.model_configs, _read_model_config),

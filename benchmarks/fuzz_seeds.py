@@ -212,6 +212,11 @@ def poses() -> list[Seed]:
     return [Seed("poses_bounds.npy", file.getvalue())]
 
 
+def lens_pictures() -> list[Seed]:
+    """What a data set's lens.json holds."""
+    return [Seed("lens.json", b'{"focus_disparity": -0.5, "radius_views": 2.0}')]
+
+
 def preferences() -> list[Seed]:
     """What the viewer keeps between two runs."""
     kept = {"theme": "light", "font_scale": 1.25, "open_sections": ["view"], "window": [0, 0, 800, 600]}

@@ -51,7 +51,7 @@ def _numbers(path: Path) -> tuple[float, float]:
     try:
         told = json.loads(path.read_text("utf-8"))
         focus, radius = float(told["focus_disparity"]), float(told["radius_views"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (OSError, ValueError, OverflowError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); give focus_disparity and radius_views") from error
     if not (math.isfinite(focus) and math.isfinite(radius) and 0 < radius <= 100):
         raise InputError(f"{path}: focus_disparity {focus}, radius_views {radius}: give finite ones, the radius > 0")

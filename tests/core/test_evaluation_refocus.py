@@ -261,6 +261,7 @@ def saying(text: str) -> Callable[[Path], None]:
         (saying('{"focus_disparity": "near", "radius_views": 1}'), "lens.json"),
         (saying('{"focus_disparity": NaN, "radius_views": 1}'), "focus_disparity nan"),
         (saying('{"focus_disparity": 1, "radius_views": 0}'), "radius_views 0"),
+        (saying('{"focus_disparity": 1' + 400 * "0" + ', "radius_views": 1}'), "lens.json"),
         (saying('{"focus_disparity": 1, "radius_views": 1e9}'), "radius_views 1000000000.0"),
         (saying("[" * 100_000), "lens.json"),
     ],
