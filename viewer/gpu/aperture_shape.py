@@ -6,14 +6,12 @@ Plain arrays, no GL. The cat's-eye is a disc here: the lens barrel, which cuts i
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewer.state import ApertureMask, ApertureShape
-
-MASK_POINTS = 8
-"""Of a sample's own area of the mask, across: its opening is their mean."""
 
 
 def opening(
@@ -55,12 +53,27 @@ def _turned(
 def _mean_of_mask(
     mask: ApertureMask, t: NDArray[np.float64], s: NDArray[np.float64], diameter: float, width: float
 ) -> NDArray[np.float64]:
-    """The mask lies in the middle, its longer side as long as the diameter."""
-    image = np.frombuffer(mask.values, np.uint8).reshape(mask.rows, mask.columns) / 255.0
+    """Over each sample's square. The mask lies in the middle, its longer side as long as the diameter."""
     pixel = diameter / max(mask.rows, mask.columns)
-    within = ((np.arange(MASK_POINTS) + 0.5) / MASK_POINTS - 0.5) * width
-    y = np.floor((t[..., None, None] + within[:, None]) / pixel + mask.rows / 2).astype(int)
-    x = np.floor((s[..., None, None] + within[None, :]) / pixel + mask.columns / 2).astype(int)
-    is_on_it = (y >= 0) & (y < mask.rows) & (x >= 0) & (x < mask.columns)
-    values = image[np.clip(y, 0, mask.rows - 1), np.clip(x, 0, mask.columns - 1)]
-    return np.where(is_on_it, values, 0.0).mean((-2, -1))
+    top, left = (t - width / 2) / pixel + mask.rows / 2, (s - width / 2) / pixel + mask.columns / 2
+    bottom, right = top + width / pixel, left + width / pixel
+    sums = _sums_of(mask)
+    corners = ((bottom, right, 1), (top, left, 1), (top, right, -1), (bottom, left, -1))
+    return np.clip(sum(sign * _between(sums, y, x) for y, x, sign in corners) * (pixel / width) ** 2, 0.0, 1.0)
+
+
+@lru_cache(maxsize=4)
+def _sums_of(mask: ApertureMask) -> NDArray[np.float64]:
+    """(rows + 1, columns + 1): of all pixels above and left of each pixel corner."""
+    image = np.frombuffer(mask.values, np.uint8).reshape(mask.rows, mask.columns) / 255.0
+    return np.pad(image.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+
+
+def _between(table: NDArray[np.float64], y: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bilinear; beyond the border it stays as there."""
+    y, x = np.clip(y, 0, table.shape[0] - 1), np.clip(x, 0, table.shape[1] - 1)
+    row, column = np.minimum(y.astype(int), table.shape[0] - 2), np.minimum(x.astype(int), table.shape[1] - 2)
+    y, x = y - row, x - column
+    upper = table[row, column] * (1 - x) + table[row, column + 1] * x
+    lower = table[row + 1, column] * (1 - x) + table[row + 1, column + 1] * x
+    return upper * (1 - y) + lower * y

@@ -64,8 +64,8 @@ class Drawing:
         """Smooth what is summed up and write it. is_linear: as light, unbounded, instead of sRGB-encoded."""
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         if summation.lens.keeps_layers:
-            wider = HIGHLIGHT_SPREAD if summation.lens.highlight_gain > 0 else 1.0
-            self.passes.smooth(summation.lens, targets, min(wider / math.sqrt(max(summation.round, 1)), 1.0))
+            narrowing = _spread(summation.lens) / math.sqrt(max(summation.round, 1))
+            self.passes.smooth(summation.lens, targets, min(narrowing, 1.0))
         framebuffer.use()
         self.passes.present(summation.lens, targets, is_linear)
 
@@ -91,7 +91,9 @@ class Drawing:
         moved = ViewOffset(lens.stride * place.t, lens.stride * place.s)
         summation.samples, summation.few = [], {}
         if lens.aperture_share > 0:
-            every = lens.samples(field.grid, field.present, moved)
+            # Smoothing narrows with the rounds: in all it stays as much as that of the first, which leave room for it.
+            leaves_room = summation.round < _spread(lens) ** 2
+            every = lens.samples(field.grid, field.present, moved, is_smoothed=leaves_room)
             summation.few = _few_of(every, lens, field, moved)
             summation.samples = sorted(
                 every, key=lambda sample: (sample.wanted not in summation.few, not _is_direct(sample, field))
@@ -106,12 +108,17 @@ class Drawing:
             self.passes.find_defocus(field, lens, summation.samples or [_eye_sample(lens, field)], targets)
 
 
+def _spread(lens: Lens) -> float:
+    """How wide smoothing is, as a share of what lies between samples of one round."""
+    return HIGHLIGHT_SPREAD if lens.highlight_gain > 0 else 1.0
+
+
 def _few_of(
     every: list[ApertureSample], lens: Lens, field: LightFieldTexture, moved: ViewOffset
 ) -> dict[ViewOffset, float]:
     """Weights of every other sample across and down."""
     wanted = {sample.wanted for sample in every}
-    coarse = lens.samples(field.grid, field.present, moved, coarser=2)
+    coarse = lens.samples(field.grid, field.present, moved, coarser=2, is_smoothed=False)
     few = {sample.wanted: sample.weight for sample in coarse if sample.wanted in wanted}
     return {place: weight / sum(few.values()) for place, weight in few.items()}
 

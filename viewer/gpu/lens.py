@@ -114,17 +114,19 @@ class Lens:
         return ViewOffset(self.eye.t + self.dolly[1] * (v - 0.5), self.eye.s + self.dolly[0] * (u - 0.5))
 
     def samples(
-        self, grid: GridShape, present: NDArray[np.bool_], moved: ViewOffset = UNMOVED, coarser: int = 1
+        self,
+        grid: GridShape,
+        present: NDArray[np.bool_],
+        moved: ViewOffset = UNMOVED,
+        coarser: int = 1,
+        is_smoothed: bool = True,
     ) -> list[ApertureSample]:
         """Points of the lens and who answers; moved: the lattice; coarser: every so manieth of them.
 
-        A sample's square widens the opening, and so does the smoothing: samples far apart take a smaller opening, so
-        that the blur has the same variance.
+        is_smoothed: whether these are to leave room for the smoothing, if there is any.
         """
-        stride = self.stride * coarser
-        wider = (stride**2 - 1) * 2 / 3 if self.keeps_layers else 0.0
-        diameter = 2 * math.sqrt(max((self.diameter / 2) ** 2 - wider, (self.diameter / 4) ** 2))
-        return aperture_samples(self.eye, diameter, grid, present, self.shape, stride, moved)
+        stride, leaves_room = self.stride * coarser, is_smoothed and self.keeps_layers
+        return aperture_samples(self.eye, self.diameter, grid, present, self.shape, stride, moved, leaves_room)
 
 
 def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, prefilter: bool, haste: Haste = NO_HASTE) -> Lens:

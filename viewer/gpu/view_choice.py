@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.aperture_shape import opening
+from viewer.gpu.aperture_width import openness, scale_of
 from viewer.state import ApertureShape
 
 MAX_SOURCES = 4
@@ -107,20 +107,23 @@ def aperture_samples(
     shape: ApertureShape = DISC,
     stride: int = 1,
     moved: ViewOffset = UNMOVED,
+    is_smoothed: bool = False,
 ) -> list[ApertureSample]:
     """Places of a square lattice inside the aperture around the eye. present: (V, U) bool, not all False.
 
     diameter: view steps, at least 1; beyond the grid's own it is cut to a square. stride: view steps between places,
     each weighted by what the aperture leaves of its square. moved: where the lattice lies, (0, 0) = on the stored
     views, those of the centre view's row and column among them. What lies off the grid is answered by its border.
+    is_smoothed: whether what is drawn will be spread over what lies between places. With or without, it blurs as wide
+    as the aperture asks for: see `aperture_width`.
     """
-    widest = float(max(grid))
-    reach = (min(diameter, widest) + stride) / 2
+    width, widest = min(float(stride), diameter), float(max(grid))
+    place = math.remainder(moved.t - eye.t, stride), math.remainder(moved.s - eye.s, stride)
+    scale = scale_of(shape, place, diameter, widest, stride, is_smoothed)
+    diameter, widest = scale * diameter, scale * widest
+    reach = min(diameter, widest) / 2 + stride
     t, s = np.meshgrid(*(_lattice(middle, reach, stride, start) for middle, start in zip(eye, moved)), indexing="ij")
-    width = min(float(stride), diameter)
-    weights = opening(shape, t - eye.t, s - eye.s, diameter, width)
-    within_widest = 0.5 + (widest / 2 - np.maximum(np.abs(t - eye.t), np.abs(s - eye.s))) / width
-    weights = np.minimum(weights, np.clip(within_widest, 0, 1))
+    weights = openness(shape, t - eye.t, s - eye.s, diameter, widest, width)
     if weights.sum() <= 0:  # a mask's hole, or one smaller than the samples
         weights = (np.hypot(t - eye.t, s - eye.s) == np.hypot(t - eye.t, s - eye.s).min()).astype(float)
     weights /= weights.sum()

@@ -110,7 +110,7 @@ def test_cats_eye_cuts_the_lens_off_toward_the_corners(renderer: Renderer, tmp_p
     corner = np.hypot(FLAT.width / 2, FLAT.height / 2)
     barrel_s, barrel_t = 2.0 * (x + 0.5 - FLAT.width / 2) / corner, 2.0 * (y + 0.5 - FLAT.height / 2) / corner
     total, weights = np.zeros((FLAT.height, FLAT.width, 3)), np.zeros((FLAT.height, FLAT.width, 1))
-    for sample in aperture_samples(CENTRE, 4.0, GRID, FULL):
+    for sample in aperture_samples(CENTRE, 4.0, GRID, FULL, optics.aperture_shape):
         moved = round(sample.wanted.t), round(sample.wanted.s)
         light = np.roll(linear_from_srgb(FLAT.view(sample.wanted)[0] / 255), moved, axis=(0, 1))
         left = np.clip(0.5 + 2.0 - np.hypot(sample.wanted.s - barrel_s, sample.wanted.t - barrel_t), 0, 1)

@@ -36,10 +36,9 @@ def converged(renderer: Renderer, optics: Optics) -> np.ndarray:
 
 def test_refining_comes_nearer_to_a_dense_aperture(renderer: Renderer) -> None:
     SCENE.fill(renderer, GRID)
-    dense = np.arange(-2.45, 2.5, 0.1)
-    offsets = [ViewOffset(t, s) for t in dense for s in dense if math.hypot(t, s) < 2.5]
-    weights = [min(2.5 - math.hypot(*offset), 1.0) for offset in offsets]
-    truth = through_aperture(SCENE, offsets, weights, CENTRE, 0.0)
+    dense = np.arange(-1.95, 2.0, 0.1)
+    offsets = [ViewOffset(t, s) for t in dense for s in dense if math.hypot(t, s) < WIDE.aperture_diameter / 2]
+    truth = through_aperture(SCENE, offsets, [1.0] * len(offsets), CENTRE, 0.0)
     errors = []
     for stride in (3, 2, 1):
         renderer.render(WIDE, SIZE, haste=Haste(stride))

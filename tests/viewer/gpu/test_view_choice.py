@@ -70,9 +70,15 @@ def test_aperture_weights_sum_to_one(eye: ViewOffset, diameter: float) -> None:
 
 
 def test_aperture_is_a_disc_with_a_soft_edge() -> None:
+    """Three kinds of views take part; the blur is as wide as the disc's, which tells how much each counts."""
     weights = weights_by_view(aperture_samples(ViewOffset(0.0, 0.0), 3.0, GRID, FULL))
-    assert weights[2, 2] == weights[2, 1] == weights[1, 1] / (2 - np.sqrt(2))
+    middle, side, corner = weights[2, 2], weights[2, 1], weights[1, 1]
+    assert middle > side > corner > 0
+    assert side / middle - corner / middle == pytest.approx(np.sqrt(2) - 1), "the edge fades over one view step"
+    assert weights == pytest.approx(weights.T)
+    assert weights == pytest.approx(weights[::-1])
     assert weights[2, 0] == weights[0, 0] == 0
+    assert 2 * side + 4 * corner == pytest.approx(1.5**2 / 4, rel=0.01)
 
 
 def test_missing_views_are_answered_by_the_nearest_present() -> None:
