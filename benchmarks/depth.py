@@ -8,21 +8,23 @@ DATA holds hci_antinous and the Middlebury pairs; BENCH holds judge_views.py, wh
 from __future__ import annotations
 
 import argparse
-import importlib
 import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
+from iibr_core.color import encoded_from_stored
 from iibr_core.depth.fill import fill_from_background
 from iibr_core.depth.offline import estimate_offline
 from iibr_core.depth.refine import edge_blur_px, refine
-from iibr_core.formats.photo import read_photo
+from iibr_core.evaluation.bench.variants import bench_scenes
+from iibr_core.evaluation.datasets import find_scenes
+from iibr_core.evaluation.metrics import psnr
+from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
 from iibr_core.generate import generate
 from iibr_core.plan import plan_literal
 from iibr_core.training.degrade import blurred
@@ -72,8 +74,7 @@ def report(data: Path, yardsticks: Path) -> Iterator[str]:
     yield from refinement(data, yardsticks)
     yield from procedural()
     yield from seconds()
-    sys.path.insert(0, str(yardsticks))
-    yield from guessed(data, importlib.import_module("judge_views"))
+    yield from guessed(data)
 
 
 def refinement(data: Path, yardsticks: Path) -> Iterator[str]:
@@ -113,7 +114,7 @@ def procedural() -> Iterator[str]:
     yield ""
 
 
-def views_psnr(colors: FloatImage, disparity: FloatImage, truth: dict[ViewOffset, FloatImage], side: int) -> float:
+def views_psnr(colors: FloatImage, disparity: FloatImage, truth: Mapping[ViewOffset, FloatImage], side: int) -> float:
     """Mean PSNR (dB) of the views at some offsets, generated as part of a grid of side x side views."""
     grid = GridShape(side, side)
     photo, given = Photo(colors, float(colors.shape[1]), "scene"), Disparity(disparity, "scene")
@@ -121,11 +122,10 @@ def views_psnr(colors: FloatImage, disparity: FloatImage, truth: dict[ViewOffset
     for update in generate(photo, given, plan_literal(photo, given, grid)):
         offset = grid.offset(update.row, update.column)
         if offset in truth:
-            wanted[offset] = update.colors.astype(np.float64) / 255
+            wanted[offset] = encoded_from_stored(update.colors)
         if len(wanted) == len(truth):
             break
-    errors = [np.mean((wanted[offset] - truth[offset]) ** 2) for offset in truth]
-    return float(np.mean([10 * np.log10(1 / max(error, 1e-10)) for error in errors]))
+    return float(np.mean([psnr(wanted[offset], truth[offset]) for offset in truth]))
 
 
 def seconds() -> Iterator[str]:
@@ -154,7 +154,8 @@ def least_seconds(work: Callable[[], object]) -> tuple[float, float]:
     return min(wall for wall, _ in times), min(cpu for _, cpu in times)
 
 
-def guessed(data: Path, judge: ModuleType) -> Iterator[str]:
+def guessed(data: Path) -> Iterator[str]:
+    """The guess beside a ramp and a constant, on scenes whose disparity is known to be true."""
     yield from ("## The guess without a model", "")
     yield "Scale and shift are fitted to the true disparity by least squares, for the guess, for a ramp from top to"
     yield "bottom and for a constant. PSNR is that of views made from it; photo: the photo as every view."
@@ -162,21 +163,19 @@ def guessed(data: Path, judge: ModuleType) -> Iterator[str]:
     yield ""
     yield "| scene | rms px: guess | ramp | constant | PSNR dB: guess | ramp | constant | photo | blur | holds |"
     yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
-    for name in EXACT:
-        path, true, views, side, _ = judge.dev_scene(data, name)
-        if name == "antinous":
-            views = {offset: views[offset] for offset in judge.OUTER}
-        truth = {ViewOffset(*map(float, offset)): judge.image(view) for offset, view in views.items()}
-        photo = read_photo(path)
+    known = [scene for scene in find_scenes(data) if any(map_.is_truth for map_ in scene.disparity.values())]
+    for scene in (bench_scenes(one, DEFAULT_MAX_PIXELS, with_soft=False)[0] for one in known):
+        true, truth, side = scene.disparity, scene.truth, 2 * scene.reach + 1
+        photo = Photo(scene.photo, float(scene.photo.shape[1]), scene.name)
         guess = estimate_offline(photo).values
         maps = (refine(photo.pixels, guess), np.indices(true.shape, np.float32)[0], np.zeros_like(true))
         fits = [fitted(candidate, true) for candidate in maps]
         errors = [float(np.sqrt(np.nanmean((fit - true) ** 2))) for fit in fits]
         ratios = [views_psnr(photo.pixels, fit, truth, side) for fit in fits]
-        flat = float(np.mean([judge.psnr(photo.pixels, view) for view in truth.values()]))
+        flat = float(np.mean([psnr(photo.pixels, view) for view in truth.values()]))
         holds = f"error {yes(errors[0] < min(errors[1:]))}, PSNR {yes(ratios[0] > flat)}"
         cells = [f"{error:.2f}" for error in errors] + [f"{ratio:.2f}" for ratio in (*ratios, flat)]
-        yield f"| {name} | {' | '.join(cells)} | {edge_blur_px(guess):.1f} | {holds} |"
+        yield f"| {scene.name} | {' | '.join(cells)} | {edge_blur_px(guess):.1f} | {holds} |"
     yield from ("", *NOTE)
 
 

@@ -1,4 +1,4 @@
-"""Figures of the optics: speed against error for every switch and every haste, bokeh from few samples, aliasing,
+"""Figures of the optics: speed against error for every haste, bokeh from few samples, aliasing,
 pinhole, the field while it fills, dragging, memory.
 
     python -m benchmarks.optics --data FOLDER [--out docs/optics.md] [--rounds 5] [--switches 1000]
@@ -16,7 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -27,11 +27,12 @@ from numpy.typing import NDArray
 
 from benchmarks.light_fields import StoredField, read_field
 from benchmarks.refocus import plain_pass
-from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
+from viewer.drawing_bench import DrawVariant, draw, sheared_light
 from viewer.gpu.context import GLContext, create_headless
-from viewer.gpu.haste import HASTES, NO_HASTE, Haste, stretched
-from viewer.gpu.renderer import Renderer, scaled
+from viewer.gpu.haste import HASTES, stretched
+from viewer.gpu.renderer import Renderer
 from viewer.gpu.view_choice import aperture_samples
 from viewer.state import Optics
 
@@ -43,33 +44,7 @@ FIVE = ((4, 4), (0, 0), (0, 8), (8, 0), (8, 8))
 EVERY_SECOND = tuple((v, u) for v in range(0, 9, 2) for u in range(0, 9, 2))
 
 
-@dataclass(frozen=True)
-class Variant:
-    """One way to draw the same picture."""
-
-    name: str
-    haste: Haste = NO_HASTE
-    prefilter: bool = True
-    adaptive: bool = True
-    stored: tuple[tuple[int, int], ...] | None = None
-    hdr: bool = False
-    is_converged: bool = False
-
-
-PLAIN = Variant("every view of the aperture")
-VARIANTS = (
-    PLAIN,
-    Variant("every 2nd view across and down", Haste(2)),
-    Variant("until converged", is_converged=True),
-    Variant("prefilter off", prefilter=False),
-    Variant("prefilter off, every 2nd view", Haste(2), prefilter=False),
-    Variant("tiles skip nothing", adaptive=False),
-    Variant("5x5 views stored", stored=EVERY_SECOND),
-    Variant("5x5 views stored, until converged", stored=EVERY_SECOND, is_converged=True),
-    Variant("5 views stored (centre and corners)", stored=FIVE),
-    Variant("5 views stored, until converged", stored=FIVE, is_converged=True),
-    Variant("textures RGBA16F instead of RGBA8", hdr=True),
-)
+PLAIN = DrawVariant("every view of the aperture")
 HASTE_APERTURES = 0.0, 4.0, 8.0
 """View steps: a drag chooses another haste for each."""
 
@@ -87,15 +62,7 @@ def mean_flip(reference: Image, image: Image) -> float:
     return float(evaluate(*pair, "LDR", applyMagma=False)[1])
 
 
-def draw(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: Variant) -> None:
-    """Draw a variant whose views are uploaded."""
-    renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
-    renderer.render(optics, scaled(size_px, variant.haste.scale), haste=variant.haste)
-    if variant.is_converged:
-        renderer.refine()
-
-
-def drawn(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: Variant) -> Image:
+def drawn(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: DrawVariant) -> Image:
     """The picture of a variant whose views are uploaded."""
     draw(renderer, optics, size_px, variant)
     return stretched(renderer.read_image(), size_px)
@@ -127,27 +94,6 @@ class Stopwatch:
         return (clock() - start) / ((os.cpu_count() or 1) if self._gl.is_software else 1)
 
 
-def switch_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
-    """Rows of speed against error, one a variant."""
-    renderer, watch = Renderer(gl), Stopwatch(gl, field, optics, rounds)
-    field.upload(renderer, field.every)
-    reference = drawn(renderer, optics, SIZE_PX, replace(PLAIN, is_converged=True))
-    uploaded = None
-    for variant in VARIANTS:
-        if (variant.stored, variant.hdr) != uploaded:
-            field.upload(renderer, variant.stored or field.every, variant.hdr)
-            uploaded = variant.stored, variant.hdr
-        image = drawn(renderer, optics, SIZE_PX, variant)
-        samples = renderer.samples_drawn
-        count = 1 if variant.is_converged else rounds
-        own, ratio = watch.milliseconds(partial(draw, renderer, optics, SIZE_PX, variant), count)
-        yield (
-            f"| {variant.name} | {samples} | {own:.0f} | {ratio:.2f} | "
-            f"{psnr_db(image, reference):.1f} | {mean_flip(reference, image):.4f} |"
-        )
-    renderer.release()
-
-
 def haste_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
     """Rows of speed against error, one a haste; for each aperture milliseconds and FLIP."""
     renderer, watch = Renderer(gl), Stopwatch(gl, field, optics, rounds)
@@ -157,7 +103,7 @@ def haste_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) 
     for haste in HASTES:
         row = f"| {haste.stride} | {haste.sources} | {haste.scale:g} |"
         for each, reference in zip(chosen, references):
-            variant = Variant("", haste)
+            variant = DrawVariant("", haste)
             image = drawn(renderer, each, SIZE_PX, variant)
             own, _ = watch.milliseconds(partial(draw, renderer, each, SIZE_PX, variant))
             row += f" {own:.0f} | {mean_flip(reference, image):.4f} |"
@@ -234,21 +180,9 @@ def numpy_refocus(field: StoredField, optics: Optics) -> NDArray[np.float64]:
     samples = aperture_samples(optics.eye, optics.aperture_diameter, field.grid, np.ones(field.grid, bool))
     total = np.zeros(field.views.shape[2:])
     for wanted, row, column, weight in samples:
-        light = linear_from_srgb(field.views[row, column] / 255)
-        by = optics.focus_disparity * (wanted.t - optics.eye.t), optics.focus_disparity * (wanted.s - optics.eye.s)
-        total += weight * shifted(shifted(light, by[0], 0), by[1], 1)
+        by_px = optics.focus_disparity * (wanted.t - optics.eye.t), optics.focus_disparity * (wanted.s - optics.eye.s)
+        total += weight * sheared_light(encoded_from_stored(field.views[row, column]), by_px)
     return np.clip(srgb_from_linear(total / sum(sample.weight for sample in samples)), 0, 1) * 255.0
-
-
-def shifted(image: NDArray[np.float32], by_px: float, axis: int) -> NDArray[np.float32]:
-    """The image moved along an axis, borders repeated."""
-    whole = int(np.floor(by_px))
-    x = by_px - whole
-    taps = {0: 1 - 2.5 * x**2 + 1.5 * x**3, 1: 0.5 * x + 2 * x**2 - 1.5 * x**3}
-    taps |= {-1: -0.5 * x + x**2 - 0.5 * x**3, 2: -0.5 * x**2 + 0.5 * x**3}
-    index = np.arange(image.shape[axis])
-    places = {k: np.clip(index - whole - k, 0, len(index) - 1) for k in taps}
-    return sum(weight * np.take(image, places[k], axis) for k, weight in taps.items())  # type: ignore[return-value]
 
 
 def pinhole_from_five(gl: GLContext, field: StoredField) -> tuple[float, float]:
@@ -294,11 +228,9 @@ def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[st
     }
     yield "# Optics: speed against error\n"
     yield f"Made by `python -m benchmarks.optics`. {gl.renderer}, {os.cpu_count()} cores.\n"
-    yield f"## Switches\n\n{shop.name}, {SIZE_PX[0]}x{SIZE_PX[1]}, aperture of 4 view steps, focus at 4.8 px. Times are"
-    yield "medians, in alternation with a plain shift-and-sum shader (25 fetches a pixel, no prefilter); on software"
-    yield "GL, processor time over the number of cores. Errors are against the converged picture of all 81 views.\n"
-    yield "| variant | samples | ms | x plain | PSNR dB | FLIP |\n| --- | --- | --- | --- | --- | --- |"
-    yield from switch_table(gl, shop, bokeh[shop.name], rounds)
+    yield f"{shop.name} is drawn with {SIZE_PX[0]}x{SIZE_PX[1]} pixels, focus at 4.8 px. Times are medians; on software"
+    yield "GL, processor time over the number of cores. Errors are against the converged picture of all 81 views."
+    yield "Single switches are in [speed.md](speed.md)."
     yield "\n## Haste\n\nWhat a drag leaves out, from the best picture to the quickest: view steps between samples,"
     yield "stored views that a pinhole view is made of, scale of the picture. Milliseconds and FLIP for an eye between"
     yield "views and apertures of 0, 4 and 8 view steps.\n"

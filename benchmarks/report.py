@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, maximum_filter, minimum_filter
 
-from iibr_core import synthesis
-from iibr_core.depth.sidecar import disparity_for
+from iibr_core import bands
+from iibr_core.depth.source import open_with_depth
 from iibr_core.formats.photo import read_photo
 from iibr_core.generate import generate
 from iibr_core.plan import plan_for_viewing, plan_literal
@@ -78,9 +78,8 @@ def antinous(data: Path) -> tuple[Photo, Disparity]:
 def demo_photo() -> tuple[Photo, Disparity]:
     """The bundled photo with the disparity that its viewing plan gives."""
     path = resource_folder("assets") / "motorcycle" / "motorcycle.png"
-    photo = read_photo(path)
-    given = disparity_for(photo, path)
-    return photo, plan_for_viewing(photo, given).field_disparity(given)
+    found = open_with_depth(path)
+    return found.photo, plan_for_viewing(found.photo, found.disparity).field_disparity(found.disparity)
 
 
 def views(photo: Photo, disparity: Disparity, nearest_to: ViewOffset = CENTRE) -> list[ViewUpdate]:
@@ -111,9 +110,9 @@ def order(photo: Photo, disparity: Disparity) -> None:
 
     reference = pixels(CENTRE)
     same_order = pixels(ViewOffset(3.0, -2.0)) == reference
-    bands, synthesis.MOST_BAND_PIXELS = synthesis.MOST_BAND_PIXELS, 10_000
+    usual, bands.MOST_BAND_PIXELS = bands.MOST_BAND_PIXELS, 10_000
     same_bands = pixels(CENTRE) == reference
-    synthesis.MOST_BAND_PIXELS = bands
+    bands.MOST_BAND_PIXELS = usual
     words = {True: "identical", False: "DIFFERENT"}
     print(f"pixels in another order of views: {words[same_order]}; in other bands: {words[same_bands]}", flush=True)
 

@@ -20,9 +20,12 @@ from viewer.options import MaxPixels
 from viewer.terminal import progress_shown
 
 if TYPE_CHECKING:
-    from iibr_core.evaluation.bench.figures import Target
+    from iibr_core.evaluation.bench.drawing import DrawingFigures
+    from iibr_core.evaluation.bench.report import Bench
+    from iibr_core.evaluation.bench.targets import Target
     from iibr_core.evaluation.bench.variants import BenchScene, Draw, Stored
-    from iibr_core.types import FloatImage, ViewOffset
+    from iibr_core.types import FloatImage, Quality, ViewOffset
+    from viewer.gpu.context import GLContext
 
 TARGET_SIZE = 512, 512
 FIRST_FRAME_S = 1.5
@@ -46,47 +49,79 @@ def bench(
     from iibr_core.evaluation.packages import require_packages
 
     require_packages("scipy", "skimage", "matplotlib")
-    from iibr_core.evaluation.bench.figures import foretell, measure_scene, targets
-    from iibr_core.evaluation.bench.report import Bench, write_bench
-    from iibr_core.evaluation.bench.scaling import growth, series
-    from iibr_core.evaluation.bench.variants import VARIANTS, bench_scenes
-    from iibr_core.evaluation.datasets import find_scenes
-    from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
+    from iibr_core.evaluation.bench.report import write_bench
 
-    scenes = [
-        scene
-        for known in find_scenes(data)
-        if known.disparity
-        for scene in bench_scenes(known, max_pixels or DEFAULT_MAX_PIXELS, with_soft=not quick)
-    ]
-    if not scenes:
-        raise InputError(
-            f"{data}: holds no scene with disparity; give one, such as views/v00_u00.png and gt_disp_*.npy"
-        )
-    with drawing() as draw, progress_shown("measuring") as show:
-        figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
-        whole = [scene for scene in scenes if not scene.is_soft]
-        foretold = tuple(f for scene in whole for f in foretell(scene, ("fast", "balanced"), show))
-        growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
-        judged = next((s for s in whole if s.photo.shape[:2] == TARGET_SIZE and s.reach == 4), None)
-        met = [] if judged is None or quick else targets(judged, repeats, show)
-        if judged is not None and not quick:
-            met.append(first_frame(judged))
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}"
-    command = shlex.join(["iibr", *sys.argv[1:]])
-    for path in write_bench(out, Bench(figures, foretold, growths, tuple(met), machine, command)):
+    measured = _measured(data, repeats, max_pixels, quick)
+    for path in write_bench(out, measured):
         print(path)
 
 
+def _measured(data: Path, repeats: int, max_pixels: int | None, quick: bool) -> Bench:
+    from iibr_core.evaluation.bench.figures import measure_scene
+    from iibr_core.evaluation.bench.foretold import foretell, whole_field
+    from iibr_core.evaluation.bench.report import Bench
+    from iibr_core.evaluation.bench.scaling import growth, series
+    from iibr_core.evaluation.bench.targets import field_targets, foretold_targets, front_targets
+    from iibr_core.evaluation.bench.variants import LEAST_STORED_SIDE, VARIANTS
+
+    scenes = _scenes(data, max_pixels, with_soft=not quick)
+    whole = [scene for scene in scenes if not scene.is_soft]
+    drawings: tuple[DrawingFigures, ...] = ()
+    with headless() as gl, progress_shown("measuring") as show:
+        with drawing(gl) as draw:
+            figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
+        large = [scene for scene in whole if 2 * scene.reach + 1 >= LEAST_STORED_SIDE]
+        if gl is not None:
+            from viewer.drawing_bench import measure_drawing
+
+            drawings = tuple(f for scene in large for f in measure_drawing(gl, scene, repeats, show))
+        qualities: tuple[Quality, ...] = ("fast", "balanced") if quick else ("fast", "balanced", "exact")
+        foretold = tuple(f for scene in whole for f in foretell([whole_field(scene)], qualities, repeats, show))
+        growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
+        targets = [*front_targets([f for f in figures if not f.is_soft]), *foretold_targets(foretold)]
+        judged = next((s for s in whole if s.photo.shape[:2] == TARGET_SIZE and s.reach == 4), None)
+        if judged is not None and not quick:
+            targets = [*field_targets(judged, repeats, show), first_frame(judged), *targets]
+    machine = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}" + (f", {gl.renderer}" if gl else "")
+    command = shlex.join(["iibr", *sys.argv[1:]])
+    return Bench(figures, drawings, foretold, growths, tuple(targets), machine, command)
+
+
+def _scenes(data: Path, max_pixels: int | None, with_soft: bool) -> list[BenchScene]:
+    from iibr_core.evaluation.bench.variants import bench_scenes
+    from iibr_core.evaluation.datasets import find_scenes
+    from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
+
+    limit = max_pixels or DEFAULT_MAX_PIXELS
+    known = [scene for scene in find_scenes(data) if scene.disparity]
+    if not known:
+        raise InputError(
+            f"{data}: holds no scene with disparity; give one, such as views/v00_u00.png and gt_disp_*.npy"
+        )
+    return [made for scene in known for made in bench_scenes(scene, limit, with_soft)]
+
+
 @contextmanager
-def drawing() -> Iterator[Draw | None]:
-    """What draws pinhole pictures from stored views; None where there is no OpenGL."""
+def headless() -> Iterator[GLContext | None]:
+    """What draws without a display; None where there is no OpenGL."""
     from viewer.gpu.context import create_headless
 
     try:
         gl = create_headless()
     except InputError as error:
-        print(f"note: variants that leave views out are not measured: {error}", file=sys.stderr)
+        print(f"note: drawing, and variants that leave views out, are not measured: {error}", file=sys.stderr)
+        yield None
+        return
+    try:
+        yield gl
+    finally:
+        gl.release()
+
+
+@contextmanager
+def drawing(gl: GLContext | None) -> Iterator[Draw | None]:
+    """What draws pinhole pictures from stored views."""
+    if gl is None:
         yield None
         return
     from viewer.gpu.renderer import Renderer
@@ -96,7 +131,6 @@ def drawing() -> Iterator[Draw | None]:
         yield lambda stored, offsets: _drawn(renderer, stored, offsets)
     finally:
         renderer.release()
-        gl.release()
 
 
 def _drawn(renderer: Any, stored: Stored, offsets: Iterable[ViewOffset]) -> list[FloatImage]:
@@ -125,7 +159,7 @@ def first_frame(scene: BenchScene) -> Target:
 
     import numpy as np
 
-    from iibr_core.evaluation.bench.figures import Target
+    from iibr_core.evaluation.bench.targets import Target
     from iibr_core.formats.photo import write_image
 
     seconds = []

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.depth.fill import fill_from_background
 from iibr_core.depth.resample import resample_surfaces
 from iibr_core.formats.raster import read_map
-from iibr_core.types import Disparity, FloatImage, InputError, Photo
+from iibr_core.types import Disparity, FloatImage, InputError
 
 DoubleImage = NDArray[np.float64]  # scaling must not overflow before the limit is looked at
 
@@ -26,12 +26,6 @@ MAX_DISPARITY_WIDTHS = 4.0
 DEPTH_SPAN_WIDTHS = 0.01
 """Depth has no baseline; its disparity is given this span from the far to the near end, in photo widths per step."""
 FLAT_DEPTH_SHARE = 1e-4
-
-
-def disparity_for(photo: Photo, photo_path: Path, explicit: Path | None = None, scale: float = 1.0) -> Disparity:
-    """The photo's disparity: from `explicit` if given, else from a sidecar, else flat. Bad files raise InputError."""
-    path = explicit or find_sidecar(photo_path)
-    return flat_disparity(photo.size) if path is None else read_disparity(path, photo.size, scale)
 
 
 def find_sidecar(photo_path: Path) -> Path | None:

@@ -1,8 +1,13 @@
 import numpy as np
 import pytest
 
+from iibr_core.cost import outermost_of, relief_of
+from iibr_core.generate import ray_set
 from iibr_core.plan import MOST_VIEWS_A_SIDE, STEP_PX, TOTAL_PARALLAX, PlanOverrides, plan_for_viewing, plan_literal
-from iibr_core.types import GridShape, InputError
+from iibr_core.training.batches import contested_rays
+from iibr_core.training.degrade import blurred
+from iibr_core.training.scenes import random_scene, render
+from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.core.scenes import disparity_of, photo_of, smooth_texture, square_before_wall
 
 
@@ -40,6 +45,47 @@ def test_every_choice_can_be_overridden():
     assert plan.disparity_zero == 2.0
     assert plan.disparity_scale < 0
     assert plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=0.0)).grid == (1, 1)
+
+
+def test_a_flat_scene_needs_next_to_nothing():
+    photo, disparity = square_before_wall(300, 400)
+    flat = plan_for_viewing(photo, disparity_of(np.zeros((300, 400))))
+    deep = plan_for_viewing(photo, disparity)
+    for quality in ("fast", "balanced", "exact"):
+        assert flat.needs.of(quality).seconds == 0
+        assert 0 < flat.needs.of(quality).peak_bytes < deep.needs.of(quality).peak_bytes
+    assert deep.needs.fast.seconds < deep.needs.balanced.seconds < deep.needs.exact.seconds
+    assert deep.peak_bytes == deep.needs.balanced.peak_bytes
+
+
+def test_needs_follow_views_pixels_and_depth_edges():
+    def seconds(size, side, front=2.0):
+        photo, disparity = square_before_wall(*size, front=front)
+        return plan_literal(photo, disparity, GridShape(side, side)).needs
+
+    small, wider = seconds((120, 160), 5), seconds((240, 320), 5)
+    assert 3 < wider.fast.seconds / small.fast.seconds < 4.2
+    assert seconds((120, 160), 9).fast.seconds / small.fast.seconds == pytest.approx(80 / 24, rel=0.2)
+    even = seconds((120, 160), 5, front=0.0)
+    assert even.balanced.seconds == pytest.approx(even.fast.seconds)
+    assert small.balanced.seconds > 1.2 * small.fast.seconds
+
+
+@pytest.mark.parametrize("blur_px", [0.0, 2.0])
+def test_the_rays_foretold_are_those_really_contested(blur_px):
+    size, grid = (120, 160), GridShape(9, 9)
+    foretold, found = [], []
+    for seed in range(4):
+        scene = random_scene(np.random.default_rng(seed), size, 2.0)
+        colors, values = render(scene, size, ViewOffset(0.0, 0.0))
+        photo, disparity = photo_of(colors), disparity_of(blurred(values, blur_px))
+        rays, completing = ray_set(photo, disparity, plan_literal(photo, disparity, grid))
+        assert len(list(completing)) == 8
+        relief = relief_of(disparity.values, outermost_of(grid))
+        for reach in (1.0, 2.0, 4.0):
+            foretold.append(relief.contested_share(reach / 4) * disparity.values.size)
+            found.append(len(contested_rays(rays, ViewOffset(reach, -reach), (0, size[0]), False).pixel))
+    assert sum(foretold) == pytest.approx(sum(found), rel=0.3), (foretold, found)
 
 
 def test_one_wild_value_does_not_set_the_baseline():

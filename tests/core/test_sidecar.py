@@ -14,13 +14,12 @@ from iibr_core.depth.resample import SURFACE_SHARE, resample_surfaces
 from iibr_core.depth.sidecar import (
     DEPTH_SPAN_WIDTHS,
     SIDECAR_EXTENSIONS,
-    disparity_for,
     find_sidecar,
     flat_disparity,
     read_disparity,
 )
 from iibr_core.formats.pfm import write_pfm
-from iibr_core.types import InputError, Photo
+from iibr_core.types import InputError
 
 RNG = np.random.default_rng(3)
 NAN = np.float32(np.nan)
@@ -207,20 +206,6 @@ def test_sidecar_order(tmp_path):
     for name in reversed(names):
         (tmp_path / name).touch()
         assert find_sidecar(photo) == tmp_path / name
-
-
-def test_the_chain_explicit_then_sidecar_then_flat(tmp_path):
-    photo = Photo(np.zeros((2, 3, 3), np.float32), 3.0, "scene")
-    path = tmp_path / "scene.png"
-    flat = disparity_for(photo, path)
-    assert flat.source == "none"
-    assert not flat.values.any()
-    pfm(tmp_path / "scene_disparity.pfm", np.full((2, 3), 2))
-    assert disparity_for(photo, path).source == "scene_disparity.pfm"
-    explicit = pfm(tmp_path / "other.pfm", np.full((2, 3), 4))
-    assert disparity_for(photo, path, explicit, 0.5).values.tolist() == [[2, 2, 2], [2, 2, 2]]
-    with pytest.raises(InputError, match="no such file"):
-        disparity_for(photo, path, tmp_path / "missing.pfm")
 
 
 def test_flat_disparity_says_how_to_get_depth():

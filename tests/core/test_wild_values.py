@@ -18,6 +18,7 @@ from iibr_core import (
     candidates,
     color,
     contested,
+    cost,
     geometry,
     lookup,
     mixed_pixels,
@@ -156,6 +157,9 @@ FINITE = {
     "contested.decide": lambda v, _: decided(v),
     "contested.find_contested": lambda v, _: in_use(contest(v)),
     "contested.votes": lambda v, _: contested.votes(rays(v), contest(v)),
+    "cost.needs_of": lambda v, _: [cost.needs_of(cost.relief_of(depths(values), 4.0), GRID) for values in (1.0, v)],
+    "cost.relief_of": lambda v, _: [cost.relief_of(depths(v), 4.0), cost.relief_of(depths(1.0), v)],
+    "cost.work_of": lambda v, _: cost.work_of(cost.relief_of(depths(v), 4.0), GRID, "exact"),
     "depth.align.disparity_from": lambda v, _: [
         known_of(DisparityMap(align.disparity_from(kind(depths(v)), GRID)))
         for kind in (RelativeInverseDepth, MetricDepth, DisparityMap)
@@ -174,7 +178,6 @@ FINITE = {
     "depth.resample.resample_surfaces": lambda v, _: known_of(
         DisparityMap(resample.resample_surfaces(known(v), (7, 9)))
     ),
-    "depth.sidecar.disparity_for": lambda v, to: sidecar.disparity_for(scene()[0], to / "a.png", map_file(to, v)),
     "depth.sidecar.read_disparity": lambda v, to: [
         sidecar.read_disparity(map_file(to, v), SIZE),
         sidecar.read_disparity(map_file(to, v, "map_depth"), (7, 8)),
@@ -282,6 +285,7 @@ READS_OR_TELLS = {
     "formats.weights_file": "load_weights read_weights read_tensors require_shapes",
     "generate": "transformer_for",
     "resources": "resource_folder",
+    "cost": "Need Needs Work outermost_of",
     "bands": "Cancelled never go_on in_pieces in_bands",
     "synthesis": "ViewSynthesis",
     "types": "ViewOffset GridShape InputError",

@@ -5,16 +5,23 @@ Ways are run in turns, one round after the other, and compared within a round: w
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import math
+import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import psutil
+
+Tell = Callable[[int, int, str], None]
+"""Told what is done: (done, of, doing)."""
 
 PEAK_RESET, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
 
@@ -41,9 +48,7 @@ def cost_of(work: Callable[[], object]) -> Cost:
     return Cost(time.perf_counter() - wall, time.process_time() - cpu)
 
 
-def in_turns(
-    ways: Mapping[str, Callable[[], Cost]], repeats: int, tell: Callable[[int, int, str], None]
-) -> dict[str, list[Cost]]:
+def in_turns(ways: Mapping[str, Callable[[], Cost]], repeats: int, tell: Tell) -> dict[str, list[Cost]]:
     """The costs that each way tells of itself, one a round; every round goes through all ways."""
     found: dict[str, list[Cost]] = {name: [] for name in ways}
     for round_ in range(repeats):
@@ -64,19 +69,44 @@ def median_cost(costs: list[Cost]) -> Cost:
     return Cost(float(np.median([c.wall_s for c in costs])), float(np.median([c.cpu_s for c in costs])))
 
 
-def peak_bytes(work: Callable[[], object]) -> float:
-    """The most memory this process took while the work ran, beyond what it had before; NaN where the system does not
-    tell (all but Linux). What the work returns is held until then.
+def peak_bytes(work: Callable[..., object], *args: object) -> float:
+    """The most memory that work(*args) takes beyond what was there before, what it returns held until then; the second
+    of two runs counts, in a process of its own. NaN where the system does not tell (all but Linux).
+
+    work: a function of a module; it and args are pickled.
     """
-    gc.collect()
+    return _gauge().submit(_peak_of, work, args).result() if PEAK_RESET.exists() else math.nan
+
+
+@cache
+def _gauge() -> ProcessPoolExecutor:
+    """A process that gives freed arrays back to the system at once: kept ones would hide what is taken anew."""
+    with _environment(MALLOC_MMAP_THRESHOLD_=str(1 << 17)):
+        gauge = ProcessPoolExecutor(1, get_context("spawn"))
+        gauge.submit(gc.collect).result()  # it starts with its first work
+    return gauge
+
+
+@contextmanager
+def _environment(**values: str) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
     try:
-        ctypes.CDLL(None).malloc_trim(0)  # else freed memory hides what is taken anew
-        PEAK_RESET.write_text("5")
-    except (OSError, AttributeError):
-        work()
-        return math.nan
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _peak_of(work: Callable[..., object], args: tuple[object, ...]) -> float:
+    work(*args)
+    gc.collect()
+    PEAK_RESET.write_text("5")
     before = psutil.Process().memory_info().rss
-    held = work()
+    held = work(*args)
     peak = _peak_rss()
     del held
     return float(peak - before)

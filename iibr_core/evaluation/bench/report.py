@@ -2,42 +2,35 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from iibr_core.evaluation.bench.figures import Foretold, Measured, SceneFigures, Target
+from iibr_core.evaluation.bench.drawing import DrawingFigures
+from iibr_core.evaluation.bench.figures import Measured, SceneFigures
+from iibr_core.evaluation.bench.foretold import WITHIN, Foretold, is_near
 from iibr_core.evaluation.bench.measure import on_the_front
+from iibr_core.evaluation.bench.plot import Panel, plotted
 from iibr_core.evaluation.bench.scaling import Growth
+from iibr_core.evaluation.bench.targets import Target
 from iibr_core.evaluation.bench.variants import REFERENCE
 from iibr_core.evaluation.report import markdown_table
 from iibr_core.evaluation.tables import NO_FIGURE, Table, number
 from iibr_core.formats.files import written_whole
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 MIB = 2**20
 FRONT_MARK = "●"
-PANEL_INCHES = 3.9, 3.0
-LEGEND_INCHES = 2.4
-LOWEST_DB = -3.0
-FRONT_COLOR, OTHER_COLOR = "#c2410c", "#64748b"
-PNG_DPI = 110
-COLUMNS = 2
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Everything that was measured. machine: in words."""
+    """Everything that was measured. machine: in words. command: what made it."""
 
     scenes: tuple[SceneFigures, ...]
+    drawings: tuple[DrawingFigures, ...]
     foretold: tuple[Foretold, ...]
     growths: tuple[Growth, ...]
     targets: tuple[Target, ...]
@@ -61,7 +54,7 @@ def write_bench(folder: Path, bench: Bench) -> list[Path]:
 
     Raises InputError where that cannot be done.
     """
-    pictures = plot(bench.scenes, ("svg", "png"))
+    pictures = plotted(panels(bench), ("svg", "png"))
     paths = [folder / "speed.md", folder / "speed.svg", folder / "speed.png"]
     for path, content in zip(paths, (markdown_of(bench).encode(), *pictures)):
         with written_whole(path) as temporary:
@@ -90,41 +83,48 @@ def means(scenes: Sequence[SceneFigures]) -> list[Mean]:
 
 
 def markdown_of(bench: Bench) -> str:
-    """All tables."""
-    lines = [
-        "# Speed against error",
-        "",
-        f"Made by `{bench.command}`. {bench.machine}.",
-        "",
-        "Time is of the whole field, processor time against that of *fast* in the same round (median of rounds).",
-        "Seconds by the clock depend on what else the machine does. Memory is what a run takes beyond what was there:",
-        f"rays, views in flight and those kept. {FRONT_MARK}: on the Pareto front, where nothing else is as cheap and",
-        "better, or as good and cheaper. What the renderer trades is in [optics.md](optics.md).",
-        "",
-        "![Time against PSNR of every variant](speed.svg)",
-        "",
-    ]
-    for title, scenes in _kinds(bench.scenes):
-        lines += [f"## {title}", "", *markdown_table(means_table(scenes)), ""]
-    for scene in bench.scenes:
-        height, width = scene.size
-        lines += [
-            f"## {scene.name}",
-            "",
-            f"{scene.views} views of {width}x{height}, {scene.judged} judged. The plan would choose *{scene.planned}*,",
-            f"{scene.behind_front_db:.2f} dB behind the best that takes no longer.",
-            "",
-            *markdown_table(scene_table(scene)),
-            "",
-        ]
+    """All tables. The first, the means over the scenes, is what to show elsewhere."""
+    means_of_kinds = [(title, "", means_table(scenes)) for title, scenes in _kinds(bench.scenes)]
+    sections = [*means_of_kinds, *_scene_sections(bench.scenes)]
+    sections += [(f"Drawing: {figures.what}", DRAWING, drawing_table(figures)) for figures in bench.drawings]
     if bench.foretold:
-        lines += ["## The plan beside what was measured", "", *markdown_table(foretold_table(bench.foretold)), ""]
+        sections.append(("The plan beside what was measured", FORETOLD, foretold_table(bench.foretold)))
     if bench.growths:
-        lines += ["## Growth", "", "Seconds and bytes grow like the varied quantity to these powers.", ""]
-        lines += [*markdown_table(growth_table(bench.growths)), ""]
+        sections.append(("Growth", GROWTH, growth_table(bench.growths)))
     if bench.targets:
-        lines += ["## Targets", "", *markdown_table(targets_table(bench.targets))]
-    return "\n".join(lines).rstrip() + "\n"
+        sections.append(("Targets", "", targets_table(bench.targets)))
+    lines = ["# Speed against error", "", f"Made by `{bench.command}`. {bench.machine}.", "", *HEAD]
+    for title, words, table in sections:
+        lines += ["", f"## {title}", "", *([words, ""] if words else []), *markdown_table(table)]
+    return "\n".join(lines) + "\n"
+
+
+HEAD = (
+    "Time is of the whole field, processor time against that of *fast* in the same round (median of rounds). Seconds",
+    "by the clock depend on what else the machine does. Memory is what a run takes beyond what was there: rays, views",
+    f"in flight and those kept. {FRONT_MARK}: on the Pareto front, where nothing else is as cheap and better, or as",
+    "good and cheaper. Colours are looked up by cubic interpolation and kept in 32-bit floats until a view is stored:",
+    "neither has a switch.",
+    "",
+    "![Time against PSNR of every variant](speed.svg)",
+)
+DRAWING = (
+    "Time of one picture against drawing it *at once*, what the viewer shows first; errors are against a float sum of\n"
+    "four times as many views in numpy. What a drag leaves out is in [optics.md](optics.md)."
+)
+FORETOLD = f"Foretold over measured; good is within {WITHIN:.0%}. Time is processor time over all cores."
+GROWTH = "Seconds and bytes grow like the varied quantity to these powers."
+
+
+def _scene_sections(scenes: Sequence[SceneFigures]) -> list[tuple[str, str, Table]]:
+    found = []
+    for scene in scenes:
+        words = (
+            f"{scene.views} views of {scene.size[1]}x{scene.size[0]}, {scene.judged} judged. The plan would choose"
+            f" *{scene.planned}*,\n{scene.behind_front_db:.2f} dB behind the best that takes no longer."
+        )
+        found.append((scene.name, words, scene_table(scene)))
+    return found
 
 
 def means_table(scenes: Sequence[SceneFigures]) -> Table:
@@ -162,22 +162,45 @@ def scene_table(scene: SceneFigures) -> Table:
     return Table(("variant", "front", "time / fast", "s by the clock", "peak MiB", "PSNR dB", "FLIP"), rows)
 
 
+def drawing_table(figures: DrawingFigures) -> Table:
+    """Every way to draw a picture."""
+    front = figures.front
+    rows = tuple(
+        (
+            drawn.name,
+            FRONT_MARK if drawn.name in front else "",
+            f"{drawn.ratio:.2f}",
+            f"{1e3 * drawn.cost.cpu_s:.0f}",
+            str(drawn.samples),
+            number(drawn.psnr_db, 2),
+            number(drawn.flip, 4),
+        )
+        for drawn in figures.drawn
+    )
+    return Table(("variant", "front", "time / at once", "ms", "samples", "PSNR dB", "FLIP"), rows)
+
+
 def foretold_table(foretold: Sequence[Foretold]) -> Table:
-    """Memory and the transformer's time, foretold and measured."""
-    head = ("scene", "quality", "MiB foretold", "measured", "transformer s foretold", "measured", "s in all")
+    """Time and memory, foretold and measured."""
+    head = ("scene", "quality", "s foretold", "measured", "ratio", "", "MiB foretold", "measured", "ratio", "")
     rows = tuple(
         (
             f.scene,
             f.quality,
+            number(f.foretold_s, 2),
+            number(f.measured_s, 2),
+            *_judged(f.time_ratio),
             _mib(f.foretold_bytes),
-            f"{_mib(f.measured_bytes)} ({_percent(f.measured_bytes, f.foretold_bytes)})",
-            number(f.foretold_transformer_s, 2),
-            f"{number(f.measured_transformer_s, 2)} ({_percent(f.measured_transformer_s, f.foretold_transformer_s)})",
-            number(f.seconds, 2),
+            _mib(f.measured_bytes),
+            *_judged(f.memory_ratio),
         )
         for f in foretold
     )
     return Table(head, rows)
+
+
+def _judged(ratio: float) -> tuple[str, str]:
+    return number(ratio, 2), {True: "", False: "off", None: ""}[is_near(ratio)]
 
 
 def growth_table(growths: Sequence[Growth]) -> Table:
@@ -212,65 +235,22 @@ def _kinds(scenes: Sequence[SceneFigures]) -> list[tuple[str, list[SceneFigures]
     return [(title, found) for title, found in kinds if found]
 
 
-def plot(scenes: Sequence[SceneFigures], formats: Sequence[str]) -> list[bytes]:
-    """Time against PSNR, as files of these formats: means over scenes, and those scenes that have more variants."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    panels = [(title, {m.name: (m.ratio, m.gain_db) for m in means(found)}) for title, found in _kinds(scenes)]
-    shared = {name for _, points in panels for name in points}
-    for scene in scenes:
+def panels(bench: Bench) -> list[Panel]:
+    """Means over scenes, those scenes that have more variants, and drawing."""
+    found = []
+    for title, scenes in _kinds(bench.scenes):
+        found.append(Panel(title, {mean.name: (mean.ratio, mean.gain_db) for mean in means(scenes)}))
+    shared = {name for panel in found for name in panel.points}
+    for scene in bench.scenes:
         if not scene.is_soft and any(m.variant.name not in shared for m in scene.measured):
-            reference = next(m.psnr_db for m in scene.measured if m.variant.name == REFERENCE.name)
-            panels.append((scene.name, {m.variant.name: (m.ratio, m.psnr_db - reference) for m in scene.measured}))
-    names = list(dict.fromkeys(name for _, points in panels for name in points))
-    rows = math.ceil(len(panels) / COLUMNS)
-    with matplotlib.rc_context({"svg.hashsalt": "iibr", "svg.fonttype": "path", "font.size": 9}):
-        size = PANEL_INCHES[0] * COLUMNS + LEGEND_INCHES, PANEL_INCHES[1] * rows
-        figure = Figure(figsize=size, layout="constrained")
-        parts = figure.subfigures(1, 2, width_ratios=(size[0] - LEGEND_INCHES, LEGEND_INCHES), squeeze=False)
-        pictures, legend = parts[0]
-        axes = list(np.ravel(pictures.subplots(rows, COLUMNS, squeeze=False)))
-        for axis, (title, points) in zip(axes, panels):
-            _draw_panel(axis, title, points, names)
-        for axis in axes[len(panels) :]:
-            axis.axis("off")
-        words = "\n".join(f"{k}  {name}" for k, name in enumerate(names, 1))
-        legend.text(0.02, 0.97, words, va="top", linespacing=1.5)
-        return [_rendered(figure, kind) for kind in formats]
-
-
-def _draw_panel(axis: Axes, title: str, points: dict[str, tuple[float, float]], names: Sequence[str]) -> None:
-    """Gains far below the rest are drawn as triangles at the lower border: all else would be a line."""
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
-
-    front = on_the_front(points)
-    line = sorted((points[name][0], max(points[name][1], LOWEST_DB)) for name in front)
-    axis.plot(*zip(*line), color=FRONT_COLOR, linewidth=1, zorder=1)
-    for name, (ratio, gain) in points.items():
-        height, marker = (gain, "o") if gain >= LOWEST_DB else (LOWEST_DB, "v")
-        axis.scatter(ratio, height, s=26, marker=marker, color=FRONT_COLOR if name in front else OTHER_COLOR, zorder=2)
-        label = str(names.index(name) + 1)
-        axis.annotate(label, (ratio, height), xytext=(4, 3), textcoords="offset points", fontsize=8)
-    axis.set_xscale("log")
-    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    axis.xaxis.set_minor_formatter(NullFormatter())
-    axis.set_title(title, fontsize=9)
-    axis.set_xlabel("time / fast")
-    axis.set_ylabel("PSNR against fast, dB")
-    axis.grid(alpha=0.25, which="both")
-
-
-def _rendered(figure: Figure, kind: str) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata={"Date": None} if kind == "svg" else None)
-    return buffer.getvalue()
+            fast_db = next(m.psnr_db for m in scene.measured if m.variant.name == REFERENCE.name)
+            found.append(Panel(scene.name, {m.variant.name: (m.ratio, m.psnr_db - fast_db) for m in scene.measured}))
+    for figures in bench.drawings:
+        first, title = figures.drawn[0], f"drawing: {figures.what}".replace(", ", ",\n", 1)
+        points = {drawn.name: (drawn.ratio, drawn.psnr_db - first.psnr_db) for drawn in figures.drawn}
+        found.append(Panel(title, points, first.name))
+    return found
 
 
 def _mib(size: float) -> str:
     return f"{size / MIB:.0f}" if math.isfinite(size) else NO_FIGURE
-
-
-def _percent(measured: float, foretold: float) -> str:
-    return f"{measured / foretold - 1:+.0%}" if foretold > 0 and math.isfinite(measured) else NO_FIGURE

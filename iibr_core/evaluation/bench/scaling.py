@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from iibr_core.evaluation.bench.measure import Cost, cost_of, exponent, in_turns, median_cost, peak_bytes
-from iibr_core.generate import generate
-from iibr_core.plan import ScenePlan, plan_literal
+from iibr_core.evaluation.bench.foretold import Given, make_field
+from iibr_core.evaluation.bench.measure import Cost, Tell, cost_of, exponent, in_turns, median_cost, peak_bytes
+from iibr_core.plan import plan_literal
 from iibr_core.training.degrade import blurred
 from iibr_core.types import Disparity, GridShape, Photo, Quality
 
@@ -81,29 +80,26 @@ def series(quick: bool) -> dict[str, list[Point]]:
 
 def edges_of(side: int, grid: int, squares: int) -> float:
     """Share of the pixels near a depth edge, as the plan counts it."""
-    return _planned(Point(0.0, side, grid, FRONT_PX, squares))[2].edge_fraction
+    given = made_up_field(Point(0.0, side, grid, FRONT_PX, squares))
+    return plan_literal(given.photo, given.disparity, given.grid).edge_fraction
 
 
-def growth(name: str, points: list[Point], repeats: int, tell: Callable[[int, int, str], None]) -> Growth:
+def growth(name: str, points: list[Point], repeats: int, tell: Tell) -> Growth:
     """Measure a series, its scenes in turns."""
-    scenes = [_planned(point) for point in points]
+    scenes = [made_up_field(point) for point in points]
+    make_field(scenes[0], points[0].quality)  # compiles
 
-    def run(k: int) -> object:
-        photo, disparity, plan = scenes[k]
-        return list(generate(photo, disparity, plan, quality=points[k].quality))
+    def way(given: Given, quality: Quality) -> Callable[[], Cost]:
+        return lambda: cost_of(lambda: make_field(given, quality))
 
-    run(0)  # compiles
-
-    def way(k: int) -> Callable[[], Cost]:
-        return lambda: cost_of(lambda: run(k))
-
-    ways = {f"{name}: {point.x:g}": way(k) for k, point in enumerate(points)}
+    ways = {f"{name}: {point.x:g}": way(given, point.quality) for given, point in zip(scenes, points)}
     seconds = [median_cost(costs).cpu_s for costs in in_turns(ways, repeats, tell).values()]
-    memory = [peak_bytes(partial(run, k)) for k in range(len(points))]
+    memory = [peak_bytes(make_field, given, point.quality) for given, point in zip(scenes, points)]
     x = [point.x for point in points]
     return Growth(name, tuple(zip(x, seconds, memory)), exponent(x, seconds), exponent(x, memory))
 
 
-def _planned(point: Point) -> tuple[Photo, Disparity, ScenePlan]:
+def made_up_field(point: Point) -> Given:
+    """The scene of a point."""
     photo, disparity = made_up(point.side, point.range_px, point.squares)
-    return photo, disparity, plan_literal(photo, disparity, GridShape(point.grid, point.grid))
+    return Given("made up", photo, disparity, GridShape(point.grid, point.grid))
