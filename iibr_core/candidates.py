@@ -65,9 +65,9 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     cells = rays.cells
     for k in range(len(rays)):
         t, s = offset.t - offsets[k, 0], offset.s - offsets[k, 1]
-        needed = land_on_rough(cells.low[k], cells.high[k], t, s, rows, smooth)
+        needed = land_on_rough(cells, k, t, s, rows, smooth)
         _land(
-            disparity[k], coverage[k], needed, k, s, t, first_row,
+            disparity[k], coverage[k], needed, needed.any(axis=1), k, s, t, first_row,
             found.count, found.coverage, found.disparity, found.source,
         )  # fmt: skip
     _mean_disparity(found.count, found.coverage, found.disparity)
@@ -86,7 +86,7 @@ def _half_extent(gap):  # type: ignore[no-untyped-def]
 
 @kernel
 def _land(  # type: ignore[no-untyped-def]
-    ray_disparity, ray_coverage, needed, index, s, t, first_row, count, coverage, disparity, source
+    ray_disparity, ray_coverage, needed, needed_rows, index, s, t, first_row, count, coverage, disparity, source
 ):  # fmt: skip
     """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, `disparity`
     holds sums weighted by coverage.
@@ -98,6 +98,8 @@ def _land(  # type: ignore[no-untyped-def]
     height = len(ray_disparity)
     tolerance = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     for y in range(height):
+        if not needed_rows[y // CELL_PX]:
+            continue
         for cell in range(needed.shape[1]):
             if not needed[y // CELL_PX, cell]:
                 continue

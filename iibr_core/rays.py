@@ -25,11 +25,13 @@ SMOOTH_SHARE = 0.8
 @dataclass(frozen=True, eq=False)
 class Cells:
     """Rays of S images summed up by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
-    disparity, (inf, -inf) without rays. rough (M, N): whether the photo is there anything but one smooth surface.
+    disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. rough (M, N): whether
+    the photo is there anything but one smooth surface.
     """
 
     low: FloatImage
     high: FloatImage
+    row_ranges: FloatImage
     rough: NDArray[np.bool_]
 
 
@@ -58,6 +60,7 @@ class RaySet:
         self._near_edge = np.empty((capacity, *size), np.bool_)
         in_cells = -(-size[0] // CELL_PX), -(-size[1] // CELL_PX)
         self._low, self._high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
+        self._row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
         self._rough = np.ones(in_cells, np.bool_)
 
     def add(
@@ -81,6 +84,7 @@ class RaySet:
                 _find_rough(disparity, SMOOTH_SHARE * self._surface_step, first, last, self._rough)
 
         in_bands(band, self.size, should_stop)
+        self._row_ranges[k, :, 0], self._row_ranges[k, :, 1] = self._low[k].min(axis=1), self._high[k].max(axis=1)
         self._offsets[k] = offset
         self._count += 1
         self._surroundings = None
@@ -110,7 +114,8 @@ class RaySet:
     @property
     def cells(self) -> Cells:
         """The rays added so far, summed up."""
-        return Cells(self._low[: self._count], self._high[: self._count], self._rough)
+        low, high, row_ranges = (part[: self._count] for part in (self._low, self._high, self._row_ranges))
+        return Cells(low, high, row_ranges, self._rough)
 
     @property
     def surroundings(self) -> Surroundings:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.kernels import kernel
-from iibr_core.rays import CELL_PX, RaySet
+from iibr_core.rays import CELL_PX, Cells, RaySet
 from iibr_core.types import FloatImage, ViewOffset
 
 REACH_PX = 1.5
@@ -38,18 +38,27 @@ def find_smooth_cells(rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -
     smooth = np.ones(shape, np.bool_)
     parallax = max(*map(abs, offset), 1e-9)
     _land_cells(
-        cells.low, cells.high, cells.rough, np.array(offset) - rays.arrays[0], first, parallax, far, near, smooth
+        cells.low,
+        cells.high,
+        cells.row_ranges,
+        cells.rough,
+        np.array(offset) - rays.arrays[0],
+        first,
+        parallax,
+        far,
+        near,
+        smooth,
     )
     smooth &= (near >= far) & ((near - far) * parallax <= ONE_SURFACE_PX)
     return smooth, np.where(smooth, far, np.float32(0.0))
 
 
 def land_on_rough(
-    low: FloatImage, high: FloatImage, t: float, s: float, rows: tuple[int, int], smooth: NDArray[np.bool_]
+    cells: Cells, k: int, t: float, s: float, rows: tuple[int, int], smooth: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Which cells (M, N) of a source, t and s away, land on any cell of these rows that is not smooth."""
-    needed = np.zeros(low.shape, np.bool_)
-    _land_on_rough(low, high, t, s, rows[0] // CELL_PX, smooth, needed)
+    """Which cells (M, N) of source k, t and s away, land on any cell of these rows that is not smooth."""
+    needed = np.zeros(cells.rough.shape, np.bool_)
+    _land_on_rough(cells.low[k], cells.high[k], cells.row_ranges[k], t, s, rows[0] // CELL_PX, smooth, needed)
     return needed
 
 
@@ -61,12 +70,21 @@ def _target_cells(first, least, most):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _land_cells(low, high, rough, offsets, first_cell, parallax, far, near, smooth):  # type: ignore[no-untyped-def]
+def _touches(least, most, t, row, rows):  # type: ignore[no-untyped-def]
+    """Whether a row of cells with these disparities can land on cells [0, rows)."""
+    top, bottom = _target_cells(row, np.float64(least) * t, np.float64(most) * t)
+    return least <= most and bottom >= 0 and top < rows
+
+
+@kernel
+def _land_cells(low, high, row_ranges, rough, offsets, first_cell, parallax, far, near, smooth):  # type: ignore[no-untyped-def]
     """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
     rows, columns = smooth.shape
     for k in range(len(offsets)):
         t, s = offsets[k]
         for v in range(low.shape[1]):
+            if not _touches(row_ranges[k, v, 0], row_ranges[k, v, 1], t, v - first_cell, rows):
+                continue
             for u in range(low.shape[2]):
                 least, most = np.float64(low[k, v, u]), np.float64(high[k, v, u])
                 top, bottom = _target_cells(v - first_cell, least * t, most * t)
@@ -83,9 +101,11 @@ def _land_cells(low, high, rough, offsets, first_cell, parallax, far, near, smoo
 
 
 @kernel
-def _land_on_rough(low, high, t, s, first_cell, smooth, needed):  # type: ignore[no-untyped-def]
+def _land_on_rough(low, high, row_ranges, t, s, first_cell, smooth, needed):  # type: ignore[no-untyped-def]
     rows, columns = smooth.shape
     for v in range(low.shape[0]):
+        if not _touches(row_ranges[v, 0], row_ranges[v, 1], t, v - first_cell, rows):
+            continue
         for u in range(low.shape[1]):
             least, most = np.float64(low[v, u]), np.float64(high[v, u])
             top, bottom = _target_cells(v - first_cell, least * t, most * t)

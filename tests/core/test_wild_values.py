@@ -147,11 +147,6 @@ def field_on_disk(folder, value):
     return header, list(views)
 
 
-def cells_of(value):
-    cells = rays(value).cells
-    return cells.low, cells.high
-
-
 FINITE = {
     "candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
     "contested.decide": lambda v, _: decided(v),
