@@ -48,6 +48,8 @@ DISTINCT_PX = 0.5
 LEAST_WEIGHT = 0.02
 LEAST_VOTE = 0.004
 """Weights below this change no colour by a visible step."""
+SAME_COLOR = 1e-5
+"""Votes no farther apart than this need no mean: so a flat scene's views are the photo to the bit."""
 INPAINTED_APART_PX = 100.0
 """What is inpainted and what the photo shows are different hypotheses, however close their disparities."""
 PROFILE_PX = (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)
@@ -152,10 +154,8 @@ def decide(rays: RaySet, contested: Contested, weights: FloatImage) -> tuple[Flo
 def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors):  # type: ignore[no-untyped-def]
     _, height, width = surfaces.shape
     for n in range(len(weights)):
-        total = red = green = blue = 0.0
-        heavy = 0
-        for a in range(weights.shape[1]):
-            heavy += weights[n, a] > LEAST_VOTE
+        total = red = green = blue = apart = 0.0
+        first_r = first_g = first_b = 0.0
         for a in range(weights.shape[1]):
             w = weights[n, a]
             if not w > LEAST_VOTE:
@@ -168,13 +168,15 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
                 r, g, b = cubic(images, k, x, y)
             else:
                 r, g, b = look_up(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
-            if heavy == 1:
-                colors[n, 0], colors[n, 1], colors[n, 2] = max(r, 0.0), max(g, 0.0), max(b, 0.0)
+            if total == 0.0:
+                first_r, first_g, first_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
+            apart = max(apart, abs(r - first_r), abs(g - first_g), abs(b - first_b))
             total += w
             red += w * linear_scalar(r)
             green += w * linear_scalar(g)
             blue += w * linear_scalar(b)
-        if heavy > 1:
+        colors[n, 0], colors[n, 1], colors[n, 2] = first_r, first_g, first_b
+        if apart > SAME_COLOR:
             colors[n, 0] = srgb_scalar(red / total)
             colors[n, 1] = srgb_scalar(green / total)
             colors[n, 2] = srgb_scalar(blue / total)
@@ -227,8 +229,13 @@ def _lay_out(  # type: ignore[no-untyped-def]
             n = 0
             for i in range(looks):
                 v, u = y + AROUND[i, 0], x + AROUND[i, 1]
-                if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
-                    near_d[n], near_k[n], near_px[n] = shown_disparity[v, u], shown_source[v, u], AROUND_DISTANCE[i]
+                if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
+                    continue
+                d, image = shown_disparity[v, u], np.int64(shown_source[v, u])
+                source_x, source_y = x + d * offsets[image, 1], first_row + y + d * offsets[image, 0]
+                is_inside = -0.5 <= source_x <= width - 0.5 and -0.5 <= source_y <= height - 0.5
+                if is_inside or image >= photo_images:  # the photo shows nothing beyond its frame
+                    near_d[n], near_k[n], near_px[n] = d, image, AROUND_DISTANCE[i]
                     n += 1
             if picked == 0 and n > 0:
                 front = np.argmax(near_d[:n])

@@ -204,10 +204,7 @@ FINITE = {
         smooth_cells.find_smooth_cells(rays(1.0), ViewOffset(v, 0.5), (0, SIZE[0])),
     ],
     "smooth_cells.land_on_rough": lambda v, _: [
-        smooth_cells.land_on_rough(
-            rays(v).cells.low[0], rays(v).cells.high[0], t, 0.5, (0, 4), np.eye(1, 4, dtype=bool)
-        )
-        for t in (0.5, v)
+        smooth_cells.land_on_rough(rays(v).cells, 0, t, 0.5, (0, 4), np.eye(1, 4, dtype=np.bool_)) for t in (0.5, v)
     ],
     "surroundings.edge_softness": lambda v, _: surroundings.edge_softness(depths(v), 0.5),
     "surroundings.surroundings_of": lambda v, _: surroundings.surroundings_of(depths(v)[None], 1.0).softness,
