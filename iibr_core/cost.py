@@ -52,7 +52,7 @@ class Work(NamedTuple):
     plain_rays: float
 
 
-NANOSECONDS = Work(250.0, 75.0, 335.0, 55.0, 1300.0, 2000.0, 950.0)
+NANOSECONDS = Work(100.0, 52.0, 680.0, 45.0, 1650.0, 2000.0, 870.0)
 """What each piece of work takes one core."""
 
 

@@ -328,7 +328,7 @@ def train(
 ) -> None:
     """Train the ray transformer on made-up scenes. Ctrl-C saves, --resume goes on; a log lies beside the weights.
 
-    Example: iibr train --steps 3000 --learning-rate 3e-3 --out weights.safetensors
+    Example: iibr train --steps 2500 --learning-rate 3e-3 --out weights.safetensors
     """
     from viewer.train_command import train_weights
 
