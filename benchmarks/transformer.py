@@ -9,7 +9,6 @@ others and on the scenes of DATA, laid out as `iibr evaluate` takes them: one vi
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,9 +19,8 @@ from numpy.typing import NDArray
 
 from iibr_core import geometry
 from iibr_core.candidates import find_candidates
-from iibr_core.contested import HYPOTHESES, PLAIN, SHARE, Contested
-from iibr_core.evaluation.bench.foretold import make_field, whole_field
-from iibr_core.evaluation.bench.variants import BenchScene, Variant, bench_scenes, judged_views
+from iibr_core.contested import PLAIN, SHARE, Contested
+from iibr_core.evaluation.bench.variants import BenchScene, bench_scenes
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
@@ -36,7 +34,7 @@ from iibr_core.training.batches import AS_RENDERED, RayChoice, contested_rays, t
 from iibr_core.training.loop import Batch
 from iibr_core.training.losses import LossWeights, color_loss, perceived, total_loss
 from iibr_core.training.scenes import random_scene, render, seen_from
-from iibr_core.types import FloatImage, Quality, ViewOffset
+from iibr_core.types import FloatImage, ViewOffset
 from iibr_core.weights import closed_form_weights
 from viewer.train_command import LAMBDAS
 
@@ -115,7 +113,6 @@ def main() -> None:
         "",
         *ablations(truths, options.scenes, options.steps),
         *masks(),
-        *qualities(truths),
     ]
     options.out.write_text("\n".join(lines) + "\n")
 
@@ -279,38 +276,6 @@ def normalised_entropy(weights: FloatImage, mask: NDArray[np.bool_]) -> FloatIma
     with np.errstate(divide="ignore", invalid="ignore"):
         nats = -np.where(weights > 0, weights * np.log(weights), 0).sum(axis=1)
     return (nats / np.log(np.maximum(mask.sum(axis=1), 2))).astype(np.float32)
-
-
-def qualities(truths: Sequence[BenchScene]) -> list[str]:
-    """The shipped weights: PSNR and time of fast, balanced and exact."""
-    lines = [
-        f"## Qualities (shipped weights, K = {HYPOTHESES})",
-        "",
-        "Full frame, PSNR in dB, and ms a view; the same views, the first scene's disparity also blurred (2 px).",
-        "",
-        "| scene | fast | balanced | exact |",
-        "| --- | --- | --- | --- |",
-    ]
-    soft = replace(
-        truths[0], name=f"{truths[0].name}, edges blurred", disparity=faults.blurred(truths[0].disparity, 2.0)
-    )
-    for truth in [*truths, soft]:
-        cells = []
-        for quality in ("fast", "balanced", "exact"):
-            transformer_for(quality)
-            start = time.perf_counter()
-            views = make_field(whole_field(truth), quality)
-            ms = (time.perf_counter() - start) * 1e3 / len(views)
-            cells.append(f"{field_psnr(truth, quality):.2f}, {ms:.0f} ms")
-        lines.append(f"| {truth.name} | " + " | ".join(cells) + " |")
-        print(lines[-1], flush=True)
-    return lines
-
-
-def field_psnr(truth: BenchScene, quality: Quality) -> float:
-    """Mean PSNR of the judged views in one quality, without refinement of the disparity."""
-    made = judged_views(Variant(quality, quality, refined=0.0), truth, None)
-    return float(np.mean([psnr(image, truth.truth[at]) for at, image in made.items()]))
 
 
 if __name__ == "__main__":
