@@ -14,7 +14,6 @@ import argparse
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -28,8 +27,9 @@ from numpy.typing import NDArray
 from benchmarks.light_fields import StoredField, read_field
 from benchmarks.refocus import plain_pass
 from iibr_core.color import encoded_from_stored, srgb_from_linear
+from iibr_core.cost import CORES
 from iibr_core.types import GridShape, ViewOffset
-from viewer.drawing_bench import DrawVariant, draw, sheared_light
+from viewer.drawing_bench import DrawVariant, draw, drawing_cost, sheared_light
 from viewer.gpu.context import GLContext, create_headless
 from viewer.gpu.haste import HASTES, stretched
 from viewer.gpu.renderer import Renderer
@@ -81,17 +81,9 @@ class Stopwatch:
         """Median time of a drawing, and that over the plain shader's."""
         own, plain = [], []
         for _ in range(rounds or self._rounds):
-            plain.append(self._seconds(lambda: self._plain(0.0)))
-            own.append(self._seconds(draw_it))
+            plain.append(drawing_cost(self._gl, lambda: self._plain(0.0)).cpu_s)
+            own.append(drawing_cost(self._gl, draw_it).cpu_s)
         return 1e3 * float(np.median(own)), float(np.median(own) / np.median(plain))
-
-    def _seconds(self, draw_it: Callable[[], None]) -> float:
-        clock = time.process_time if self._gl.is_software else time.perf_counter
-        self._gl.ctx.finish()
-        start = clock()
-        draw_it()
-        self._gl.ctx.finish()
-        return (clock() - start) / ((os.cpu_count() or 1) if self._gl.is_software else 1)
 
 
 def haste_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
@@ -227,7 +219,7 @@ def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[st
         shop.name: Optics(focus_disparity=4.8, aperture_diameter=4.0),
     }
     yield "# Optics: speed against error\n"
-    yield f"Made by `python -m benchmarks.optics`. {gl.renderer}, {os.cpu_count()} cores.\n"
+    yield f"Made by `python -m benchmarks.optics`. {gl.renderer}, {CORES} cores.\n"
     yield f"{shop.name} is drawn with {SIZE_PX[0]}x{SIZE_PX[1]} pixels, focus at 4.8 px. Times are medians; on software"
     yield "GL, processor time over the number of cores. Errors are against the converged picture of all 81 views."
     yield "Single switches are in [speed.md](speed.md)."

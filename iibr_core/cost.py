@@ -6,7 +6,6 @@ beyond the photo's frame. The constants were measured; `python -m benchmarks.for
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,10 +13,10 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
-from iibr_core.bands import MOST_BAND_PIXELS
+from iibr_core.bands import MOST_BAND_PIXELS, THREADS
 from iibr_core.types import FloatImage, GridShape, Quality
 
-CORES = os.cpu_count() or 1
+CORES = THREADS
 FARTHEST_VIEWS = 8
 """Views that complete the ray set: the corners and the middles of the sides."""
 STILL_PX = 0.5

@@ -5,13 +5,13 @@ The best picture, which errors are against, is a plain float sum in numpy over f
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear, stored_from_encoded
+from iibr_core.cost import CORES
 from iibr_core.evaluation.bench.drawing import DrawingFigures, Drawn
 from iibr_core.evaluation.bench.foretold import whole_field
 from iibr_core.evaluation.bench.measure import Cost, Tell, cost_of, in_turns, median_cost, median_ratio
@@ -31,7 +31,6 @@ BETWEEN = ViewOffset(-0.5, 1.5)
 """An eye between the stored views, on one of those that only the best picture has."""
 FINER = 2
 """Views of the best picture, to each stored one across and down."""
-CORES = os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
@@ -96,9 +95,18 @@ def draw(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: 
         renderer.refine()
 
 
-def drawing_seconds(gl: GLContext, work: Cost) -> float:
-    """What a drawing takes: on software GL processor time over the cores, which other programs disturb less."""
-    return work.cpu_s / CORES if gl.is_software else work.wall_s
+def drawing_cost(gl: GLContext, draw_it: Callable[[], None]) -> Cost:
+    """Of a drawing, once everything before it is done. cpu_s: what it takes alone: on software GL processor time over
+    the cores, which other programs disturb less, else time by the clock.
+    """
+    gl.ctx.finish()
+
+    def work() -> None:
+        draw_it()
+        gl.ctx.finish()
+
+    cost = cost_of(work)
+    return Cost(cost.wall_s, cost.cpu_s / CORES if gl.is_software else cost.wall_s)
 
 
 def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int, tell: Tell) -> list[DrawingFigures]:
@@ -162,14 +170,7 @@ class _Drawer:
         """Of one picture."""
         self._upload(variant)
         self.renderer.render(optics, self._size_px, haste=variant.haste)  # what is uploaded has to arrive first
-        self.gl.ctx.finish()
-
-        def work() -> None:
-            draw(self.renderer, optics, self._size_px, variant)
-            self.gl.ctx.finish()
-
-        cost = cost_of(work)
-        return Cost(cost.wall_s, drawing_seconds(self.gl, cost))
+        return drawing_cost(self.gl, lambda: draw(self.renderer, optics, self._size_px, variant))
 
     def errors(self, optics: Optics, variant: DrawVariant, truth: FloatImage) -> tuple[int, float, float]:
         """Samples drawn, PSNR and FLIP."""

@@ -6,7 +6,6 @@ step. All pictures are sheared to the zero plane, so that a point at depth z has
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iibr_core.bands import THREADS
 from iibr_core.kernels import kernel, srgb_scalar
 from iibr_core.training.surfaces import inside_pattern, is_cut, noise, pattern, rough_noise
 from iibr_core.types import FloatImage, ViewOffset
@@ -144,7 +144,7 @@ def _bounded(values: ArrayLike) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=1)
 def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="iibr-rays")
+    return ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rays")
 
 
 def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -6,6 +6,7 @@ import ctypes
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,10 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from iibr_core.types import GridShape, InputError
 from tests.xvfb import private_display
 
 if TYPE_CHECKING:
     from viewer.app import App
+    from viewer.headless import HeadlessViewer
+    from viewer.state import Section
 
 WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
@@ -41,6 +45,34 @@ def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
     write_image(folder / f"{name}.png", pixels)
     np.save(folder / f"{name}_disparity.npy", disparity)
     return folder / f"{name}.png"
+
+
+@contextmanager
+def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[HeadlessViewer]:
+    """A scene opened without a window, its notices gone; open_sections: of the panel, the usual ones if none."""
+    from viewer.actions import DismissNotice
+    from viewer.headless import HeadlessViewer
+    from viewer.state import Source
+
+    try:
+        viewer = HeadlessViewer("egl")
+    except InputError as error:
+        pytest.skip(str(error))
+    with viewer:
+        viewer.open(Source(str(write_scene(folder)), grid=GridShape(3, 3)), 1.0, lambda _: None)
+        viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
+        if open_sections:
+            preferences = replace(viewer.state.preferences, open_sections=open_sections)
+            viewer.state = replace(viewer.state, preferences=preferences)
+        yield viewer
+
+
+@pytest.fixture
+def viewer(opened: HeadlessViewer) -> Iterator[HeadlessViewer]:
+    """What a module's `opened` gives, its state put back after every test."""
+    before = opened.state
+    yield opened
+    opened.state = before
 
 
 @pytest.fixture

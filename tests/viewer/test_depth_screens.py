@@ -10,15 +10,14 @@ import pytest
 
 from iibr_core.depth.edit import DepthEdits, Stroke
 from iibr_core.depth.origin import BETTER_WAYS, DepthOrigin
-from iibr_core.types import GridShape, InputError
-from tests.viewer.conftest import write_scene
-from viewer.actions import AskToSave, DismissNotice, SetFontScale, SetHover, SetTheme
+from tests.viewer.conftest import headless_with_scene
+from viewer.actions import AskToSave, SetFontScale, SetHover, SetTheme
 from viewer.depth_preview import DepthPreview
 from viewer.depth_work import Brush, SetBrush, SetTone
 from viewer.headless import HeadlessViewer
 from viewer.inspection import SetOpacity, SetOverlay
 from viewer.layout import PANEL_WIDTH
-from viewer.state import AppState, Hover, Source, Theme
+from viewer.state import AppState, Hover, Theme
 
 SIZE = 640, 800
 PANEL = np.s_[:, -int(PANEL_WIDTH) :]
@@ -27,24 +26,8 @@ PICTURE = np.s_[:, : -int(PANEL_WIDTH)]
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
-    try:
-        viewer = HeadlessViewer("egl")
-    except InputError as error:
-        pytest.skip(str(error))
-    with viewer:
-        path = write_scene(tmp_path_factory.mktemp("depth"))
-        viewer.open(Source(str(path), grid=GridShape(3, 3)), 1.0, lambda _: None)
-        viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
-        preferences = replace(viewer.state.preferences, open_sections=("depth",))
-        viewer.state = replace(viewer.state, preferences=preferences)
+    with headless_with_scene(tmp_path_factory.mktemp("depth"), "depth") as viewer:
         yield viewer
-
-
-@pytest.fixture
-def viewer(opened: HeadlessViewer) -> Iterator[HeadlessViewer]:
-    before = opened.state
-    yield opened
-    opened.state = before
 
 
 def differs(before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
-from viewer.actions import Action, DismissNotice, MoveEye, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
+from viewer.actions import Action, MoveEye, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
 from viewer.headless import HeadlessViewer
 from viewer.inquiry import beside_of, sheet_cells
 from viewer.inspection import (
@@ -25,7 +25,7 @@ from viewer.inspection import (
     ShowValues,
 )
 from viewer.layout import PANEL_WIDTH, Layout, Rect, layout_of
-from viewer.state import Hover, Notice, Source, Theme
+from viewer.state import Hover, Notice, Theme
 
 SIZE = 640, 760
 GRID = GridShape(3, 3)
@@ -35,24 +35,8 @@ HOVER = Hover(48.0, 32.0, 1.0)
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
-    try:
-        viewer = HeadlessViewer("egl")
-    except InputError as error:
-        pytest.skip(str(error))
-    with viewer:
-        path = write_scene(tmp_path_factory.mktemp("screens"))
-        viewer.open(Source(str(path), grid=GRID), 1.0, lambda _: None)
-        viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
-        preferences = replace(viewer.state.preferences, open_sections=("inspect",))
-        viewer.state = replace(viewer.state, preferences=preferences)
+    with headless_with_scene(tmp_path_factory.mktemp("screens"), "inspect") as viewer:
         yield viewer
-
-
-@pytest.fixture
-def viewer(opened: HeadlessViewer) -> Iterator[HeadlessViewer]:
-    before = opened.state
-    yield opened
-    opened.state = before
 
 
 def layout_now(viewer: HeadlessViewer, size: tuple[int, int] = SIZE) -> Layout:

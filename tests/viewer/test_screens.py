@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.types import GridShape, InputError, ViewOffset
+from iibr_core.types import ViewOffset
+from tests.viewer.conftest import headless_with_scene
 from viewer.actions import (
     Action,
     AskForPath,
@@ -55,24 +56,8 @@ ENOUGH_PIXELS = 60
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
-    from tests.viewer.conftest import write_scene
-
-    try:
-        viewer = HeadlessViewer("egl")
-    except InputError as error:
-        pytest.skip(str(error))
-    with viewer:
-        path = write_scene(tmp_path_factory.mktemp("screens"))
-        viewer.open(Source(str(path), grid=GridShape(3, 3)), 1.0, lambda _: None)
-        viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
+    with headless_with_scene(tmp_path_factory.mktemp("screens")) as viewer:
         yield viewer
-
-
-@pytest.fixture
-def viewer(opened: HeadlessViewer) -> Iterator[HeadlessViewer]:
-    before = opened.state
-    yield opened
-    opened.state = before
 
 
 def changed_after(viewer: HeadlessViewer, *actions: Action) -> np.ndarray:
