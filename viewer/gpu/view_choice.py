@@ -126,9 +126,9 @@ def aperture_samples(
     weights = openness(shape, t - eye.t, s - eye.s, diameter, widest, width)
     if weights.sum() <= 0:  # a mask's hole, or one smaller than the samples
         weights = (np.hypot(t - eye.t, s - eye.s) == np.hypot(t - eye.t, s - eye.s).min()).astype(float)
-    weights /= weights.sum()
+    chosen = weights > LEAST_WEIGHT * weights.sum()
+    weights /= weights[chosen].sum()
     stand_in = nearest_present(present)
-    chosen = weights > LEAST_WEIGHT
     return [
         ApertureSample(wanted, *_answer_to(wanted, grid, stand_in), weight)
         for wanted, weight in zip(map(ViewOffset, t[chosen].tolist(), s[chosen].tolist()), weights[chosen].tolist())
