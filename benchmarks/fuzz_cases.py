@@ -44,7 +44,7 @@ def _read_photo(path: Path) -> None:
 
 
 def _read_map(path: Path) -> None:
-    from iibr_core.depth.sidecar import read_disparity
+    from iibr_core.formats.disparity_file import read_disparity
 
     assert np.isfinite(read_disparity(path, seeds.SIZE).values).all()
 

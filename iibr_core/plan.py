@@ -9,10 +9,9 @@ import numpy as np
 import psutil
 
 from iibr_core.cost import NO_NEEDS, STILL_PX, Needs, Relief, needs_of, outermost_of, relief_of
+from iibr_core.depth.align import TOTAL_PARALLAX
 from iibr_core.types import DEFAULT_QUALITY, Disparity, GridShape, InputError, Photo
 
-TOTAL_PARALLAX = 0.04
-"""For viewing: how far the nearest moves against the farthest across the grid, as a share of the photo's width."""
 STEP_PX = 4.0
 """For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity."""
 MOST_VIEWS_A_SIDE = 9

@@ -15,7 +15,6 @@ import typer
 from iibr_core.depth.edit import UNEDITED
 from iibr_core.depth.origin import DepthChoice
 from iibr_core.types import DEFAULT_QUALITY, GridShape, InputError, Quality, ViewOffset
-from viewer.bench_command import bench
 from viewer.evaluate_command import evaluate
 from viewer.models_command import models
 from viewer.options import (
@@ -62,7 +61,6 @@ app = typer.Typer(
 )
 app.add_typer(models, name="models")
 app.command()(evaluate)
-app.command()(bench)
 
 
 class Backend(StrEnum):

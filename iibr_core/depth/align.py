@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.estimate import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.sidecar import MAX_DISPARITY_WIDTHS
-from iibr_core.plan import TOTAL_PARALLAX
+from iibr_core.formats.disparity_file import MAX_DISPARITY_WIDTHS
 from iibr_core.types import FloatImage, GridShape, InputError
 
+TOTAL_PARALLAX = 0.04
+"""For viewing: how far the nearest moves against the farthest across the grid, as a share of the photo's width."""
 PERCENTILES = ((1.0, 99.0), (0.1, 99.9), (0.0, 100.0))
 """The near and the far end, without a few wild values; wider ones where nearly all is one plane."""
 FLAT_SHARE = 1e-5

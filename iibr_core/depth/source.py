@@ -20,7 +20,8 @@ from iibr_core.depth.origin import BETTER_WAYS, DepthChoice, DepthKind, DepthOri
 from iibr_core.depth.pictures import picture_file
 from iibr_core.depth.refine import refine
 from iibr_core.depth.resample import resample_surfaces
-from iibr_core.depth.sidecar import MAX_ASPECT_DIFFERENCE, find_sidecar, flat_disparity, read_disparity
+from iibr_core.depth.sidecar import find_sidecar, flat_disparity
+from iibr_core.formats.disparity_file import MAX_ASPECT_DIFFERENCE, read_disparity
 from iibr_core.formats.photo import DEFAULT_MAX_PIXELS, read_photo, upright
 from iibr_core.formats.raster import read_orientation
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo

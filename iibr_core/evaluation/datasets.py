@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from iibr_core.depth.sidecar import read_disparity
+from iibr_core.formats.disparity_file import read_disparity
 from iibr_core.formats.grid_folder import read_grid_folder
 from iibr_core.formats.llff import read_llff
 from iibr_core.formats.middlebury import read_middlebury

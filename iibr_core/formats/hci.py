@@ -21,7 +21,7 @@ from types import TracebackType
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
-from iibr_core.depth.sidecar import read_disparity
+from iibr_core.formats.disparity_file import read_disparity
 from iibr_core.formats.files import opened_file, temporary_sibling
 from iibr_core.formats.pfm import MAX_FILE_PIXELS, write_pfm
 from iibr_core.formats.photo import focal_px_from_fov, read_photo, write_image

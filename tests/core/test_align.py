@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from iibr_core.depth.align import OUTLIER_SPANS, disparity_from
+from iibr_core.depth.align import OUTLIER_SPANS, TOTAL_PARALLAX, disparity_from
 from iibr_core.depth.estimate import DisparityMap, MetricDepth, RelativeInverseDepth
-from iibr_core.plan import TOTAL_PARALLAX
 from iibr_core.types import GridShape, InputError
 
 GRID = GridShape(9, 9)

@@ -20,8 +20,8 @@ from torch import nn
 from iibr_core.depth import estimate_cache
 from iibr_core.depth.embedded import read_embedded
 from iibr_core.depth.estimate import RelativeInverseDepth
-from iibr_core.depth.sidecar import read_disparity
 from iibr_core.formats import files
+from iibr_core.formats.disparity_file import read_disparity
 from iibr_core.formats.hci import HciWriter, read_light_field
 from iibr_core.formats.map_file import write_map
 from iibr_core.formats.pfm import write_pfm

@@ -16,7 +16,7 @@ from PIL import Image
 from iibr_core.candidates import find_candidates
 from iibr_core.color import encoded_from_stored
 from iibr_core.contested import FEATURES, SHARE, Contested
-from iibr_core.depth.sidecar import read_disparity
+from iibr_core.formats.disparity_file import read_disparity
 from iibr_core.formats.photo import read_photo
 from iibr_core.generate import generate
 from iibr_core.inpaint.background import fill_background

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.depth.sidecar import read_disparity
+from iibr_core.formats.disparity_file import read_disparity
 from iibr_core.formats.map_file import MAP_SUFFIXES, PNG_MOST, write_map
 from iibr_core.formats.raster import read_map
 from iibr_core.types import InputError

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from iibr_core.cost import outermost_of, relief_of
+from iibr_core.depth.align import TOTAL_PARALLAX
 from iibr_core.generate import ray_set
-from iibr_core.plan import MOST_VIEWS_A_SIDE, STEP_PX, TOTAL_PARALLAX, PlanOverrides, plan_for_viewing, plan_literal
+from iibr_core.plan import MOST_VIEWS_A_SIDE, STEP_PX, PlanOverrides, plan_for_viewing, plan_literal
 from iibr_core.training.batches import contested_rays
 from iibr_core.training.degrade import blurred
 from iibr_core.training.scenes import random_scene, render

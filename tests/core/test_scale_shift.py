@@ -10,7 +10,8 @@ import torch
 
 from benchmarks.scale_shift_network import Network, color
 from benchmarks.scale_shift_scenes import Scenes, by_rule, normalised
-from iibr_core.plan import TOTAL_PARALLAX, plan_for_viewing
+from iibr_core.depth.align import TOTAL_PARALLAX
+from iibr_core.plan import plan_for_viewing
 from iibr_core.training.scenes import random_scene, render
 from iibr_core.types import Disparity, FloatImage, Photo, ViewOffset
 

@@ -11,13 +11,8 @@ from hypothesis.extra import numpy as hnp
 
 from iibr_core.depth.fill import OPEN_LINE, SHORTNESS, STEP_LENGTHS, fill_from_background
 from iibr_core.depth.resample import SURFACE_SHARE, resample_surfaces
-from iibr_core.depth.sidecar import (
-    DEPTH_SPAN_WIDTHS,
-    SIDECAR_EXTENSIONS,
-    find_sidecar,
-    flat_disparity,
-    read_disparity,
-)
+from iibr_core.depth.sidecar import SIDECAR_EXTENSIONS, find_sidecar, flat_disparity
+from iibr_core.formats.disparity_file import DEPTH_SPAN_WIDTHS, read_disparity
 from iibr_core.formats.pfm import write_pfm
 from iibr_core.types import InputError
 

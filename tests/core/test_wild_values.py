@@ -28,11 +28,11 @@ from iibr_core import (
     surroundings,
 )
 from iibr_core import generate as generating
-from iibr_core.depth import align, apple, fill, gdepth, offline, refine, resample, sidecar, source
+from iibr_core.depth import align, apple, fill, gdepth, offline, refine, resample, source
 from iibr_core.depth.estimate import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.origin import DepthChoice
 from iibr_core.depth.xmp import Xmp, parsed
-from iibr_core.formats import hci, photo
+from iibr_core.formats import disparity_file, hci, photo
 from iibr_core.synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.types import Disparity, GridShape, Photo, ViewOffset, ViewUpdate
 from iibr_core.weights import closed_form_weights
@@ -173,9 +173,9 @@ FINITE = {
     "depth.resample.resample_surfaces": lambda v, _: known_of(
         DisparityMap(resample.resample_surfaces(known(v), (7, 9)))
     ),
-    "depth.sidecar.read_disparity": lambda v, to: [
-        sidecar.read_disparity(map_file(to, v), SIZE),
-        sidecar.read_disparity(map_file(to, v, "map_depth"), (7, 8)),
+    "formats.disparity_file.read_disparity": lambda v, to: [
+        disparity_file.read_disparity(map_file(to, v), SIZE),
+        disparity_file.read_disparity(map_file(to, v, "map_depth"), (7, 8)),
     ],
     "depth.source.open_with_depth": lambda v, to: [
         source.open_with_depth(photo_file(to, v)),

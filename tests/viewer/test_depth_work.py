@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.edit import GAMMA_LIMITS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
-from iibr_core.depth.sidecar import read_disparity
+from iibr_core.formats.disparity_file import read_disparity
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
 from tests.viewer.test_actions import plan_of, scene_of, state_with

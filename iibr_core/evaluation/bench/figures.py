@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from iibr_core.depth.align import TOTAL_PARALLAX
 from iibr_core.evaluation.bench.foretold import whole_field
 from iibr_core.evaluation.bench.measure import (
     Cost,
@@ -27,7 +28,7 @@ from iibr_core.evaluation.bench.variants import (
     judged_views,
 )
 from iibr_core.evaluation.metrics import flip, psnr
-from iibr_core.plan import ROBUST_PERCENTILES, TOTAL_PARALLAX, PlanOverrides, plan_for_viewing
+from iibr_core.plan import ROBUST_PERCENTILES, PlanOverrides, plan_for_viewing
 from iibr_core.types import DEFAULT_QUALITY
 
 
