@@ -18,11 +18,11 @@ from itertools import islice
 
 import numpy as np
 
-from iibr_core.bands import ShouldStop
-from iibr_core.depth.offline import estimate_offline
+from iibr_core.depth.pictorial_cues import estimate_offline
 from iibr_core.depth.refine import refine
-from iibr_core.generate import generate
-from iibr_core.plan import plan_literal
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_literal
+from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import Disparity, GridShape, Photo, Quality, ViewUpdate
 
 GRID = GridShape(9, 9)

@@ -17,18 +17,18 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.speed.variants import bench_scenes
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.fill import fill_from_background
-from iibr_core.depth.offline import estimate_offline
+from iibr_core.depth.pictorial_cues import estimate_offline
 from iibr_core.depth.refine import edge_blur_px, refine
-from iibr_core.evaluation.bench.variants import bench_scenes
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
-from iibr_core.generate import generate
-from iibr_core.plan import plan_literal
-from iibr_core.training.degrade import blurred
-from iibr_core.training.scenes import random_scene, render
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_literal
+from iibr_core.inpainting.disparity_holes import fill_from_background
+from iibr_core.training.degradation import blurred
+from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import Disparity, FloatImage, GridShape, Photo, ViewOffset
 
 SOFT = {"antinous-blur1": 40.5, "antinous-blur2": 39.0, "antinous-blur4": 36.0, "antinous-half": 40.5}

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iibr_core.resources import resource_folder
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
-from viewer.actions import OpenPath, SetAperture
-from viewer.app import App, opening
-from viewer.state import Source
+from viewer.app.main_loop import App, opening
+from viewer.model.actions import OpenPath, SetAperture
+from viewer.model.state.app_state import Source
 
 MOVES = 150
 STEP_PX = 2

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.depth import estimate_cache
-from iibr_core.depth.estimators import estimate_with
-from iibr_core.depth.models import LocalModel
-from iibr_core.depth.source import resized
-from iibr_core.formats.photo import read_photo
+from iibr_core.depth.models import estimate_cache
+from iibr_core.depth.models.catalog import LocalModel
+from iibr_core.depth.models.transformers_models import estimate_with
+from iibr_core.depth.search import resized
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import Photo
 
 SIZE = (864, 1152)  # 1 MP

@@ -34,7 +34,7 @@ def case(name: str, seed: int, number: int) -> tuple[str, bytes]:
 
 
 def _read_photo(path: Path) -> None:
-    from iibr_core.formats.photo import read_photo
+    from iibr_core.formats.images.photo import read_photo
 
     pixels = read_photo(path, MAX_PIXELS).pixels
     assert pixels.ndim == 3
@@ -44,13 +44,13 @@ def _read_photo(path: Path) -> None:
 
 
 def _read_map(path: Path) -> None:
-    from iibr_core.formats.disparity_file import read_disparity
+    from iibr_core.formats.maps.disparity_file import read_disparity
 
     assert np.isfinite(read_disparity(path, seeds.SIZE).values).all()
 
 
 def _open_with_depth(path: Path) -> None:
-    from iibr_core.depth.source import open_with_depth
+    from iibr_core.depth.search import open_with_depth
 
     found = open_with_depth(path, max_pixels=MAX_PIXELS)
     assert found.disparity.values.shape == found.photo.size
@@ -58,8 +58,8 @@ def _open_with_depth(path: Path) -> None:
 
 
 def _read_field(path: Path) -> None:
-    from iibr_core.formats.grid_folder import read_grid_folder
-    from iibr_core.formats.hci import read_light_field
+    from iibr_core.formats.light_fields.hci import read_light_field
+    from iibr_core.formats.light_fields.numbered_grid import read_grid_folder
 
     refused = None
     for read in (read_light_field, read_grid_folder):
@@ -80,19 +80,19 @@ def _four_views(folder: Path) -> None:
 
 
 def _read_settings(path: Path) -> None:
-    from viewer.saved_settings import read_settings
+    from viewer.model.saved_settings import read_settings
 
     read_settings(path)
 
 
 def _read_mask(path: Path) -> None:
-    from viewer.aperture_mask import read_mask
+    from viewer.model.lens.aperture_mask import read_mask
 
     read_mask(path)
 
 
 def _read_poses(path: Path) -> None:
-    from iibr_core.formats.llff import read_llff
+    from iibr_core.formats.light_fields.llff import read_llff
 
     scene = read_llff(path.parent)
     assert scene is None or all(np.isfinite(view.offset).all() for view in scene.views)
@@ -106,7 +106,7 @@ def _view_and_lens(folder: Path) -> None:
 
 def _read_lens_picture(path: Path) -> None:
     from iibr_core.evaluation.lens_picture import read_lens_picture
-    from iibr_core.formats.grid_folder import read_grid_folder
+    from iibr_core.formats.light_fields.numbered_grid import read_grid_folder
 
     scene = read_grid_folder(path.parent)
     assert scene is not None
@@ -116,15 +116,15 @@ def _read_lens_picture(path: Path) -> None:
 
 
 def _read_preferences(path: Path) -> None:
-    from viewer.kept import with_kept
-    from viewer.state import AppState
+    from viewer.app.preferences_store import with_kept
+    from viewer.model.state.app_state import AppState
 
     if with_kept(AppState(), path.parent).notices:
         raise InputError("told in a notice")
 
 
 def _read_estimate(path: Path) -> None:
-    from iibr_core.depth import estimate_cache
+    from iibr_core.depth.models import estimate_cache
 
     estimate_cache.cache_folder = lambda: path.parent
     if estimate_cache.load(path.stem) is None:
@@ -132,13 +132,13 @@ def _read_estimate(path: Path) -> None:
 
 
 def _read_model_config(path: Path) -> None:
-    from iibr_core.depth.model_config import read_preparation
+    from iibr_core.depth.models.config import read_preparation
 
     read_preparation(path.parent, "depth_anything")
 
 
 def _read_weights(path: Path) -> None:
-    from iibr_core.ray_weights import TrainedWeights
+    from iibr_core.ray_transformer.inference import TrainedWeights
 
     TrainedWeights(path)
 

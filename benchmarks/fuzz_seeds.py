@@ -13,7 +13,7 @@ import OpenImageIO as oiio
 from PIL import Image, PngImagePlugin
 
 from benchmarks.fuzz_damage import Seed, mended_png
-from tests.core import embedded_files as embedded
+from tests.iibr_core import embedded_files as embedded
 
 SIZE = 17, 23
 """Height and width."""
@@ -164,8 +164,8 @@ def cfgs() -> list[Seed]:
 
 
 def saved_settings() -> list[Seed]:
-    from viewer.saved_settings import settings_text
-    from viewer.state import ApertureMask, ApertureShape, Optics, SavedSettings, Source
+    from viewer.model.saved_settings import settings_text
+    from viewer.model.state.app_state import ApertureMask, ApertureShape, Optics, SavedSettings, Source
 
     mask = ApertureShape("mask", mask=ApertureMask("m", 2, 2, b"\x01\xff\x00\x10"))
     text = settings_text(SavedSettings(Optics(aperture_shape=mask), 1.0, Source(""), (64, 48))).encode()
@@ -185,7 +185,7 @@ def saved_settings() -> list[Seed]:
 
 
 def weights() -> list[Seed]:
-    from iibr_core.resources import resource_folder
+    from iibr_core.runtime.resources import resource_folder
 
     data = (resource_folder("assets") / "weights" / "ray_transformer.safetensors").read_bytes()
     split = 8 + int.from_bytes(data[:8], "little")

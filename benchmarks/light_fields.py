@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.refocus import read_views
-from iibr_core.generate import generate
-from iibr_core.plan import plan_literal
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_literal
 from iibr_core.types import Disparity, GridShape, Photo
-from viewer.gpu.renderer import Renderer
+from viewer.gpu.refocus.renderer import Renderer
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,15 @@ from numpy.typing import NDArray
 
 from benchmarks.light_fields import StoredField, read_field
 from benchmarks.refocus import plain_pass
+from benchmarks.speed.rendering import DrawVariant, draw, drawing_cost, sheared_light
 from iibr_core.color import encoded_from_stored, srgb_from_linear
-from iibr_core.cost import CORES
+from iibr_core.generation.cost_model import CORES
 from iibr_core.types import GridShape, ViewOffset
-from viewer.drawing_bench import DrawVariant, draw, drawing_cost, sheared_light
 from viewer.gpu.context import GLContext, create_headless
-from viewer.gpu.haste import HASTES, stretched
-from viewer.gpu.renderer import Renderer
-from viewer.gpu.view_choice import aperture_samples
-from viewer.state import Optics
+from viewer.gpu.refocus.frame_budget import HASTES, stretched
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.view_sampling import aperture_samples
+from viewer.model.state.app_state import Optics
 
 Image = NDArray[np.uint8]
 SIZE_PX = 768, 512

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.context import create_headless
-from viewer.gpu.renderer import Renderer
-from viewer.state import Optics
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.state.app_state import Optics
 
 FRAMES = 12
 

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, maximum_filter, minimum_filter
 
-from iibr_core import bands
-from iibr_core.depth.source import open_with_depth
-from iibr_core.formats.photo import read_photo
-from iibr_core.generate import generate
-from iibr_core.plan import plan_for_viewing, plan_literal
-from iibr_core.resources import resource_folder
+from iibr_core.depth.search import open_with_depth
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_for_viewing, plan_literal
+from iibr_core.runtime import tiling
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import Disparity, GridShape, Photo, ViewOffset, ViewUpdate
 
 SCENES = ["antinous", "teddy", "moebius", "motorcycle"]
@@ -110,9 +110,9 @@ def order(photo: Photo, disparity: Disparity) -> None:
 
     reference = pixels(CENTRE)
     same_order = pixels(ViewOffset(3.0, -2.0)) == reference
-    usual, bands.MOST_BAND_PIXELS = bands.MOST_BAND_PIXELS, 10_000
+    usual, tiling.MOST_BAND_PIXELS = tiling.MOST_BAND_PIXELS, 10_000
     same_bands = pixels(CENTRE) == reference
-    bands.MOST_BAND_PIXELS = usual
+    tiling.MOST_BAND_PIXELS = usual
     words = {True: "identical", False: "DIFFERENT"}
     print(f"pixels in another order of views: {words[same_order]}; in other bands: {words[same_bands]}", flush=True)
 

@@ -12,15 +12,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from iibr_core.depth.align import disparity_from
-from iibr_core.depth.estimate import RelativeInverseDepth
-from iibr_core.depth.fill import fill_from_background
-from iibr_core.depth.resample import resample_surfaces
-from iibr_core.formats.photo import read_photo
+from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.depth.scaling import disparity_from
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.inpainting.disparity_holes import fill_from_background
 from iibr_core.training.batches import PARALLAX_PX
 from iibr_core.training.batches import SIZE as TRAINING_SIZE
-from iibr_core.training.degrade import blurred, noisy
-from iibr_core.training.scenes import random_scene, render
+from iibr_core.training.degradation import blurred, noisy
+from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import FloatImage, GridShape, ViewOffset
 
 SIZE = 56, 64

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from iibr_core.training.scenes import random_scene, render
+from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import ViewOffset
 
 OFFSETS = (ViewOffset(0.0, 0.0), ViewOffset(-4.0, 4.0))

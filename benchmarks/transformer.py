@@ -17,26 +17,26 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from iibr_core import geometry
-from iibr_core.candidates import find_candidates
-from iibr_core.contested import PLAIN, SHARE, Contested
-from iibr_core.evaluation.bench.variants import BenchScene, bench_scenes
+from benchmarks import plucker
+from benchmarks.speed.variants import BenchScene, bench_scenes
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
-from iibr_core.generate import transformer_for
-from iibr_core.occlusion import entropy, occlusion_mask
-from iibr_core.ray_transformer import RayTransformer
-from iibr_core.rays import RaySet
-from iibr_core.synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.training import degrade as faults
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+from iibr_core.generation.light_field import transformer_for
+from iibr_core.ray_transformer.model import RayTransformer
+from iibr_core.rendering.ambiguous_rays import PLAIN, SHARE, Contested
+from iibr_core.rendering.candidates import find_candidates
+from iibr_core.rendering.occlusion import entropy, occlusion_mask
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.training import degradation as faults
 from iibr_core.training.batches import AS_RENDERED, RayChoice, contested_rays, training_batch
-from iibr_core.training.loop import Batch
 from iibr_core.training.losses import LossWeights, color_loss, perceived, total_loss
-from iibr_core.training.scenes import random_scene, render, seen_from
+from iibr_core.training.scenes.random_scene import random_scene, render, seen_from
+from iibr_core.training.trainer import Batch
 from iibr_core.types import FloatImage, ViewOffset
-from iibr_core.weights import closed_form_weights
-from viewer.train_command import LAMBDAS
+from viewer.cli.train import LAMBDAS
 
 HELD_OUT_SEED = 1_000_003
 HELD_OUT = 40
@@ -74,10 +74,10 @@ def raw_coordinates(rays: RaySet, contested: Contested) -> Contested:
     moved = np.array(contested.offset) - offsets
     y, x = (contested.pixel[:, i, None] for i in (0, 1))
     x, y = np.broadcast_to(x - width / 2, d.shape), np.broadcast_to(y - height / 2, d.shape)
-    target = geometry.line_of_pixel(x, y, contested.offset)
-    eye = np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * geometry.VIEW_STEP_PX
+    target = plucker.line_of_pixel(x, y, contested.offset)
+    eye = np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * plucker.VIEW_STEP_PX
     pixel = np.stack([x + d * moved[..., 1], y + d * moved[..., 0], np.ones_like(d)], -1)
-    source = geometry.line_of(eye, pixel - eye)
+    source = plucker.line_of(eye, pixel - eye)
     scale = np.r_[1, 1, 1, np.full(3, 1 / width)]
     features = np.zeros_like(contested.features)
     features[..., SHARE + 1 : SHARE + 14] = np.concatenate([target * scale, source * scale, d[..., None]], -1)

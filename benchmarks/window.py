@@ -10,26 +10,26 @@ import time
 
 import psutil
 
-from iibr_core.resources import resource_folder
+from iibr_core.runtime.resources import resource_folder
 from tests.xvfb import private_display
-from viewer import worker
-from viewer.actions import OpenPath
-from viewer.app import App, opening
-from viewer.state import Source
+from viewer.app.main_loop import App, opening
+from viewer.background import scene_worker
+from viewer.model.actions import OpenPath
+from viewer.model.state.app_state import Source
 
 IDLE_S = 5.0
 
 
 def main() -> None:
     read_at: list[float] = []
-    load = worker.load
+    load = scene_worker.load
 
-    def timed_load(source: Source) -> worker.Loaded:
+    def timed_load(source: Source) -> scene_worker.Loaded:
         loaded = load(source)
         read_at.append(time.perf_counter())
         return loaded
 
-    worker.load = timed_load
+    scene_worker.load = timed_load
     photo = resource_folder("assets") / "motorcycle" / "motorcycle.png"
     with private_display():
         started = time.perf_counter()

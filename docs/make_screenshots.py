@@ -13,19 +13,12 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.resources import resource_folder
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
-from viewer.actions import (
-    DismissNotice,
-    MoveEye,
-    SetAperture,
-    SetApertureShape,
-    SetFocus,
-    SetHover,
-)
-from viewer.headless import HeadlessViewer
-from viewer.inspection import SetOverlay, ShowEpis, ShowValues
-from viewer.state import ApertureShape, Hover, Section, Source
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import DismissNotice, MoveEye, SetAperture, SetApertureShape, SetFocus, SetHover
+from viewer.model.state.app_state import ApertureShape, Hover, Section, Source
+from viewer.model.state.inspection import SetOverlay, ShowEpis, ShowValues
 
 SIZE = 1200, 760
 MOST_BYTES = 700_000

@@ -32,6 +32,10 @@ Quality = Literal["fast", "balanced", "exact"]
 DEFAULT_QUALITY: Quality = "balanced"
 
 
+TOTAL_PARALLAX = 0.04
+"""For viewing: how far the nearest moves against the farthest across the grid, as a share of the photo's width."""
+
+
 class ViewOffset(NamedTuple):
     """Where a view stands relative to the centre view, in view steps: t down, s right."""
 

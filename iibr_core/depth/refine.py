@@ -11,9 +11,9 @@ from math import ceil, floor, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.bands import ShouldStop, in_bands, never
-from iibr_core.depth.fill import fill_from_background
-from iibr_core.kernels import kernel
+from iibr_core.inpainting.disparity_holes import fill_from_background
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, InputError
 
 SHARP_PX = 0.65

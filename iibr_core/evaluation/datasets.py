@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from iibr_core.formats.disparity_file import read_disparity
-from iibr_core.formats.grid_folder import read_grid_folder
-from iibr_core.formats.llff import read_llff
-from iibr_core.formats.middlebury import read_middlebury
-from iibr_core.formats.multi_view import KnownDisparity, KnownView, MultiView, with_equal_sizes
-from iibr_core.formats.photo import read_photo
-from iibr_core.formats.raster import read_size
-from iibr_core.formats.stanford import read_stanford
+from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.light_fields.llff import read_llff
+from iibr_core.formats.light_fields.middlebury import read_middlebury
+from iibr_core.formats.light_fields.numbered_grid import read_grid_folder
+from iibr_core.formats.light_fields.scene import KnownDisparity, KnownView, MultiView, with_equal_sizes
+from iibr_core.formats.light_fields.stanford import read_stanford
+from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import Disparity, FloatImage, InputError
 
 Reader = Callable[[Path], MultiView | None]

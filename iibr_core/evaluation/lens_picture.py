@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.multi_view import MultiView
-from iibr_core.formats.photo import read_photo
-from iibr_core.formats.raster import read_size
+from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.types import FloatImage, InputError
 
 PICTURE, ABOUT = "lens.png", "lens.json"

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.origin import DepthChoice
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
 from iibr_core.evaluation.datasets import read_view
@@ -28,9 +28,9 @@ from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
 from iibr_core.evaluation.refocus import FocalStack, Refocused, foci_of, lens_focus
 from iibr_core.evaluation.refocus import judged as refocus_judged
 from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Given, Trial, given_of, trials_of
-from iibr_core.evaluation.views import ViewMaker, as_stored
-from iibr_core.formats.multi_view import MultiView
-from iibr_core.formats.photo import DEFAULT_MAX_PIXELS
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.generation.view_maker import ViewMaker, as_stored
 from iibr_core.types import DEFAULT_QUALITY, Disparity, FloatImage, Quality, ViewOffset
 
 if TYPE_CHECKING:

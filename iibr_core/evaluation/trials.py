@@ -12,15 +12,15 @@ from typing import Literal
 
 import numpy as np
 
-from iibr_core.depth.fill import fill_from_background
-from iibr_core.depth.origin import DepthChoice
-from iibr_core.depth.source import open_with_depth
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.alignment import fit_to_truth, fit_to_views
 from iibr_core.evaluation.datasets import read_known_disparity, read_view
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.formats.multi_view import KnownDisparity, MultiView
-from iibr_core.formats.photo import size_within
-from iibr_core.formats.raster import read_size
+from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.photo import size_within
+from iibr_core.formats.light_fields.scene import KnownDisparity, MultiView
+from iibr_core.inpainting.disparity_holes import fill_from_background
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, ViewOffset
 
 DisparityFrom = Literal["auto", "gt", "estimate"]

@@ -14,18 +14,18 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from iibr_core.candidates import find_candidates
 from iibr_core.color import linear_from_srgb
-from iibr_core.contested import HYPOTHESES, REACH_PX, SHARE, Contested, find_contested, votes
-from iibr_core.lookup import heaviest
-from iibr_core.rays import RaySet
-from iibr_core.synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.training.degrade import degrade
-from iibr_core.training.loop import Batch
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, SHARE, Contested, find_contested, votes
+from iibr_core.rendering.candidates import find_candidates
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.resampling import heaviest
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.training.degradation import degrade
 from iibr_core.training.losses import EpiShape, color_loss, perceived
-from iibr_core.training.scenes import Scene, cast, random_scene, render
+from iibr_core.training.scenes.random_scene import Scene, cast, random_scene, render
+from iibr_core.training.trainer import Batch
 from iibr_core.types import FloatImage, ViewOffset
-from iibr_core.weights import closed_form_weights
 
 SIZE = 112, 128
 VIEWS = 3

@@ -18,9 +18,9 @@ from iibr_core.types import GridShape, InputError
 from tests.xvfb import private_display
 
 if TYPE_CHECKING:
-    from viewer.app import App
-    from viewer.headless import HeadlessViewer
-    from viewer.state import Section
+    from viewer.app.headless import HeadlessViewer
+    from viewer.app.main_loop import App
+    from viewer.model.state.app_state import Section
 
 WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
@@ -34,7 +34,7 @@ DEADLINE_S = 120.0
 
 def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
     """A photo with its sidecar: a near red square, in the middle, before a far grey wall. Returns the photo's path."""
-    from iibr_core.formats.photo import write_image
+    from iibr_core.formats.images.photo import write_image
 
     rng = np.random.default_rng(seed)
     pixels = rng.integers(60, 200, (HEIGHT // 8, WIDTH // 8, 1)).repeat(8, 0).repeat(8, 1).repeat(3, 2).astype(np.uint8)
@@ -50,9 +50,9 @@ def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
 @contextmanager
 def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[HeadlessViewer]:
     """A scene opened without a window, its notices gone; open_sections: of the panel, the usual ones if none."""
-    from viewer.actions import DismissNotice
-    from viewer.headless import HeadlessViewer
-    from viewer.state import Source
+    from viewer.app.headless import HeadlessViewer
+    from viewer.model.actions import DismissNotice
+    from viewer.model.state.app_state import Source
 
     try:
         viewer = HeadlessViewer("egl")
@@ -190,9 +190,9 @@ def no_egl_context() -> Iterator[None]:
 @pytest.fixture
 def open_window(display: str, no_egl_context: None) -> Iterator[Callable[..., Driver]]:
     """Opens the viewer on a photo; closes it after the test."""
-    from viewer.actions import OpenPath
-    from viewer.app import App, opening
-    from viewer.state import AppState, Preferences, Source
+    from viewer.app.main_loop import App, opening
+    from viewer.model.actions import OpenPath
+    from viewer.model.state.app_state import AppState, Preferences, Source
 
     apps = []
 

@@ -18,18 +18,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.formats.hci import HciWriter
-from iibr_core.formats.photo import write_image
+from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
-from tests.viewer.test_worker import Desk
-from viewer.actions import MoveEye, SetAperture
-from viewer.headless import HeadlessViewer
-from viewer.kept import keep, with_kept
-from viewer.saved_settings import read_settings, settings_text_in
-from viewer.saving import save_picture
-from viewer.state import CENTRE, AppState, SaveTask, Source
-from viewer.worker import Failed, Request, SceneReady, ViewReady, results_of
+from viewer.app.headless import HeadlessViewer
+from viewer.app.image_export import save_picture
+from viewer.app.preferences_store import keep, with_kept
+from viewer.background.scene_worker import Failed, Request, SceneReady, ViewReady, results_of
+from viewer.model.actions import MoveEye, SetAperture
+from viewer.model.saved_settings import read_settings, settings_text_in
+from viewer.model.state.app_state import CENTRE, AppState, SaveTask, Source
 
 GRID = GridShape(3, 3)
 
@@ -232,8 +232,9 @@ def test_a_refused_gl_context_is_one_line(tmp_path: Path) -> None:
 STARVED = """
 import resource, sys
 import psutil
-from viewer.cli import main
-import iibr_core.generate, viewer.worker, iibr_core.formats.photo, iibr_core.depth.source
+from viewer.cli.main import main
+import iibr_core.generation.light_field, viewer.background.scene_worker
+import iibr_core.formats.images.photo, iibr_core.depth.search
 room = psutil.Process().memory_info().vms + (160 << 20)
 resource.setrlimit(resource.RLIMIT_AS, (room, room))
 main()

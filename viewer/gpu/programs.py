@@ -14,7 +14,7 @@ from typing import Any
 
 import moderngl
 
-from iibr_core.resources import resource_folder
+from iibr_core.runtime.resources import resource_folder
 
 _INCLUDE = re.compile(r'\s*#include\s+"([^"]+)"')
 _UNIFORM = re.compile(r"^\s*uniform\s+\w+\s+([^;]+);", re.MULTILINE)

@@ -12,7 +12,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from viewer.layout import Layout
+from viewer.model.layout import Layout
 from viewer.ui.style import Look, apply_style, load_fonts
 
 VERTEX_BYTES = 20

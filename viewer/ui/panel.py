@@ -8,18 +8,18 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from iibr_core.types import DEFAULT_QUALITY
-from viewer.actions import Action, ApplyPreset, OpenPath, ResumeWork, StopWork, ToggleSection
-from viewer.commands import BY_NAME
-from viewer.layout import Layout
-from viewer.limits import aperture_limit
-from viewer.presets import PRESETS
-from viewer.state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source, source_beside
-from viewer.ui.depth_section import depth_line, depth_section
-from viewer.ui.inspect_section import inspect_section
-from viewer.ui.lens_sections import aperture_section, focus_section, light_section
-from viewer.ui.scene_section import scene_section
+from viewer.model.actions import Action, ApplyPreset, OpenPath, ResumeWork, StopWork, ToggleSection
+from viewer.model.commands import BY_NAME
+from viewer.model.layout import Layout
+from viewer.model.lens.limits import aperture_limit
+from viewer.model.lens.presets import PRESETS
+from viewer.model.state.app_state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source, source_beside
+from viewer.ui.sections.depth import depth_line, depth_section
+from viewer.ui.sections.inspect import inspect_section
+from viewer.ui.sections.lens import aperture_section, focus_section, light_section
+from viewer.ui.sections.scene import scene_section
+from viewer.ui.sections.view import view_section
 from viewer.ui.style import Palette, palette_of
-from viewer.ui.view_section import view_section
 from viewer.ui.widgets import button, gap, heading, quiet, tooltip
 
 TOOLS = (

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.actions import Action
-from viewer.inquiry import NO_AIDS, Aids
-from viewer.layout import Layout
-from viewer.state import AppState
-from viewer.ui.inspection import draw_beside_picture, draw_over_picture
-from viewer.ui.notices import notices
-from viewer.ui.overlays import overlays
+from viewer.model.actions import Action
+from viewer.model.inspection_request import NO_AIDS, Aids
+from viewer.model.layout import Layout
+from viewer.model.state.app_state import AppState
+from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
+from viewer.ui.overlays.notices import notices
+from viewer.ui.overlays.prompts import prompts
+from viewer.ui.overlays.reticle import overlays
 from viewer.ui.panel import panel
-from viewer.ui.prompts import prompts
 from viewer.ui.style import packed, palette_of
 
 

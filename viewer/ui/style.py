@@ -8,8 +8,8 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
-from viewer.layout import BACKGROUND
-from viewer.state import Theme
+from viewer.model.layout import BACKGROUND
+from viewer.model.state.app_state import Theme
 
 FONT_SIZE = 16.0
 Color = tuple[float, float, float, float]

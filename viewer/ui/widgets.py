@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from viewer.layout import Layout
+from viewer.model.layout import Layout
 
 LABEL_WIDTH = 92.0
 

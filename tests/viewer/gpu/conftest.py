@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from viewer.gpu.context import GLContext, create_headless
-from viewer.gpu.renderer import Renderer
+from viewer.gpu.refocus.renderer import Renderer
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.renderer import Renderer
+from viewer.gpu.refocus.renderer import Renderer
 
 
 @dataclass(frozen=True)

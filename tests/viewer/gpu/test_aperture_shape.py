@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from viewer.gpu.aperture_shape import opening
-from viewer.state import ApertureMask, ApertureShape
+from viewer.gpu.refocus.aperture_shape import opening
+from viewer.model.state.app_state import ApertureMask, ApertureShape
 
 DIAMETER = 8.0
 WIDTH = 0.5

@@ -19,9 +19,9 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms
 from viewer.gpu.context import GLContext
-from viewer.gpu.renderer import Renderer
-from viewer.limits import eye_limits
-from viewer.state import Optics
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.lens.limits import eye_limits
+from viewer.model.state.app_state import Optics
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
 SIZE = SCENE.width, SCENE.height

@@ -10,12 +10,12 @@ import pytest
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
-from viewer.colormap import VIRIDIS, mapped
 from viewer.gpu.context import GLContext
-from viewer.gpu.inspection import SAME_SURFACE, SAME_SURFACE_PX, Cell, InspectionPasses, Line, OverlayStyle
+from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, Cell, InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.renderer import Renderer
-from viewer.state import Optics
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.colormap import VIRIDIS, mapped
+from viewer.model.state.app_state import Optics
 
 GRID = GridShape(5, 7)
 SCENE = TwoPlanes()

@@ -13,10 +13,10 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
-from viewer.gpu.lens import HIGHLIGHT_GAIN
-from viewer.gpu.renderer import Renderer
-from viewer.gpu.view_choice import aperture_samples
-from viewer.state import CENTRE, ApertureMask, ApertureShape, Optics
+from viewer.gpu.refocus.lens import HIGHLIGHT_GAIN
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.view_sampling import aperture_samples
+from viewer.model.state.app_state import CENTRE, ApertureMask, ApertureShape, Optics
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)

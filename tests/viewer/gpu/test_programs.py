@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from iibr_core.resources import resource_folder
+from iibr_core.runtime.resources import resource_folder
 from viewer.gpu.context import GLContext
 from viewer.gpu.programs import ShaderError, declared_uniforms, flatten, load_program
 

@@ -11,16 +11,16 @@ import moderngl
 import numpy as np
 import pytest
 
-from iibr_core.resources import resource_folder
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.context import GLContext
-from viewer.gpu.error_estimate import ErrorEstimate
-from viewer.gpu.haste import Haste
 from viewer.gpu.programs import ProgramCache, ShaderError
-from viewer.gpu.renderer import Renderer
-from viewer.gpu.summation import EDGE_ROUNDS, even_places
-from viewer.state import CENTRE, Optics
+from viewer.gpu.refocus.error_estimate import ErrorEstimate
+from viewer.gpu.refocus.frame_budget import Haste
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.summation import EDGE_ROUNDS, even_places
+from viewer.model.state.app_state import CENTRE, Optics
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=0.0, radius_px=25.0)

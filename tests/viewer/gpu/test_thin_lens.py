@@ -15,12 +15,12 @@ import pytest
 from iibr_core.color import stored_from_encoded
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.refocus import LENS, Focus, within
-from iibr_core.generate import generate
+from iibr_core.generation.light_field import generate
 from iibr_core.types import Disparity, FloatImage, Quality, ViewUpdate
-from tests.core.lens_scenes import GRID, NAMES, LensScene, lens_scene
-from tests.core.scenes import by_index, literal_plan
-from viewer.gpu.renderer import Renderer
-from viewer.state import Optics
+from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
+from tests.iibr_core.scenes import by_index, literal_plan
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.state.app_state import Optics
 
 LEAST_DB = {"shelf": 41.1, "fence": 38.0}
 Field = Mapping[tuple[int, int], ViewUpdate]

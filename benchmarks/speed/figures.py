@@ -1,0 +1,102 @@
+"""What the bench measures of real scenes: the cost and the error of every variant, and which the plan would choose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.speed.measure import Cost, Tell, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
+from benchmarks.speed.prediction import whole_field
+from benchmarks.speed.variants import REFERENCE, BenchScene, Draw, Variant, field_cost, is_possible, judged_views
+from iibr_core.evaluation.metrics import flip, psnr
+from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, plan_for_viewing
+from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One variant on one scene. cost: of the whole field; ratio: of processor time to the reference; peak_bytes: beyond
+    what was there before; psnr_db, flip: means over the judged views.
+    """
+
+    variant: Variant
+    cost: Cost
+    ratio: float
+    peak_bytes: float
+    psnr_db: float
+    flip: float
+
+
+@dataclass(frozen=True)
+class SceneFigures:
+    """size: (height, width). planned: name of the variant that stores as many views as the plan would choose."""
+
+    name: str
+    size: tuple[int, int]
+    views: int
+    judged: int
+    measured: tuple[Measured, ...]
+    planned: str
+    is_soft: bool = False
+
+    @property
+    def front(self) -> set[str]:
+        """Variants that none beats in time and PSNR both."""
+        return on_the_front({m.variant.name: (m.ratio, m.psnr_db) for m in self.measured})
+
+    @property
+    def behind_front_db(self) -> float:
+        """By how much the plan's choice falls short of the best variant that takes no longer."""
+        own = next(m for m in self.measured if m.variant.name == self.planned)
+        return max(m.psnr_db for m in self.measured if m.ratio <= own.ratio) - own.psnr_db
+
+
+def measure_scene(
+    scene: BenchScene, variants: Sequence[Variant], repeats: int, tell: Tell, draw: Draw | None = None
+) -> SceneFigures:
+    """Every possible variant on one scene, timed in turns. draw: what fills in where views are left out."""
+    possible = [variant for variant in variants if is_possible(variant, scene, draw is not None)]
+    if REFERENCE not in possible:
+        possible.insert(0, REFERENCE)
+
+    def way(variant: Variant) -> Callable[[], Cost]:
+        return lambda: field_cost(variant, scene)
+
+    def told(done: int, total: int, doing: str) -> None:
+        tell(done, total, f"{scene.name}: {doing}")
+
+    errors = {}
+    for k, variant in enumerate(possible):
+        told(k, len(possible), f"error of {variant.name}")
+        errors[variant] = _errors(variant, scene, draw)
+    costs = in_turns({variant.name: way(variant) for variant in possible}, repeats, told)
+    measured = []
+    for variant in possible:
+        own, reference = costs[variant.name], costs[REFERENCE.name]
+        memory = peak_bytes(field_cost, variant, scene)
+        measured.append(Measured(variant, median_cost(own), median_ratio(own, reference), memory, *errors[variant]))
+    size = (scene.photo.shape[0], scene.photo.shape[1])
+    planned = _planned(scene, possible)
+    return SceneFigures(scene.name, size, len(scene.field), len(scene.truth), tuple(measured), planned, scene.is_soft)
+
+
+def _errors(variant: Variant, scene: BenchScene, draw: Draw | None) -> tuple[float, float]:
+    """Mean PSNR and FLIP over the judged views."""
+    made = judged_views(variant, scene, draw)
+    errors = [(psnr(image, scene.truth[at]), flip(image, scene.truth[at])) for at, image in made.items()]
+    mean_psnr, mean_flip = np.mean(errors, axis=0)
+    return float(mean_psnr), float(mean_flip)
+
+
+def _planned(scene: BenchScene, variants: Sequence[Variant]) -> str:
+    """The default quality with as few stored views as the plan finds enough for this parallax."""
+    field, full = whole_field(scene), 2 * scene.reach
+    low, high = (float(p) for p in np.percentile(scene.disparity, ROBUST_PERCENTILES))
+    strength = max((high - low) * full / (TOTAL_PARALLAX * scene.photo.shape[1]), 1e-6)
+    side = plan_for_viewing(field.photo, field.disparity, PlanOverrides(depth_strength=strength)).grid.columns
+    default = Variant("", DEFAULT_QUALITY)
+    plain = [variant for variant in variants if replace(variant, name="", every=1) == default and variant.every > 0]
+    enough = [variant for variant in plain if full // variant.every + 1 >= min(side, full + 1)]
+    return max(enough, key=lambda variant: variant.every, default=REFERENCE).name

@@ -1,0 +1,242 @@
+"""The renderer's switches: the time of one picture, drawn in many ways, against its error.
+
+The best picture, which errors are against, is a plain float sum in numpy over four times as many views as are stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.speed.measure import Cost, Tell, cost_of, in_turns, median_cost, median_ratio
+from benchmarks.speed.prediction import whole_field
+from benchmarks.speed.rendering_figures import DrawingFigures, Drawn
+from benchmarks.speed.variants import BenchScene
+from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear, stored_from_encoded
+from iibr_core.evaluation.metrics import flip, psnr
+from iibr_core.generation.cost_model import CORES
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_literal
+from iibr_core.types import Disparity, FloatImage, GridShape, ViewOffset
+from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.frame_budget import NO_HASTE, Haste, stretched
+from viewer.gpu.refocus.renderer import Renderer, scaled
+from viewer.gpu.refocus.view_sampling import aperture_samples
+from viewer.model.state.app_state import Optics
+
+APERTURE_VIEWS = 6.0
+BETWEEN = ViewOffset(-0.5, 1.5)
+"""An eye between the stored views, on one of those that only the best picture has."""
+FINER = 2
+"""Views of the best picture, to each stored one across and down."""
+
+
+@dataclass(frozen=True)
+class DrawVariant:
+    """One way to draw the same picture. every: of the views across and down, one in so many is stored; 0: centre and
+    corners only. is_half_float: textures of half floats instead of bytes. is_converged: every sample there is.
+    """
+
+    name: str
+    haste: Haste = NO_HASTE
+    prefilter: bool = True
+    adaptive: bool = True
+    every: int = 1
+    is_half_float: bool = False
+    knows_disparity: bool = True
+    is_converged: bool = False
+
+    @property
+    def stored(self) -> tuple[int, bool, bool]:
+        """What has to be uploaded for it."""
+        return self.every, self.is_half_float, self.knows_disparity
+
+
+REFERENCE = DrawVariant("at once")
+STORAGE = (
+    DrawVariant("textures of half floats", is_half_float=True),
+    DrawVariant("every 2nd view stored", every=2),
+    DrawVariant("every 2nd view stored, until converged", every=2, is_converged=True),
+    DrawVariant("centre and corners stored", every=0),
+    DrawVariant("centre and corners stored, until converged", every=0, is_converged=True),
+)
+APERTURE_VARIANTS = (
+    REFERENCE,
+    DrawVariant("until converged", is_converged=True),
+    DrawVariant("half the picture's width", Haste(scale=0.5)),
+    DrawVariant("every 2nd sample across and down", Haste(stride=2)),
+    DrawVariant("every 2nd sample, half width", Haste(stride=2, scale=0.5)),
+    DrawVariant("every 3rd sample, half width", Haste(stride=3, scale=0.5)),
+    DrawVariant("no smoothing", prefilter=False),
+    DrawVariant("no smoothing, every 2nd sample", Haste(stride=2), prefilter=False),
+    DrawVariant("tiles skip nothing", adaptive=False),
+    *STORAGE,
+    DrawVariant("views without disparity", knows_disparity=False),
+)
+PINHOLE_VARIANTS = (
+    REFERENCE,
+    DrawVariant("until converged", is_converged=True),
+    DrawVariant("of 2 views", Haste(sources=2)),
+    DrawVariant("of 1 view", Haste(sources=1)),
+    DrawVariant("half the picture's width", Haste(scale=0.5)),
+    DrawVariant("of 1 view, half width", Haste(sources=1, scale=0.5)),
+    *STORAGE,
+    DrawVariant("plain blending, no disparity", knows_disparity=False),
+)
+
+
+def draw(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: DrawVariant) -> None:
+    """Draw a variant whose views are uploaded."""
+    renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
+    renderer.render(optics, scaled(size_px, variant.haste.scale), haste=variant.haste)
+    if variant.is_converged:
+        renderer.refine()
+
+
+def drawing_cost(gl: GLContext, draw_it: Callable[[], None]) -> Cost:
+    """Of a drawing, once everything before it is done. cpu_s: what it takes alone: on software GL processor time over
+    the cores, which other programs disturb less, else time by the clock.
+    """
+    gl.ctx.finish()
+
+    def work() -> None:
+        draw_it()
+        gl.ctx.finish()
+
+    cost = cost_of(work)
+    return Cost(cost.wall_s, cost.cpu_s / CORES if gl.is_software else cost.wall_s)
+
+
+def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int, tell: Tell) -> list[DrawingFigures]:
+    """A refocused picture, and one through a pinhole between the views, of a scene's field, drawn in every way."""
+    focus, diameter = float(np.median(scene.disparity)), min(APERTURE_VIEWS, 2.0 * scene.reach)
+    pictures = {
+        f"{scene.name}, refocused, aperture of {diameter:g} view steps": (
+            Optics(focus_disparity=focus, aperture_diameter=diameter),
+            APERTURE_VARIANTS,
+        ),
+        f"{scene.name}, pinhole between views": (Optics(eye=BETWEEN), PINHOLE_VARIANTS),
+    }
+    tell(0, 1, f"{scene.name}: the best picture")
+    best = best_pictures(scene, [optics for optics, _ in pictures.values()])
+    drawer = _Drawer(gl, scene)
+    try:
+        return [
+            _figures(drawer, what, optics, variants, truth, repeats, tell)
+            for truth, (what, (optics, variants)) in zip(best, pictures.items())
+        ]
+    finally:
+        drawer.renderer.release()
+
+
+def _figures(
+    drawer: _Drawer,
+    what: str,
+    optics: Optics,
+    variants: Iterable[DrawVariant],
+    truth: FloatImage,
+    repeats: int,
+    tell: Tell,
+) -> DrawingFigures:
+    by_name = {variant.name: variant for variant in variants}
+
+    def way(variant: DrawVariant) -> Callable[[], Cost]:
+        return lambda: drawer.cost(optics, variant)
+
+    ways = {name: way(variant) for name, variant in by_name.items()}
+    errors = {name: drawer.errors(optics, variant, truth) for name, variant in by_name.items()}
+    costs = in_turns(ways, repeats, lambda done, total, name: tell(done, total, f"{what}: {name}"))
+    drawn = []
+    for name in by_name:
+        ratio = median_ratio(costs[name], costs[REFERENCE.name])
+        drawn.append(Drawn(name, median_cost(costs[name]), ratio, *errors[name]))
+    return DrawingFigures(what, tuple(drawn))
+
+
+class _Drawer:
+    """Draws variants of one field, with the views that each wants uploaded."""
+
+    def __init__(self, gl: GLContext, scene: BenchScene) -> None:
+        self.gl, self.renderer = gl, Renderer(gl)
+        field = whole_field(scene)
+        plan = plan_literal(field.photo, field.disparity, field.grid)
+        self._grid, self._size_px = field.grid, (scene.photo.shape[1], scene.photo.shape[0])
+        self._views = list(generate(field.photo, field.disparity, plan, quality="fast"))
+        self._uploaded: tuple[int, bool, bool] | None = None
+
+    def cost(self, optics: Optics, variant: DrawVariant) -> Cost:
+        """Of one picture."""
+        self._upload(variant)
+        self.renderer.render(optics, self._size_px, haste=variant.haste)  # what is uploaded has to arrive first
+        return drawing_cost(self.gl, lambda: draw(self.renderer, optics, self._size_px, variant))
+
+    def errors(self, optics: Optics, variant: DrawVariant, truth: FloatImage) -> tuple[int, float, float]:
+        """Samples drawn, PSNR and FLIP."""
+        self._upload(variant)
+        draw(self.renderer, optics, self._size_px, variant)
+        image = stretched(self.renderer.read_image(), self._size_px).astype(np.float32) / np.float32(255)
+        return self.renderer.samples_drawn, psnr(image, truth), flip(image, truth)
+
+    def _upload(self, variant: DrawVariant) -> None:
+        if variant.stored == self._uploaded:
+            return
+        is_half_float, knows_disparity = variant.is_half_float, variant.knows_disparity
+        self.renderer.open_field(self._grid, *self._size_px, hdr=is_half_float, with_disparity=knows_disparity)
+        for view in self._views:
+            if _is_stored(self._grid.offset(view.row, view.column), self._grid, variant.every):
+                colors = stored_from_encoded(encoded_from_stored(view.colors), True) if is_half_float else view.colors
+                self.renderer.upload_view(view.row, view.column, colors, view.disparity if knows_disparity else None)
+        self._uploaded = variant.stored
+
+
+def _is_stored(at: ViewOffset, grid: GridShape, every: int) -> bool:
+    if every > 0:
+        return at.t % every == 0 and at.s % every == 0
+    return (abs(at.t) == grid.centre[0] and abs(at.s) == grid.centre[1]) or at == (0, 0)
+
+
+def best_pictures(scene: BenchScene, wanted: list[Optics]) -> list[FloatImage]:
+    """Pictures (H, W, 3), sRGB-encoded, summed in numpy over views FINER times as close as the field's."""
+    side = FINER * 2 * scene.reach + 1
+    grid, photo = GridShape(side, side), whole_field(scene).photo
+    disparity = Disparity(scene.disparity / np.float32(FINER), "bench")
+    weights = [_weights(optics, grid) for optics in wanted]
+    light = [np.zeros(scene.photo.shape) for _ in wanted]
+    for view in generate(photo, disparity, plan_literal(photo, disparity, grid), quality="fast"):
+        at = grid.offset(view.row, view.column)
+        for optics, of_views, total in zip(wanted, weights, light):
+            if weight := of_views.get((view.row, view.column)):
+                focus = optics.focus_disparity / FINER
+                by_px = focus * (at.t - FINER * optics.eye.t), focus * (at.s - FINER * optics.eye.s)
+                total += weight * sheared_light(encoded_from_stored(view.colors), by_px)
+    return [np.clip(srgb_from_linear(total.astype(np.float32)), 0, 1) for total in light]
+
+
+def _weights(optics: Optics, grid: GridShape) -> dict[tuple[int, int], float]:
+    """By index of the finer grid's views; they sum to 1."""
+    eye = ViewOffset(FINER * optics.eye.t, FINER * optics.eye.s)
+    if optics.aperture_diameter == 0:
+        return {(round(eye.t) + grid.centre[0], round(eye.s) + grid.centre[1]): 1.0}
+    samples = aperture_samples(eye, FINER * optics.aperture_diameter, grid, np.ones(grid, bool))
+    return {(sample.row, sample.column): sample.weight for sample in samples}
+
+
+def sheared_light(encoded: FloatImage, by_px: tuple[float, float]) -> FloatImage:
+    """Linear light of a view (H, W, 3), moved down and right by so many pixels."""
+    return shifted(shifted(linear_from_srgb(encoded), by_px[0], 0), by_px[1], 1)
+
+
+def shifted(image: FloatImage, by_px: float, axis: int) -> FloatImage:
+    """The image moved along an axis by Catmull-Rom interpolation, borders repeated."""
+    whole = int(np.floor(by_px))
+    x = by_px - whole
+    taps = {0: 1 - 2.5 * x**2 + 1.5 * x**3, 1: 0.5 * x + 2 * x**2 - 1.5 * x**3}
+    taps |= {-1: -0.5 * x + x**2 - 0.5 * x**3, 2: -0.5 * x**2 + 0.5 * x**3}
+    index = np.arange(image.shape[axis])
+    places = {k: np.clip(index - whole - k, 0, len(index) - 1) for k in taps}
+    total = np.zeros_like(image)
+    for k, weight in taps.items():
+        total += np.float32(weight) * np.take(image, places[k], axis)
+    return total

@@ -1,0 +1,203 @@
+"""The switches of the core that trade speed for error, and one scene's field made with each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from benchmarks.speed.measure import Cost, cost_of
+from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.depth.refine import refine
+from iibr_core.evaluation.datasets import read_view
+from iibr_core.evaluation.trials import Trial, given_of, trials_of
+from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.generation.view_maker import ViewMaker
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.training.degradation import blurred
+from iibr_core.types import FloatImage, Quality, StoredColors, ViewOffset
+
+MOST_JUDGED = 12
+SOFT_PX = 2.0
+"""Estimated maps are soft at edges; true ones blurred by this sigma stand in for them."""
+LEAST_STORED_SIDE = 5
+"""Fields with fewer views a side have none to leave out."""
+
+
+Stored = Mapping[ViewOffset, tuple[StoredColors, FloatImage]]
+Draw = Callable[[Stored, Iterable[ViewOffset]], list[FloatImage]]
+"""Pinhole pictures at these offsets from stored views and their disparity, as the viewer draws them."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to make a field. refined: strength of the refinement. shrink: of width and height. every: of the views
+    across and down, store one in so many and let the viewer fill in; 0: centre and corners only.
+    """
+
+    name: str
+    quality: Quality = "fast"
+    slots: int = 5
+    hypotheses: int = HYPOTHESES
+    refined: float = 1.0
+    shrink: int = 1
+    is_half_float: bool = False
+    every: int = 1
+
+
+REFERENCE = Variant("fast")
+VARIANTS = (
+    REFERENCE,
+    Variant("balanced", "balanced"),
+    Variant("exact", "exact"),
+    *(Variant(f"K = {k} candidates", slots=k) for k in (1, 2, 3, 8)),
+    *(Variant(f"balanced, {k} hypotheses", "balanced", hypotheses=k) for k in (3, 9)),
+    Variant("no refinement", refined=0.0),
+    Variant("balanced, no refinement", "balanced", refined=0.0),
+    Variant("half width", shrink=2),
+    Variant("quarter width", shrink=4),
+    Variant("half width, balanced", "balanced", shrink=2),
+    Variant("stored as half floats", is_half_float=True),
+    Variant("every 2nd view stored", every=2),
+    Variant("every 2nd view stored, balanced", "balanced", every=2),
+    Variant("every 4th view stored", every=4),
+    Variant("every 4th view stored, balanced", "balanced", every=4),
+    Variant("centre and corners stored", every=0),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class BenchScene:
+    """A field to make: photo (H, W, 3), disparity (H, W), true views by offset, offsets of every view of the field.
+
+    is_soft: whether the disparity was blurred.
+    """
+
+    name: str
+    photo: FloatImage
+    disparity: FloatImage
+    truth: Mapping[ViewOffset, FloatImage]
+    field: tuple[ViewOffset, ...]
+    is_soft: bool = False
+
+    @property
+    def reach(self) -> int:
+        """Views from the centre to the side."""
+        return int(max(abs(part) for at in self.field for part in at))
+
+
+def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> list[BenchScene]:
+    """The scene with its own disparity, and with that made soft. Raises InputError where it has none or is no grid."""
+    from iibr_core.depth.choice import DepthChoice
+
+    trial = trials_of(scene, "auto", None)[0]
+    given = given_of(trial, "auto", DepthChoice(), max_pixels)
+    offsets = {index: trial.offset(index) for index in trial.judged}
+    reach = max(round(max(abs(part) for part in at)) for at in offsets.values())
+    field = tuple(ViewOffset(float(t), float(s)) for t in range(-reach, reach + 1) for s in range(-reach, reach + 1))
+    judged = _spread_out(trial)
+    truth = {offsets[k]: read_view(scene.views[k], max_pixels)[0] for k in judged}
+    own = BenchScene(scene.name, given.photo, given.maps[0].values, truth, field)
+    soft = replace(own, name=f"{scene.name}, soft map", disparity=blurred(own.disparity, SOFT_PX), is_soft=True)
+    return [own, soft] if with_soft else [own]
+
+
+def _spread_out(trial: Trial) -> list[int]:
+    """Judged views: the corners, and eight between that fields with views left out do not store; all of few."""
+    if len(trial.judged) <= MOST_JUDGED:
+        return list(trial.judged)
+    at = {k: np.array(trial.offset(k)) for k in trial.judged}
+    low, high = np.min(list(at.values()), axis=0), np.max(list(at.values()), axis=0)
+    shares = ((1.0, 1.0), (0.75, 0.25), (0.25, 0.75))
+    wanted = [(a * t, b * s) for a, b in shares for t in (low[0], high[0]) for s in (low[1], high[1])]
+    return list(dict.fromkeys(min(at, key=lambda k: float(np.hypot(*(at[k] - place)))) for place in wanted))
+
+
+def stored_offsets(variant: Variant, scene: BenchScene) -> list[ViewOffset]:
+    """Which views of the field a variant makes, the centre's not counted."""
+    reach, centre = scene.reach, ViewOffset(0.0, 0.0)
+    if variant.every == 0:
+        chosen = [at for at in scene.field if abs(at.t) == abs(at.s) == reach]
+    else:
+        chosen = [at for at in scene.field if at.t % variant.every == 0 and at.s % variant.every == 0]
+    return [at for at in chosen if at != centre]
+
+
+def is_possible(variant: Variant, scene: BenchScene, has_drawing: bool) -> bool:
+    """Whether the scene has views to leave out, and something draws what is between."""
+    return variant.every == 1 or (has_drawing and 2 * scene.reach + 1 >= LEAST_STORED_SIDE)
+
+
+def field_cost(variant: Variant, scene: BenchScene) -> Cost:
+    """Of the whole field: setting up is timed, and a few views, from which the time of all follows."""
+    makers: list[ViewMaker] = []
+    with ExitStack() as open_until_done:
+        cost = cost_of(
+            lambda: makers.append(open_until_done.enter_context(_maker(variant, scene.photo, scene.disparity, scene)))
+        )
+        (maker,) = makers
+        outer = {at for at in maker.outer} if variant.quality == "fast" else set()
+        rest = [at for at in stored_offsets(variant, scene) if at not in outer]
+        sample = [rest[round(k)] for k in np.linspace(0, len(rest) - 1, min(len(rest), MOST_JUDGED))]
+        if sample:
+            rendering = cost_of(lambda: [_stored(v.colors, variant) for v in maker.views(variant.quality, sample)])
+            cost += rendering.times(len(rest) / len(sample))
+    return cost
+
+
+def judged_views(variant: Variant, scene: BenchScene, draw: Draw | None) -> dict[ViewOffset, FloatImage]:
+    """The judged views of a variant, sRGB-encoded, at the scene's size."""
+    wanted = list(scene.truth)
+    with _maker(variant, scene.photo, scene.disparity, scene) as maker:
+        if variant.every == 1:
+            made = [encoded_from_stored(_stored(maker.view(variant.quality, at).colors, variant)) for at in wanted]
+        else:
+            assert draw is not None
+            offsets = stored_offsets(variant, scene)
+            stored: dict[ViewOffset, tuple[StoredColors, FloatImage]] = {
+                at: (_stored(view.colors, variant), view.disparity)
+                for at, view in zip(offsets, maker.views(variant.quality, offsets))
+            }
+            stored[ViewOffset(0.0, 0.0)] = (
+                _stored(scene.photo, variant),
+                _refined(variant, scene.photo, scene.disparity),
+            )
+            made = draw(stored, wanted)
+    return {at: _resized(image, scene.photo.shape[:2]) for at, image in zip(wanted, made)}
+
+
+def _maker(variant: Variant, photo: FloatImage, disparity: FloatImage, scene: BenchScene) -> ViewMaker:
+    if variant.shrink > 1:
+        size = (max(photo.shape[0] // variant.shrink, 1), max(photo.shape[1] // variant.shrink, 1))
+        ratio = np.float32(size[1] / photo.shape[1])
+        photo, disparity = _resized(photo, size), resample_surfaces(disparity, size) * ratio
+    disparity = _refined(variant, photo, disparity)
+    return ViewMaker(
+        photo, disparity, scene.field, (variant.quality,), slots=variant.slots, hypotheses=variant.hypotheses
+    )
+
+
+def _refined(variant: Variant, photo: FloatImage, disparity: FloatImage) -> FloatImage:
+    return refine(photo, disparity, variant.refined) if variant.refined > 0 else disparity
+
+
+def _stored(colors: FloatImage, variant: Variant) -> StoredColors:
+    return stored_from_encoded(colors, variant.is_half_float)
+
+
+def _resized(image: FloatImage, size: tuple[int, ...]) -> FloatImage:
+    """The picture (H, W, 3) at another (height, width): Lanczos, over areas where it gets smaller."""
+    if image.shape[:2] == tuple(size[:2]):
+        return image
+    channels: list[Any] = [
+        Image.fromarray(np.ascontiguousarray(image[..., c], np.float32)).resize(
+            (size[1], size[0]), Image.Resampling.LANCZOS
+        )
+        for c in range(3)
+    ]
+    return np.clip(np.stack([np.asarray(channel) for channel in channels], axis=-1), 0, 1).astype(np.float32)

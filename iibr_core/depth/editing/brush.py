@@ -1,0 +1,361 @@
+"""Strokes of a brush on a disparity map. They end at the photo's contours: how far a pixel is from the stroke is
+measured along the way, and to come to colours that the stroke did not touch counts like going far. So texture that the
+stroke runs over does not stop it, and what lies behind a surface is spared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil, exp, floor, hypot, sqrt
+
+import numpy as np
+
+from iibr_core.depth.editing.edits import UNEDITED, BrushTool, DepthEdits, Stroke, extent_of, require_sound, toned
+from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.types import FloatImage
+
+CONTOUR_CONTRAST = 0.12
+"""A difference in colour (sRGB-encoded, root of the summed squares) that ends a stroke, beyond `LIKENESS`."""
+LIKENESS = 0.08
+"""Colours so near to one that the stroke touched are the same surface."""
+TOUCH_RADII = 0.15
+"""Colours so near to its path are touched, ..."""
+TOUCH_POINTS = 8
+"""... for so many of its points: then it may have come to another surface."""
+SPECK_PIXELS = 3
+"""So few unlike pixels in a square of 3 x 3 are texture."""
+COLOR_BIN = 0.1
+MOST_TOUCHED = 4000
+NOISE_MEDIANS = 2.5
+"""Differences between neighbours below so many medians of them are texture, no contour."""
+MOST_NOISE = 0.03
+MOST_SWEEPS = 16
+"""Over a window, there and back, to measure ways: three do unless the ways wind like a maze's."""
+MAPS_KEPT = 8
+"""Of those before the last strokes: so many can be taken back at once."""
+SMOOTHING_ROUNDS = 3
+PARTING_RADII = 3.0
+"""A contour parts what is smoothed like going so many radii."""
+
+Window = tuple[slice, slice]
+_SIGNS: dict[BrushTool, float] = {"nearer": 1.0, "farther": -1.0, "smooth": 1.0}
+MOST = float(np.finfo(np.float32).max)
+
+
+def edited(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
+    """The map with all its edits: (H, W) float32, finite; the map itself where nothing is edited.
+
+    photo: (H, W, 3), sRGB-encoded, guides the strokes. disparity: (H, W), any unit in which larger is closer.
+    Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known.
+    """
+    return DepthCanvas(photo, disparity).shown(edits)
+
+
+class DepthCanvas:
+    """A map that follows its edits: where they only go on, only what is new is worked out.
+
+    `shown` gives the same as `edited`, to the bit, whatever was shown before.
+    """
+
+    def __init__(self, photo: FloatImage, disparity: FloatImage) -> None:
+        """photo: (H, W, 3), sRGB-encoded; disparity: (H, W). Raises ValueError where the sizes differ."""
+        if photo.shape != (*disparity.shape, 3):
+            raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
+        self._photo, self._given = photo, np.asarray(disparity, np.float32)
+        self._is_known = bool(np.isfinite(self._given).all())
+        self._extent: tuple[float, float] | None = None
+        self._noise: float | None = None
+        self._edits = UNEDITED.tone
+        self._toned: FloatImage | None = None
+        self._values: FloatImage = self._given
+        self._open: _OpenStroke | None = None
+        self._trail: list[tuple[int, FloatImage]] = []  # (strokes, map) before the last ones, to go back to
+
+    def shown(self, edits: DepthEdits) -> FloatImage:
+        """The map with these edits, (H, W) float32; not to be written to. Raises InputError as `edited` does."""
+        if edits == UNEDITED and self._is_known:
+            return self._given
+        require_sound(edits)
+        self._extent = self._extent or extent_of(self._given)
+        if self._toned is None or self._edits.tone != edits.tone:
+            self._toned = toned(self._given, edits, self._extent)
+            self._forget(edits)
+        self._return_to(edits)
+        for stroke in edits.strokes[len(self._edits.strokes) :]:
+            self._begin(stroke)
+        return self._values
+
+    def before_strokes(self, edits: DepthEdits) -> FloatImage:
+        """The map without the strokes of these edits: what stays as it is where the brush does not go."""
+        self.shown(edits)
+        return self._given if self._toned is None else self._toned
+
+    def _forget(self, edits: DepthEdits) -> None:
+        assert self._toned is not None
+        self._edits, self._values, self._open = edits.tone, self._toned, None
+        self._trail.clear()
+
+    def _return_to(self, edits: DepthEdits) -> None:
+        """Keep of what was painted what these strokes begin with, and go on with the last one if it became longer."""
+        done, wanted = self._edits.strokes, edits.strokes
+        if wanted[: len(done)] == done:
+            return
+        alike = next((i for i, (a, b) in enumerate(zip(done, wanted)) if a != b), min(len(done), len(wanted)))
+        is_last = self._open is not None and alike == len(done) - 1 < len(wanted)
+        if is_last and _goes_on(done[-1], wanted[alike]):
+            self._go_on(wanted[alike], first=len(done[-1].points))
+            return
+        while self._trail and self._trail[-1][0] > alike:
+            self._trail.pop()
+        if not self._trail:
+            self._forget(edits)
+            return
+        count, self._values = self._trail.pop()
+        self._open, self._edits = None, replace(self._edits, strokes=done[:count])
+
+    def _begin(self, stroke: Stroke) -> None:
+        target, under = None, self._values
+        self._trail = [*self._trail, (len(self._edits.strokes), under)][-MAPS_KEPT:]
+        if stroke.tool == "smooth":
+            target = smoothed(self._photo, under, radius_px(stroke, under), self._texture())
+        self._open = _OpenStroke(under, np.ones(under.shape, np.float32), target)
+        self._edits = replace(self._edits, strokes=(*self._edits.strokes, stroke))
+        self._paint(stroke, first=0)
+
+    def _go_on(self, stroke: Stroke, first: int) -> None:
+        self._edits = replace(self._edits, strokes=(*self._edits.strokes[:-1], stroke))
+        self._paint(stroke, first)
+
+    def _texture(self) -> float:
+        self._noise = texture_contrast(self._photo) if self._noise is None else self._noise
+        return self._noise
+
+    def _paint(self, stroke: Stroke, first: int) -> None:
+        """Lay the stroke on the map, from its point of this index on. Maps handed out before stay as they are."""
+        assert self._open is not None
+        assert self._extent is not None
+        under, distance, target = self._open.under, self._open.distance, self._open.target
+        amount = stroke.strength * (self._extent[1] - self._extent[0]) * _SIGNS[stroke.tool]
+        values = self._values.copy()
+        for i in range(first, len(stroke.points)):
+            window = _measure_from(self._photo, stroke, i, distance)
+            weight, before = falloff(distance[window]), under[window].astype(np.float64)  # which do not overflow
+            change = amount if target is None else stroke.strength * (target[window] - before)
+            values[window] = np.clip(before + weight * change, -MOST, MOST)
+        self._values = values
+
+
+@dataclass(frozen=True, eq=False)
+class _OpenStroke:
+    """The last stroke, which may go on. under: the map without it. distance: of every pixel from it, 1 = out of reach.
+
+    target: the smoothed map, for "smooth".
+    """
+
+    under: FloatImage
+    distance: FloatImage
+    target: FloatImage | None
+
+
+def falloff(distance: FloatImage) -> FloatImage:
+    """How much a brush does at a distance (1 = its radius): 1 in its middle, smoothly to 0."""
+    return np.square(1 - np.square(np.minimum(distance, np.float32(1))))
+
+
+def radius_px(stroke: Stroke, disparity: FloatImage) -> float:
+    """The brush's radius in pixels of a map, at least one."""
+    return max(stroke.radius * disparity.shape[1], 1.0)
+
+
+def texture_contrast(photo: FloatImage) -> float:
+    """Difference in colour between neighbours of a photo (H, W, 3) below which it is texture or noise."""
+    step = max(1, photo.shape[0] * photo.shape[1] // 500_000)
+    differences = [
+        np.sqrt(np.square(np.diff(rows, axis=1)).sum(axis=2)).reshape(-1)
+        for rows in (photo[::step], photo[:, ::step].swapaxes(0, 1))
+    ]
+    both = np.concatenate(differences)
+    return min(NOISE_MEDIANS * float(np.median(both)), MOST_NOISE) if both.size else 0.0
+
+
+def stroke_distance(photo: FloatImage, stroke: Stroke) -> FloatImage:
+    """How far every pixel of a photo (H, W, 3) is from a stroke, in its radii: (H, W), 1 = out of reach."""
+    distance = np.ones(photo.shape[:2], np.float32)
+    for i in range(len(stroke.points)):
+        _measure_from(photo, stroke, i, distance)
+    return distance
+
+
+def touched_colours(photo: FloatImage, stroke: Stroke, index: int) -> FloatImage:
+    """Colours (N, 3) that a stroke touched on its way to the point of this index; a few that stand for all."""
+    height, width = photo.shape[:2]
+    reach = max(TOUCH_RADII * radius_px(stroke, photo[..., 0]), 1.0)
+    parts = []
+    for x, y in stroke.points[max(index - TOUCH_POINTS + 1, 0) : index + 1]:
+        rows, columns = (
+            _span(at * size - 0.5 - reach, at * size - 0.5 + reach, size) for at, size in ((y, height), (x, width))
+        )
+        parts.append(photo[rows, columns].reshape(-1, 3))
+    colors = np.concatenate(parts)
+    colors = colors[:: max(1, len(colors) // MOST_TOUCHED)]
+    _, bins, counts = np.unique(np.floor(colors / COLOR_BIN), axis=0, return_inverse=True, return_counts=True)
+    sums = np.zeros((len(counts), 3))
+    np.add.at(sums, bins.reshape(-1), colors)
+    return (sums / counts[:, None]).astype(np.float32)
+
+
+def smoothed(photo: FloatImage, disparity: FloatImage, radius: float, noise: float) -> FloatImage:
+    """The map (H, W), smoothed over about `radius` px, not across the photo's contours.
+
+    The recursive filter of Gastal and Oliveira, "Domain transform for edge-aware image and video processing" (2011).
+    noise: see `texture_contrast`.
+    """
+    parting = PARTING_RADII * radius / CONTOUR_CONTRAST
+    steps = [np.ones(shape, np.float32) for shape in (disparity.shape, disparity.shape[::-1])]
+    for turned, step in zip((photo, np.ascontiguousarray(photo.swapaxes(0, 1))), steps):
+        _measure_steps(turned, parting, noise, step)
+    values = np.array(disparity, np.float32, order="C")
+    for k in range(SMOOTHING_ROUNDS):
+        sigma = radius * sqrt(3) * 2 ** (SMOOTHING_ROUNDS - k - 1) / sqrt(4**SMOOTHING_ROUNDS - 1)
+        for step in steps:
+            _smooth_rows(values, step, sqrt(2) / sigma)
+            values = np.ascontiguousarray(values.T)
+    return values
+
+
+def _goes_on(old: Stroke, new: Stroke) -> bool:
+    """Whether a stroke is another one, continued."""
+    return replace(new, points=old.points) == old and new.points[: len(old.points)] == old.points
+
+
+def _measure_from(photo: FloatImage, stroke: Stroke, index: int, distance: FloatImage) -> Window:
+    """Shorten the distances (H, W) to what they are from the way to the stroke's point of this index.
+
+    Returns the window in which they may have changed.
+    """
+    height, width = distance.shape
+    ends = [(x * width - 0.5, y * height - 0.5) for x, y in stroke.points[max(index - 1, 0) : index + 1]]
+    radius = radius_px(stroke, distance)
+    xs, ys = zip(*ends)
+    reach = ceil(radius) + 1
+    window = _span(min(ys) - reach, max(ys) + reach, height), _span(min(xs) - reach, max(xs) + reach, width)
+    (x0, y0), (x1, y1) = ends[0], ends[-1]
+    x0, y0, x1, y1 = (float(np.clip(at, -1e6, 1e6)) for at in (x0, y0, x1, y1))
+    _seed(distance, x0, y0, x1, y1, radius)
+    if distance[window].size:
+        unlike = np.zeros(distance[window].shape, np.float32)
+        _tell_unlike(photo[window], touched_colours(photo, stroke, index), unlike)
+        _without_specks(unlike)
+        _measure(unlike, distance[window], radius, MOST_SWEEPS)
+    return window
+
+
+def _span(low: float, high: float, size: int) -> slice:
+    first, last = (int(min(max(at, 0), size)) for at in (floor(low), ceil(high) + 1))
+    return slice(first, last)
+
+
+@kernel
+def _seed(distance, x0, y0, x1, y1, radius):  # type: ignore[no-untyped-def]
+    """Distances of the pixels about every place on the way from (x0, y0) to (x1, y1)."""
+    height, width = distance.shape
+    steps = max(ceil(2 * hypot(x1 - x0, y1 - y0)), 1)
+    for k in range(steps + 1):
+        x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
+        column, row = nearest_pixel(x), nearest_pixel(y)
+        if 0 <= row < height and 0 <= column < width:
+            distance[row, column] = min(distance[row, column], np.float32(hypot(column - x, row - y) / radius))
+
+
+@kernel
+def _contour(photo, y, x, other_y, other_x, noise):  # type: ignore[no-untyped-def]
+    """Difference in colour between two pixels beyond texture."""
+    total = 0.0
+    for c in range(3):
+        total += (photo[y, x, c] - photo[other_y, other_x, c]) ** 2
+    return max(sqrt(total) - noise, 0.0)
+
+
+@kernel
+def _tell_unlike(photo, colors, unlike):  # type: ignore[no-untyped-def]
+    """How far every pixel's colour is from the nearest of the colours (N, 3), 0 where it is like one."""
+    for y in range(photo.shape[0]):
+        for x in range(photo.shape[1]):
+            least = np.inf if len(colors) else 0.0
+            for n in range(len(colors)):
+                total = 0.0
+                for c in range(3):
+                    total += (photo[y, x, c] - colors[n, c]) ** 2
+                least = min(least, total)
+            unlike[y, x] = max(sqrt(least) - LIKENESS, 0.0)
+
+
+@kernel
+def _without_specks(unlike):  # type: ignore[no-untyped-def]
+    """What few of a pixel's neighbours share is no other surface."""
+    height, width = unlike.shape
+    for y in range(height):
+        for x in range(width):
+            if unlike[y, x] == 0.0:
+                continue
+            count = 0
+            for j in range(max(y - 1, 0), min(y + 2, height)):
+                for i in range(max(x - 1, 0), min(x + 2, width)):
+                    count += unlike[j, i] > 0.0
+            if count <= SPECK_PIXELS:
+                unlike[y, x] = 0.0
+
+
+@kernel
+def _measure(unlike, distance, radius, most_sweeps):  # type: ignore[no-untyped-def]
+    """Shortest ways from pixel to pixel (8 neighbours), by sweeps there and back until nothing changes.
+
+    To a pixel of a more unlike colour the way is longer.
+    """
+    height, width = distance.shape
+    sweep = 0
+    changed = True
+    while changed and sweep < most_sweeps:
+        changed = False
+        for way in range(2):
+            for j in range(height):
+                y = j if way == 0 else height - 1 - j
+                back = -1 if way == 0 else 1
+                for i in range(width):
+                    x = i if way == 0 else width - 1 - i
+                    best = distance[y, x]
+                    for k in range(4):
+                        # The four neighbours that the sweep has passed.
+                        other_y = y if k == 0 else y + back
+                        other_x = x + back if k < 2 else (x if k == 2 else x - back)
+                        if not (0 <= other_y < height and 0 <= other_x < width):
+                            continue
+                        length = sqrt(2.0) if k == 1 or k == 3 else 1.0
+                        before = distance[other_y, other_x] + length / radius
+                        before += max(unlike[y, x] - unlike[other_y, other_x], 0.0) / CONTOUR_CONTRAST
+                        best = min(best, np.float32(before))
+                    if best < distance[y, x]:
+                        distance[y, x] = best
+                        changed = True
+        sweep += 1
+
+
+@kernel
+def _measure_steps(photo, parting, noise, steps):  # type: ignore[no-untyped-def]
+    """How far every pixel counts as being from the one at its left; steps: (H, W)."""
+    for y in range(photo.shape[0]):
+        for x in range(1, photo.shape[1]):
+            steps[y, x] = 1.0 + parting * _contour(photo, y, x, y, x - 1, noise)
+
+
+@kernel
+def _smooth_rows(values, steps, rate):  # type: ignore[no-untyped-def]
+    """Every row of values, smoothed there and back. rate: by how much a pixel's step lets go of what was before."""
+    height, width = values.shape
+    kept = np.empty(width)
+    for y in range(height):
+        for x in range(1, width):
+            kept[x] = exp(-rate * steps[y, x])
+            values[y, x] = kept[x] * values[y, x - 1] + (1.0 - kept[x]) * values[y, x]
+        for x in range(width - 2, -1, -1):
+            values[y, x] = kept[x + 1] * values[y, x + 1] + (1.0 - kept[x + 1]) * values[y, x]

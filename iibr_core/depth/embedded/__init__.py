@@ -1,0 +1,1 @@
+"""Depth that a photo file carries itself."""

@@ -1,0 +1,1 @@
+"""Trained depth models: which there are, where they lie, how they run."""

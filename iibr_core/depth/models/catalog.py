@@ -1,0 +1,215 @@
+"""Depth models by name: what there is to be had, what lies on this machine, and how to fetch one. Loads no model.
+
+Only safetensors files are ever fetched or read: pickled weights run code.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from iibr_core.types import InputError
+
+TRANSFORMERS = "transformers"
+INSTALL_HINT = "pip install 'iibr[depth]'"
+
+
+@dataclass(frozen=True)
+class KnownModel:
+    """A published model. repository: on the Hugging Face hub. megabytes: of its weights, about. package: that runs it,
+    as Python imports it; install: how to get that.
+    """
+
+    name: str
+    title: str
+    repository: str
+    megabytes: int
+    licence: str
+    package: str = TRANSFORMERS
+    install: str = INSTALL_HINT
+
+
+USUAL_MODEL = "depth-anything-v2-small"
+
+DA3_INSTALL = "pip install depth-anything-3"
+UNIDEPTH_INSTALL = "follow github.com/lpiccinelli-eth/UniDepth"
+MOGE_INSTALL = "follow github.com/microsoft/MoGe"
+KNOWN_MODELS = (
+    KnownModel(
+        "depth-anything-v2-small",
+        "Depth Anything V2 Small",
+        "depth-anything/Depth-Anything-V2-Small-hf",
+        99,
+        "Apache-2.0",
+    ),
+    KnownModel(
+        "depth-anything-v2-base",
+        "Depth Anything V2 Base",
+        "depth-anything/Depth-Anything-V2-Base-hf",
+        390,
+        "CC-BY-NC-4.0 (not for commercial use)",
+    ),
+    KnownModel(
+        "depth-anything-v2-large",
+        "Depth Anything V2 Large",
+        "depth-anything/Depth-Anything-V2-Large-hf",
+        1341,
+        "CC-BY-NC-4.0 (not for commercial use)",
+    ),
+    KnownModel(
+        "depth-anything-v2-metric-indoor",
+        "Depth Anything V2 Metric Indoor Small",
+        "depth-anything/Depth-Anything-V2-Metric-Indoor-Small-hf",
+        99,
+        "Apache-2.0",
+    ),
+    KnownModel(
+        "depth-anything-v2-metric-outdoor",
+        "Depth Anything V2 Metric Outdoor Small",
+        "depth-anything/Depth-Anything-V2-Metric-Outdoor-Small-hf",
+        99,
+        "Apache-2.0",
+    ),
+    KnownModel("depth-pro", "Depth Pro", "apple/DepthPro-hf", 1904, "Apple's model licence (for research)"),
+    KnownModel("zoedepth", "ZoeDepth", "Intel/zoedepth-nyu-kitti", 1380, "MIT"),
+    KnownModel("midas-dpt-hybrid", "MiDaS 3 (DPT hybrid)", "Intel/dpt-hybrid-midas", 490, "Apache-2.0"),
+    KnownModel("midas-dpt-large", "MiDaS 3 (DPT large)", "Intel/dpt-large", 1370, "Apache-2.0"),
+    KnownModel(
+        "depth-anything-3-small",
+        "Depth Anything 3 Small",
+        "depth-anything/DA3-SMALL",
+        138,
+        "Apache-2.0",
+        "depth_anything_3",
+        DA3_INSTALL,
+    ),
+    KnownModel(
+        "unidepth-v2-small",
+        "UniDepth V2 Small",
+        "lpiccinelli/unidepth-v2-vits14",
+        137,
+        "CC-BY-NC-4.0 (not for commercial use)",
+        "unidepth",
+        UNIDEPTH_INSTALL,
+    ),
+    KnownModel("moge-2", "MoGe 2", "Ruicheng/moge-2-vits-normal", 141, "MIT", "moge", MOGE_INSTALL),
+)
+"""Sizes and licences as published; the repository itself has the last word."""
+
+
+@dataclass(frozen=True)
+class LocalModel:
+    """A model on this machine. package: the Python package that runs it."""
+
+    title: str
+    folder: Path
+    package: str = TRANSFORMERS
+
+
+def known_model(name: str) -> KnownModel:
+    """Raises InputError, naming those there are."""
+    for model in KNOWN_MODELS:
+        if model.name == name:
+            return model
+    names = ", ".join(model.name for model in KNOWN_MODELS)
+    raise InputError(f"{name}: no depth model of this name is known; there are {names}")
+
+
+def model_to_use(wanted: str | None) -> LocalModel | None:
+    """The model that the user wants (a folder or a known name), else the usual one if it is ready, else None.
+
+    Raises InputError where what is wanted is not here, or the package that runs it is not installed.
+    """
+    if wanted is None:
+        usual = known_model(USUAL_MODEL)
+        folder = cached_folder(usual) if is_installed(usual.package) else None
+        return LocalModel(usual.title, folder, usual.package) if folder is not None else None
+    path = Path(wanted).expanduser()
+    if path.is_dir():
+        return _model_in(path)
+    if path.exists():
+        raise InputError(f"{wanted}: is a file; --depth-model takes the model's folder, or a name `iibr models` lists")
+    if "/" in wanted or "\\" in wanted:
+        raise InputError(f"{wanted}: no such folder")
+    model = known_model(wanted)
+    _require_installed(model.title, model.package, model.install)
+    folder = cached_folder(model)
+    if folder is None:
+        raise InputError(f"{wanted} is not on this machine; get it with: iibr models get {wanted}")
+    return LocalModel(model.title, folder, model.package)
+
+
+def is_installed(package: str) -> bool:
+    """Whether Python finds a package, without importing it."""
+    return importlib.util.find_spec(package) is not None
+
+
+def cached_folder(model: KnownModel) -> Path | None:
+    """Where a model lies in the local Hugging Face cache, None where it does not, or without weights."""
+    if not is_installed("huggingface_hub"):
+        return None
+    from huggingface_hub import constants
+
+    # Looked for by hand first: importing the rest of the library takes half a second.
+    repository = Path(constants.HF_HUB_CACHE) / f"models--{model.repository.replace('/', '--')}"
+    if not repository.is_dir():
+        return None
+    from huggingface_hub import try_to_load_from_cache
+
+    found = try_to_load_from_cache(model.repository, "config.json")
+    folder = Path(found).parent if isinstance(found, str) else None
+    return folder if folder is not None and any(weight_files(folder)) else None
+
+
+def weight_files(folder: Path) -> Iterator[Path]:
+    """The safetensors files of a model folder, in order of their names."""
+    yield from sorted(folder.glob("*.safetensors"))
+
+
+def bytes_of(folder: Path) -> int:
+    """What a model's weights take on disk."""
+    return sum(path.stat().st_size for path in weight_files(folder))
+
+
+def fetch(model: KnownModel) -> Path:
+    """Download a model into the local Hugging Face cache, its bars on stderr. Returns its folder.
+
+    Raises InputError where that fails: no network, no right to it, no safetensors.
+    """
+    if not is_installed("huggingface_hub"):
+        raise InputError(f"downloading needs the package huggingface_hub: {INSTALL_HINT}")
+    from huggingface_hub import snapshot_download
+    from huggingface_hub.errors import GatedRepoError, HfHubHTTPError
+
+    try:
+        folder = Path(snapshot_download(model.repository, allow_patterns=["*.json", "*.safetensors"]))
+    except GatedRepoError as error:
+        raise InputError(
+            f"{model.repository}: its owner asks you to accept a licence on huggingface.co first"
+        ) from error
+    except (OSError, HfHubHTTPError, ValueError) as error:
+        reason = str(error).strip().partition("\n")[0].removeprefix("Got: ")[:120] or type(error).__name__
+        raise InputError(
+            f"{model.name} cannot be downloaded ({reason}); check the network, or copy the folder of "
+            f"{model.repository} here and name it with --depth-model"
+        ) from error
+    if not any(weight_files(folder)):
+        raise InputError(f"{model.repository} publishes no safetensors weights; pickled ones are not taken")
+    return folder
+
+
+def _model_in(folder: Path) -> LocalModel:
+    """The model in a user's folder. Which package runs it stands in its config.json."""
+    from iibr_core.depth.models.config import package_for, read_config
+
+    package = package_for(read_config(folder))
+    install = next((model.install for model in KNOWN_MODELS if model.package == package), INSTALL_HINT)
+    _require_installed(str(folder), package, install)
+    return LocalModel(f"the model in {folder.name or folder}", folder, package)
+
+
+def _require_installed(what: str, package: str, install: str) -> None:
+    if not is_installed(package):
+        raise InputError(f"{what} needs the package {package}, which is not installed: {install}")

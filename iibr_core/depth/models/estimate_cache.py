@@ -1,0 +1,96 @@
+"""Estimates kept on disk by what they were made of: the photo's pixels, the model's files, the options. Bounded.
+
+A cache that cannot be read or written is as if it were empty: nothing depends on it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import zipfile
+import zlib
+from pathlib import Path
+from uuid import uuid4
+
+import numpy as np
+
+from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.models.catalog import weight_files
+from iibr_core.depth.models.config import CONFIG, PREPROCESSOR
+from iibr_core.formats.maps import npy
+from iibr_core.types import FloatImage
+
+MAX_BYTES = 512 * 2**20
+FORMAT = "1"
+"""Part of every key: raise it when estimates mean something else."""
+
+KINDS = {"relative": RelativeInverseDepth, "metric": MetricDepth, "disparity": DisparityMap}
+# What numpy, zipfile and zlib raise for damaged files; RuntimeError: encrypted, or compressed in an unknown way.
+MISREADINGS = (*npy.MISREADINGS, OSError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error)
+
+
+def cache_folder() -> Path:
+    """The user's folder for estimates; it may not exist yet."""
+    from platformdirs import user_cache_path
+
+    return user_cache_path("iibr", appauthor=False) / "depth"
+
+
+def key_of(pixels: FloatImage, model_folder: Path, options: str) -> str:
+    """A name for what a model makes of a picture: the same for the same contents, wherever they lie."""
+    digest = hashlib.blake2b(digest_size=20)
+    digest.update(f"{FORMAT} {pixels.shape} {options} ".encode())
+    digest.update(np.ascontiguousarray(pixels).data)
+    for path in (model_folder / CONFIG, model_folder / PREPROCESSOR, *weight_files(model_folder)):
+        with contextlib.suppress(OSError), path.open("rb") as file:
+            digest.update(path.name.encode())
+            digest.update(hashlib.file_digest(file, "blake2b").digest())
+    return digest.hexdigest()
+
+
+def load(key: str) -> Estimate | None:
+    """What was kept under this key, None where nothing was or it is damaged."""
+    path = cache_folder() / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            kind, values, focal_px = str(kept["kind"]), np.array(kept["values"], np.float32), float(kept["focal_px"])
+        if values.ndim != 2:
+            return None
+        with contextlib.suppress(OSError):
+            os.utime(path)  # the least recently used go first
+        return MetricDepth(values, focal_px or None) if kind == "metric" else KINDS[kind](values)
+    except MISREADINGS:
+        return None
+
+
+def store(key: str, estimate: Estimate) -> None:
+    """Keep an estimate; the least recently used ones go where all exceed MAX_BYTES."""
+    folder = cache_folder()
+    temporary = folder / f".{uuid4().hex}.npz"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        match estimate:
+            case RelativeInverseDepth(values):
+                np.savez(temporary, kind="relative", values=values, focal_px=0.0)
+            case MetricDepth(values, focal_px):
+                np.savez(temporary, kind="metric", values=values, focal_px=focal_px or 0.0)
+            case DisparityMap(values):
+                np.savez(temporary, kind="disparity", values=values, focal_px=0.0)
+        temporary.replace(folder / f"{key}.npz")
+        _make_room(folder)
+    except OSError:
+        pass  # read-only or full: the estimate is made anew the next time
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _make_room(folder: Path) -> None:
+    kept = sorted(((entry.stat(), entry) for entry in folder.glob("*.npz")), key=lambda item: item[0].st_mtime_ns)
+    total = sum(status.st_size for status, _ in kept)
+    for status, entry in kept[:-1]:
+        if total <= MAX_BYTES:
+            return
+        entry.unlink(missing_ok=True)
+        total -= status.st_size

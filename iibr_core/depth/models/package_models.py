@@ -1,0 +1,75 @@
+"""Depth models that come as packages of their own (Depth Anything 3, UniDepth, MoGe): thin adapters over their
+documented calls. They are not part of this project's environment; a package that is not installed is told in one line.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.models.catalog import LocalModel
+from iibr_core.types import FloatImage, InputError, Photo
+
+# What foreign packages raise for weights or photos that do not suit them.
+FAILURES = (OSError, ValueError, RuntimeError, KeyError, TypeError, ImportError, AttributeError, AssertionError)
+
+
+def run_package(model: LocalModel, photo: Photo) -> Estimate:
+    """Depth from a package's model; NaN where it says nothing. Raises InputError where it cannot be used."""
+    runs: dict[str, Callable[[LocalModel, Photo], Estimate]] = {
+        "depth_anything_3": _depth_anything_3,
+        "unidepth": _unidepth,
+        "moge": _moge,
+    }
+    try:
+        return runs[model.package](model, photo)
+    except FAILURES as error:
+        if isinstance(error, InputError):
+            raise
+        reason = " ".join(str(error).split())[:160] or type(error).__name__
+        raise InputError(f"{model.title} ({model.package}) failed: {reason}") from error
+
+
+def _depth_anything_3(model: LocalModel, photo: Photo) -> RelativeInverseDepth:
+    network = importlib.import_module("depth_anything_3.api").DepthAnything3.from_pretrained(str(model.folder))
+    said = network.inference([_bytes(photo)])
+    # Its distances have no scale of their own.
+    return RelativeInverseDepth(np.reciprocal(_positive(_array(said.depth)[0])))
+
+
+def _unidepth(model: LocalModel, photo: Photo) -> MetricDepth:
+    import torch
+
+    network = importlib.import_module("unidepth.models").UniDepthV2.from_pretrained(str(model.folder)).eval()
+    with torch.inference_mode():
+        said = network.infer(torch.from_numpy(_bytes(photo)).permute(2, 0, 1))
+    return MetricDepth(
+        _positive(_array(said["depth"]).squeeze()), float(_array(said["intrinsics"]).reshape(3, 3)[0, 0])
+    )
+
+
+def _moge(model: LocalModel, photo: Photo) -> MetricDepth:
+    import torch
+
+    network = importlib.import_module("moge.model.v2").MoGeModel.from_pretrained(str(model.folder)).eval()
+    with torch.inference_mode():
+        said = network.infer(torch.from_numpy(np.clip(photo.pixels, 0, 1)).permute(2, 0, 1))
+    # MoGe's intrinsics count in widths of the picture.
+    return MetricDepth(_positive(_array(said["depth"])), float(_array(said["intrinsics"])[0, 0]) * photo.size[1])
+
+
+def _bytes(photo: Photo) -> Any:
+    return (np.clip(photo.pixels, 0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def _array(said: Any) -> FloatImage:
+    return np.asarray(said.cpu() if hasattr(said, "cpu") else said, np.float32)
+
+
+def _positive(depth: FloatImage) -> FloatImage:
+    """Sky and the like is infinite or 0 there: unknown."""
+    return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(np.nan))

@@ -1,0 +1,275 @@
+"""Depth by a trained model: a photo in, an estimate out whose type says what is known; kept, so that the same photo
+costs nothing the second time.
+
+torch and transformers are imported where they are used: a photo with depth of its own never waits for them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import psutil
+from safetensors import SafetensorError
+
+from iibr_core.depth.choice import Tell
+from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.models import estimate_cache
+from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
+from iibr_core.depth.models.config import Preparation, read_config, read_preparation
+from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.runtime.tiling import ShouldStop, go_on, never
+from iibr_core.types import FloatImage, InputError, Photo
+
+if TYPE_CHECKING:
+    import torch
+
+MEMORY_SHARE = 4
+"""A model may take this part of the machine's memory where the user says nothing."""
+
+ACTIVATION_BYTES = 1500
+"""For each pixel of the input of a model of USUAL_WIDTH; measured: 1,060 with Depth Anything V2 Small at 686x518."""
+USUAL_WIDTH = 384
+
+MAX_AREA_GROWTH = 2.5
+"""A long photo's input may hold this many times the pixels that the model was made for; time grows with its square."""
+
+PICKLED = ("*.bin", "*.pt", "*.pth", "*.ckpt")
+INVERSE_LIMITS = (1e-4, 1e4)
+"""Depth Pro's canonical inverse depth, as its authors clamp it."""
+
+# What transformers, torch and safetensors raise for folders that hold something else than they claim.
+LOAD_ERRORS = (
+    OSError,
+    ValueError,
+    RuntimeError,
+    KeyError,
+    TypeError,
+    ImportError,
+    AttributeError,
+    AssertionError,
+    SafetensorError,
+)
+
+
+def estimate_with(
+    model: LocalModel,
+    photo: Photo,
+    memory_bytes: int | None = None,
+    should_stop: ShouldStop = never,
+    tell: Tell = lambda doing, share: None,
+) -> Estimate:
+    """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
+
+    memory_bytes: what the model may take; its input is made smaller for it. Raises InputError where the model cannot
+    be used or its result is of no use, Cancelled where should_stop says so.
+    """
+    _require_weights(model.folder)
+    tell(f"looking for what {model.title} said before", 0.0)
+    network_input = None
+    if model.package == TRANSFORMERS:
+        network_input = _input_of(model, photo.size, memory_bytes or psutil.virtual_memory().total // MEMORY_SHARE)
+    key = estimate_cache.key_of(photo.pixels, model.folder, f"{model.package} {network_input}")
+    found = estimate_cache.load(key)
+    if found is not None:
+        return found
+    if network_input is not None:
+        found = _run(model, photo, network_input, should_stop, tell)
+    else:
+        from iibr_core.depth.models.package_models import run_package
+
+        found = run_package(model, photo)
+    _require_use(model, found)
+    estimate_cache.store(key, found)
+    return found
+
+
+@dataclass(frozen=True)
+class _Input:
+    """How a photo becomes a model's input, and of which (height, width)."""
+
+    preparation: Preparation
+    size: tuple[int, int]
+
+
+def _input_of(model: LocalModel, size: tuple[int, int], memory_bytes: int) -> _Input:
+    """The input for a photo of (height, width) that the memory allows. Raises InputError where it allows none."""
+    config = read_config(model.folder)
+    preparation = read_preparation(model.folder, config["model_type"])
+    per_pixel = ACTIVATION_BYTES * max(_width_of(config), USUAL_WIDTH) / USUAL_WIDTH
+    pixels = (memory_bytes - bytes_of(model.folder)) / per_pixel
+    is_fixed = config["model_type"] == "depth_pro"
+    needed = preparation.size[0] * preparation.size[1] if is_fixed else (2 * preparation.multiple) ** 2
+    if pixels < needed:
+        least = bytes_of(model.folder) + needed * per_pixel
+        raise InputError(
+            f"{model.title} takes {least / 2**20:,.0f} MiB, the budget is {memory_bytes / 2**20:,.0f} MiB: raise "
+            "--memory or choose a smaller model"
+        )
+    return _Input(preparation, preparation.size if is_fixed else input_size(preparation, size, pixels))
+
+
+def input_size(preparation: Preparation, size: tuple[int, int], max_pixels: float) -> tuple[int, int]:
+    """(height, width) that a photo is made for its model: as the model asks for, unless that exceeds max_pixels.
+
+    The side that has to change least meets the model's size (as the library's own preparation chooses it).
+    """
+    height, width = size
+    asked_height, asked_width = preparation.size
+    scale_y, scale_x = asked_height / height, asked_width / width
+    if preparation.keeps_aspect:
+        scale_y = scale_x = scale_x if abs(1 - scale_x) < abs(1 - scale_y) else scale_y
+    limit = min(max_pixels, MAX_AREA_GROWTH * asked_height * asked_width)
+    shrink = min(1.0, math.sqrt(limit / (scale_y * height * scale_x * width)))
+    rounded = round if shrink == 1 else math.floor
+    sides = (scale_y * height * shrink, scale_x * width * shrink)
+    multiple = preparation.multiple
+    # Two patches at least: networks halve what they see once more.
+    tall, wide = (max(rounded(side / multiple), 2) * multiple for side in sides)
+    longest = max(2, int(limit / min(tall, wide)) // multiple) * multiple
+    return min(tall, longest), min(wide, longest)
+
+
+def _width_of(config: dict[str, Any]) -> int:
+    """Channels of the transformer inside; what is not told counts as large."""
+    backbone = config.get("backbone_config")
+    inner = backbone if isinstance(backbone, dict) else config
+    width = inner.get("hidden_size", 1024)
+    return width if isinstance(width, int) and width > 0 else 1024
+
+
+def _run(model: LocalModel, photo: Photo, network_input: _Input, should_stop: ShouldStop, tell: Tell) -> Estimate:
+    tell(f"loading {model.title}", 0.0)
+    import torch
+
+    network = _loaded(model)
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    pixels = _prepared(photo.pixels, network_input).to(device)
+    doing = f"estimating depth with {model.title}"
+    try:
+        with torch.inference_mode(), _Watch(network, should_stop, lambda share: tell(doing, share)):
+            output = network.to(device)(pixel_values=pixels)
+    except (RuntimeError, ValueError, IndexError, TypeError) as error:
+        raise InputError(f"{model.title} failed on this photo ({_line(error)})") from error
+    return _estimate_of(network.config, output, photo.size, network_input.preparation)
+
+
+def _loaded(model: LocalModel) -> Any:
+    """The network, ready to run. Raises InputError where the folder holds something else."""
+    from transformers import AutoModelForDepthEstimation
+    from transformers.utils import logging
+
+    logging.set_verbosity_error()
+    logging.disable_progress_bar()
+    try:
+        network, report = AutoModelForDepthEstimation.from_pretrained(
+            model.folder, local_files_only=True, use_safetensors=True, trust_remote_code=False, output_loading_info=True
+        )
+    except LOAD_ERRORS as error:
+        raise InputError(f"{model.folder}: cannot be loaded as a depth model ({_line(error)})") from error
+    lacking = sorted(report["missing_keys"])
+    if lacking:
+        raise InputError(f"{model.folder}: its weights lack {len(lacking)} parts ({lacking[0]}, ...); get them all")
+    return network.float().eval()
+
+
+class _Watch:
+    """While it is entered, a network asks before each of its layers whether to go on, and tells how far it is."""
+
+    def __init__(self, network: torch.nn.Module, should_stop: ShouldStop, tell: Callable[[float], None]) -> None:
+        self._layers = [layer for layer in network.modules() if not any(layer.children())]
+        self._should_stop, self._tell = should_stop, tell
+        self._seen = 0
+
+    def __enter__(self) -> None:
+        self._hooks = [layer.register_forward_pre_hook(self._before) for layer in self._layers]
+
+    def __exit__(self, *_: object) -> None:
+        for hook in self._hooks:
+            hook.remove()
+
+    def _before(self, *_: object) -> None:
+        go_on(self._should_stop)
+        self._seen += 1
+        self._tell(min(self._seen / len(self._layers), 1.0))
+
+
+def _prepared(pixels: FloatImage, network_input: _Input) -> torch.Tensor:
+    """(1, 3, height, width), normalised as the model was trained; white is 1, HDR is cut off there."""
+    import torch
+
+    wanted = network_input.preparation
+    if wanted.pads:
+        pad_y, pad_x = _padding(pixels.shape[:2])
+        pixels = np.pad(pixels, ((pad_y, pad_y), (pad_x, pad_x), (0, 0)), "reflect")
+    image = torch.from_numpy(np.clip(pixels, 0, 1)).permute(2, 0, 1)[None]
+    small = torch.nn.functional.interpolate(image, network_input.size, mode="bicubic", antialias=True)
+    mean, std = (torch.tensor(values).view(1, 3, 1, 1) for values in (wanted.mean, wanted.std))
+    return (small - mean) / std
+
+
+def _padding(size: tuple[int, ...]) -> tuple[int, int]:
+    """ZoeDepth's borders, rows and columns: it was trained with them."""
+    return int(math.sqrt(size[0] / 2) * 3), int(math.sqrt(size[1] / 2) * 3)
+
+
+def _estimate_of(config: Any, output: Any, size: tuple[int, int], preparation: Preparation) -> Estimate:
+    """The network's output as what it is; by the kind of network, never by its values. size: of the photo."""
+    values = output.predicted_depth[0].float().cpu().numpy()
+    match config.model_type:
+        case "zoedepth":
+            return MetricDepth(_unpadded(values, size) if preparation.pads else values)
+        case "depth_pro":
+            return _depth_pro_estimate(values, output.field_of_view)
+        case "depth_anything" if config.depth_estimation_type == "metric":
+            return MetricDepth(values)
+        case _:
+            return RelativeInverseDepth(values)
+
+
+def _unpadded(values: FloatImage, size: tuple[int, int]) -> FloatImage:
+    pad_y, pad_x = _padding(size)
+    whole = resample_surfaces(values, (size[0] + 2 * pad_y, size[1] + 2 * pad_x))
+    return whole[pad_y : pad_y + size[0], pad_x : pad_x + size[1]]
+
+
+def _depth_pro_estimate(canonical: FloatImage, field_of_view: Any) -> Estimate:
+    """Depth Pro tells inverse distance for a camera as wide as its picture; its field of view turns that to metres."""
+    if field_of_view is None:
+        return RelativeInverseDepth(canonical)
+    width = canonical.shape[1]
+    focal_px = width / 2 / math.tan(math.radians(float(field_of_view[0])) / 2)
+    return MetricDepth(1 / np.clip(canonical * np.float32(width / focal_px), *INVERSE_LIMITS), focal_px)
+
+
+def _require_weights(folder: Path) -> None:
+    """Raises InputError where a model folder holds no safetensors weights; pickled ones are told apart."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    if any(weight_files(folder)):
+        return
+    pickled = [path.name for pattern in PICKLED for path in folder.glob(pattern)]
+    if pickled:
+        raise InputError(f"{folder}: {pickled[0]} is pickled, which can run code; only .safetensors weights are read")
+    raise InputError(f"{folder}: holds no .safetensors weights; get the whole model folder")
+
+
+def _require_use(model: LocalModel, estimate: Estimate) -> None:
+    """Raises InputError for results that say nothing about the photo."""
+    match estimate:
+        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
+            known = values if model.package == TRANSFORMERS else values[~np.isnan(values)]
+    if not known.size or not np.isfinite(known).all():
+        raise InputError(f"{model.title} gave NaN or infinity for this photo")
+    if isinstance(estimate, MetricDepth) and not (known > 0).all():
+        raise InputError(f"{model.title} gave distances of 0 or less for this photo")
+    if known.max() == known.min():
+        raise InputError(f"{model.title} gave the same depth everywhere")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:160] or type(error).__name__

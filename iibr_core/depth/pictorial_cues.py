@@ -1,0 +1,149 @@
+"""A rough guess at depth without any model: things stand lower in the picture, and edges lie before them, the nearer
+they are.
+
+Two cues are kept: the height in the picture, and how much change of colour lies on the way from the upper border, which
+shows what is far. Sharpness, haze, saturation, brightness and a prior for the middle did not help
+on all photos with known depth.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import OpenImageIO as oiio
+
+from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.runtime import tiling
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, go_on, in_bands, never
+from iibr_core.types import FloatImage, Photo
+
+LONGEST_PX = 400
+"""Depth is guessed on a picture so large."""
+DETAIL_PX = 4
+"""Radius of three box blurs there: finer detail is texture."""
+STEP_COST = 0.0005
+"""Of one pixel of way, against 1 for the change from black to white in one channel."""
+WAY_SHARE = 2.0
+"""How much the way counts against the height."""
+SWEEPS = 3
+"""To and fro; more change nothing that can be seen."""
+GUIDE_PX = 8
+"""Radius in which depth is linear in the photo's brightness: its edges become the photo's."""
+GUIDE_CONTRAST = 0.03
+"""Brightness that varies by less than this (standard deviation) draws no edge of depth."""
+
+
+def estimate_offline(photo: Photo, should_stop: ShouldStop = never) -> RelativeInverseDepth:
+    """Rough inverse depth (H, W) of a photo, finite; 0 everywhere where the picture gives no hint (one row of pixels).
+
+    On teddy, moebius, motorcycle and antinous its correlation with the true disparity is 0.5 to 0.86 (docs/depth.md).
+    Raises Cancelled once should_stop is true.
+    """
+    pixels = np.clip(photo.pixels, 0, 1)
+    small = _resized(pixels, _small_size(photo.size), "box", should_stop)
+    smooth = small
+    for _ in range(3):
+        smooth = _averaged(smooth, DETAIL_PX)
+    go_on(should_stop)
+    way = _way_from_top(smooth)
+    go_on(should_stop)
+    depth = _standardised(np.indices(way.shape, np.float32)[0]) + WAY_SHARE * _standardised(way)
+    return RelativeInverseDepth(_guided(depth, small.mean(axis=2), pixels, should_stop))
+
+
+def _small_size(size: tuple[int, int]) -> tuple[int, int]:
+    ratio = min(1.0, LONGEST_PX / max(size))
+    return max(round(size[0] * ratio), 1), max(round(size[1] * ratio), 1)
+
+
+def _resized(image: FloatImage, size: tuple[int, int], filter_name: str, should_stop: ShouldStop) -> FloatImage:
+    """(H, W, C) at another (height, width)."""
+    if image.shape[:2] == size:
+        return image
+    channels = image.shape[2]
+    source, resized = (oiio.ImageBuf(oiio.ImageSpec(w, h, channels, oiio.FLOAT)) for h, w in (image.shape[:2], size))
+
+    def put(first: int, last: int) -> None:
+        rows = oiio.ROI(0, image.shape[1], first, last, 0, 1, 0, channels)
+        source.set_pixels(rows, np.ascontiguousarray(image[first:last], np.float32))
+
+    def resize(first: int, last: int) -> None:
+        rows = oiio.ROI(0, size[1], first, last, 0, 1, 0, channels)
+        oiio.ImageBufAlgo.resize(resized, source, filtername=filter_name, roi=rows)
+
+    # OpenImageIO has threads of its own. A pixel of a smaller picture takes as long as all that it is the mean of.
+    in_bands(put, (image.shape[0], image.shape[1]), should_stop, threads=1)
+    shrinkage = max(image.shape[0] * image.shape[1] / (size[0] * size[1]), 1.0)
+    in_bands(resize, size, should_stop, threads=1, most_pixels=int(tiling.MOST_BAND_PIXELS / shrinkage))
+    return np.asarray(resized.get_pixels(oiio.FLOAT), np.float32).reshape(*size, channels)
+
+
+def _way_from_top(image: FloatImage) -> FloatImage:
+    """(H, W): length of the shortest way from the upper border, in changes of colour of an (H, W, 3) picture."""
+    way = np.full(image.shape[:2], np.inf, np.float32)
+    way[0] = 0
+    _grow_way(np.ascontiguousarray(image, np.float32), way)
+    return way
+
+
+def _averaged(image: FloatImage, radius: int) -> FloatImage:
+    """Means over squares, (H, W, ...); at the frame over what of them lies inside."""
+    for axis in (0, 1):
+        count = image.shape[axis]
+        sums = np.insert(np.cumsum(image, axis=axis, dtype=np.float64), 0, 0.0, axis=axis)
+        first, last = np.maximum(np.arange(count) - radius, 0), np.minimum(np.arange(count) + radius + 1, count)
+        widths = (last - first).reshape([-1 if a == axis else 1 for a in range(image.ndim)])
+        image = ((np.take(sums, last, axis) - np.take(sums, first, axis)) / widths).astype(np.float32)
+    return image
+
+
+def _standardised(values: FloatImage) -> FloatImage:
+    """Mean 0, standard deviation 1; 0 where all are equal."""
+    spread = float(values.std())
+    return (values - values.mean()) / np.float32(spread) if spread > 1e-9 else np.zeros_like(values)
+
+
+def _guided(values: FloatImage, guide: FloatImage, pixels: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
+    """The map (h, w), guided by a picture (h, w), at the size of the photo (H, W, 3), which guides it there.
+
+    He et al., Guided Image Filtering, PAMI 2013, in its fast form: the linear model is enlarged, not the map.
+    """
+    products = np.stack([values, guide, guide * values, guide * guide], axis=2)
+    mean, guide_mean, product, square = np.moveaxis(_averaged(products, GUIDE_PX), 2, 0)
+    gain = (product - guide_mean * mean) / (square - guide_mean**2 + GUIDE_CONTRAST**2)
+    model = _averaged(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
+    model = _resized(model, pixels.shape[:2], "triangle", should_stop)
+    guided = np.empty(pixels.shape[:2], np.float32)
+
+    def band(first: int, last: int) -> None:
+        rows = slice(first, last)
+        guided[rows] = model[rows, :, 0] * pixels[rows].mean(axis=2) + model[rows, :, 1]
+
+    in_bands(band, (pixels.shape[0], pixels.shape[1]), should_stop)
+    return guided
+
+
+@kernel
+def _grow_way(image, way):  # type: ignore[no-untyped-def]
+    """Shortest ways from the pixels where `way` (H, W) is 0, over 8 neighbours, sweeping to and fro."""
+    height, width, channels = image.shape
+    for sweep in range(2 * SWEEPS):
+        to = 1 if sweep % 2 == 0 else -1
+        for row in range(height):
+            y = row if to > 0 else height - 1 - row
+            for column in range(width):
+                x = column if to > 0 else width - 1 - column
+                for n in range(4):
+                    # Those that this sweep has been to: beside, then the three of the row before.
+                    v = y if n == 0 else y - to
+                    u = x - to if n == 0 else x + n - 2
+                    if not (0 <= v < height and 0 <= u < width):
+                        continue
+                    change = 0.0
+                    for c in range(channels):
+                        change += (image[y, x, c] - image[v, u, c]) ** 2
+                    length = way[v, u] + sqrt(change) + STEP_COST * (1.0 if u == x or v == y else sqrt(2.0))
+                    if length < way[y, x]:
+                        way[y, x] = length

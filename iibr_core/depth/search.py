@@ -1,0 +1,237 @@
+"""Decides where a photo's disparity comes from: a file, the photo itself, a trained model, a rough estimate; in this
+order, and says so. What fails is followed by the next; only a file that the user named must be good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin, Tell
+from iibr_core.depth.embedded.images import picture_file
+from iibr_core.depth.embedded.reader import read_embedded
+from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.pictorial_cues import estimate_offline
+from iibr_core.depth.refine import refine
+from iibr_core.depth.scaling import disparity_from
+from iibr_core.depth.sidecar import find_sidecar, flat_disparity
+from iibr_core.formats.images.oiio_reader import read_orientation
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo, upright
+from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_disparity
+from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.inpainting.disparity_holes import fill_from_background
+from iibr_core.runtime.tiling import ShouldStop, go_on, never
+from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
+
+USUAL_GRID = GridShape(9, 9)
+"""What estimates without a scale are made to suit where the grid is not yet known."""
+
+NOT_USED: dict[DepthKind, str] = {
+    "file": "The map beside the photo was not used",
+    "embedded": "The photo's own depth was not used",
+    "model": "The depth model was not used",
+    "rough": "Depth could not be guessed",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoWithDepth:
+    """A photo, its disparity at the same size, and where that came from."""
+
+    photo: Photo
+    disparity: Disparity
+    origin: DepthOrigin
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What one source gave: an estimate of any kind and size, or disparity that counts as it is (from a file).
+
+    photo: the one to show with it.
+    """
+
+    photo: Photo
+    origin: DepthOrigin
+    depth: Estimate | Disparity
+
+
+def open_with_depth(
+    path: Path,
+    choice: DepthChoice | None = None,
+    max_pixels: int = DEFAULT_MAX_PIXELS,
+    grid: GridShape | None = None,
+    should_stop: ShouldStop = never,
+    tell: Tell = lambda doing, share: None,
+) -> PhotoWithDepth:
+    """Read a photo and find its disparity; every photo gets one.
+
+    A photo that the camera blurred is replaced by the sharp picture beside it, where its own depth comes with one.
+    Raises InputError for a bad photo and for a bad file that `choice` names, Cancelled where should_stop says so.
+    """
+    choice, path = choice or DepthChoice(), Path(path)
+    photo = read_photo(path, max_pixels)
+    search = _Search(path, photo, choice, max_pixels, should_stop, tell)
+    if choice.file is not None:
+        return _finished(search.of_file(Path(choice.file)), choice, grid, should_stop)
+    failures: tuple[str, ...] = ()
+    for kind, find in search.sources():
+        try:
+            found = find()
+            if found is not None:
+                found = replace(found, origin=replace(found.origin, failures=failures))
+                return _finished(found, choice, grid, should_stop)
+        except InputError as error:
+            failures += (f"{NOT_USED[kind]}: {error}",)
+    return _flat(photo, failures)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One photo on its way to its depth. The methods give None where there is nothing to read."""
+
+    path: Path
+    photo: Photo
+    choice: DepthChoice
+    max_pixels: int
+    should_stop: ShouldStop
+    tell: Tell
+
+    def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _Found | None]]]:
+        ways: dict[DepthKind, Callable[[], _Found | None]] = {
+            "file": self.sidecar,
+            "embedded": self.embedded,
+            "model": self.model,
+            "rough": self.rough,
+        }
+        kinds: list[DepthKind] = [*ways, "flat"]
+        start = 0 if self.choice.start == "auto" else kinds.index(self.choice.start)
+        for kind in kinds[start:-1]:
+            yield kind, ways[kind]
+
+    def go_on(self) -> None:
+        """Asked before work that takes long."""
+        go_on(self.should_stop)
+
+    def of_file(self, path: Path) -> _Found:
+        disparity = read_disparity(path, self.photo.size, self.choice.file_scale)
+        return _Found(self.photo, DepthOrigin("file", disparity.source), disparity)
+
+    def sidecar(self) -> _Found | None:
+        path = find_sidecar(self.path)
+        return self.of_file(path) if path is not None else None
+
+    def embedded(self) -> _Found | None:
+        embedded = read_embedded(self.path)
+        if embedded is None:
+            return None
+        orientation = read_orientation(self.path)
+        photo = self.photo
+        if embedded.all_in_focus is not None:
+            photo = _sharp_photo(photo, embedded.all_in_focus, orientation, self.max_pixels)
+        origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
+        return _Found(photo, origin, _turned(embedded.estimate, photo.size, orientation))
+
+    def model(self) -> _Found | None:
+        from iibr_core.depth.models.catalog import model_to_use
+
+        model = model_to_use(self.choice.model)
+        if model is None:
+            return None
+        from iibr_core.depth.models.transformers_models import estimate_with
+
+        self.go_on()
+        estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.tell)
+        return _Found(self.photo, DepthOrigin("model", f"estimated by {model.title}"), estimate)
+
+    def rough(self) -> _Found:
+        self.go_on()
+        self.tell("guessing depth", 0.0)
+        origin = DepthOrigin("rough", "rough, guessed without a model", advice=BETTER_WAYS)
+        return _Found(self.photo, origin, estimate_offline(self.photo, self.should_stop))
+
+
+def _finished(found: _Found, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
+    """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
+    photo, origin = found.photo, found.origin
+    notes = origin.failures + ((f"{origin.line} {origin.advice}",) if origin.advice else ())
+    if isinstance(found.depth, Disparity):
+        values, notes = found.depth.values, found.depth.notes + notes
+    else:
+        values = disparity_from(resized(found.depth, photo.size), grid or USUAL_GRID)
+        if np.isnan(values).all():
+            raise InputError("it knows no depth anywhere")
+        values = fill_from_background(values, should_stop)
+    if choice.refine > 0:
+        values = refine(photo.pixels, values, choice.refine, should_stop)
+    return PhotoWithDepth(photo, Disparity(values, origin.words, notes), origin)
+
+
+def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:
+    flat = flat_disparity(photo.size)
+    origin = DepthOrigin("flat", flat.source, failures, BETTER_WAYS)
+    return PhotoWithDepth(photo, replace(flat, notes=flat.notes + failures), origin)
+
+
+def _sharp_photo(photo: Photo, data: bytes, orientation: int, max_pixels: int) -> Photo:
+    """The all-in-focus picture as the photo, turned like it; the photo itself where that is damaged or another one."""
+    try:
+        with picture_file(data, "the all-in-focus picture") as path:
+            sharp = read_photo(path, max_pixels)
+            pixels = upright(sharp.pixels, orientation) if read_orientation(path) == 1 else sharp.pixels
+    except InputError as error:
+        return replace(photo, notes=(*photo.notes, f"The blurred picture is shown: {error}"))
+    if not _is_alike(pixels.shape[:2], photo.size):
+        return replace(photo, notes=(*photo.notes, "The blurred picture is shown: the sharp one has another shape."))
+    focal_px = photo.focal_px * pixels.shape[1] / photo.size[1]
+    note = "The sharp picture that the file holds is shown, not the blurred one."
+    return replace(photo, pixels=pixels, focal_px=focal_px, notes=(*photo.notes, note))
+
+
+def _turned(estimate: Estimate, size: tuple[int, int], orientation: int) -> Estimate:
+    """The estimate, turned upright as the photo was. Some writers turn the map already; others' maps fit no way."""
+    values = _values(estimate)
+    for candidate in (upright(values, orientation), values):
+        if _is_alike(candidate.shape, size):
+            return _with_values(estimate, candidate)
+    shape, photo_shape = (f"{width}x{height}" for height, width in (values.shape, size))
+    raise InputError(f"its {shape} pixels have another shape than the photo, {photo_shape}")
+
+
+def resized(estimate: Estimate, size: tuple[int, int]) -> Estimate:
+    """The estimate for a picture of another (height, width), surface by surface; lengths in pixels are scaled along."""
+    if _values(estimate).shape == size:
+        return estimate
+    ratio = size[1] / _values(estimate).shape[1]
+    match estimate:
+        case RelativeInverseDepth(values):
+            return RelativeInverseDepth(resample_surfaces(values, size))
+        case MetricDepth(metres, focal_px):
+            # Surfaces are told apart by inverse distance: what is far would else be all that counts.
+            resampled = np.reciprocal(resample_surfaces(np.reciprocal(metres), size))
+            return MetricDepth(resampled, None if focal_px is None else focal_px * ratio)
+        case DisparityMap(px_per_view):
+            return DisparityMap(resample_surfaces(px_per_view, size) * np.float32(ratio))
+
+
+def _values(estimate: Estimate) -> FloatImage:
+    match estimate:
+        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
+            return values
+
+
+def _with_values(estimate: Estimate, values: FloatImage) -> Estimate:
+    match estimate:
+        case RelativeInverseDepth():
+            return RelativeInverseDepth(values)
+        case MetricDepth():
+            return replace(estimate, metres=values)
+        case DisparityMap():
+            return DisparityMap(values)
+
+
+def _is_alike(shape: tuple[int, ...], size: tuple[int, int]) -> bool:
+    """Whether two (height, width) have nearly the same aspect ratio."""
+    return abs(shape[1] * size[0] / (shape[0] * size[1]) - 1) <= MAX_ASPECT_DIFFERENCE

@@ -1,0 +1,126 @@
+"""HEIC photos (HEIF with HEVC), which OpenImageIO's wheel does not read; they come out as rasters like all others."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from iibr_core.formats.files import opened_file, refuse_bomb, require_file
+from iibr_core.formats.images.oiio_reader import Raster
+from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS
+from iibr_core.types import FloatImage, InputError
+
+BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
+EXIF_FOLDER = 0x8769
+EXIF_NUMBERS = {
+    0x920A: "Exif:FocalLength",
+    0xA405: "Exif:FocalLengthIn35mmFilm",
+    0xA20E: "Exif:FocalPlaneXResolution",
+    0xA210: "Exif:FocalPlaneResolutionUnit",
+    0xA002: "Exif:PixelXDimension",
+}
+DECODE_ERRORS = (ValueError, OSError, RuntimeError, EOFError, SyntaxError, MemoryError, IndexError)
+
+
+@dataclass(frozen=True, eq=False)
+class HeicDepth:
+    """The depth map beside a HEIC's photo, upright: (H, W), 0..1, with what libheif tells of its range."""
+
+    values: FloatImage
+    metadata: dict[str, Any]
+
+
+def is_heic(path: Path) -> bool:
+    """Whether a file begins as HEIF files do, whatever its name. Raises InputError where it cannot be read."""
+    with opened_file(path) as file:
+        start = file.read(12)
+    return start[4:8] == b"ftyp" and start[8:12] in BRANDS
+
+
+def read_heic(path: Path) -> Raster:
+    """Decode a HEIC's photo, turned upright as the file asks. Raises InputError as `read_raster` does."""
+    file = _opened(path)
+    spec = oiio.ImageSpec(file.size[0], file.size[1], 3, "uint8")
+    _describe(spec, file.info)
+    pixels = _pixels(path, file)
+    alpha = np.ascontiguousarray(pixels[..., 3]) if pixels.shape[2] == 4 else None
+    if alpha is not None and (alpha == np.iinfo(alpha.dtype).max).all():
+        alpha = None
+    if not getattr(file, "premultiplied_alpha", False):
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+    return Raster(pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1], alpha, spec)
+
+
+def read_heic_depth(path: Path) -> HeicDepth | None:
+    """The depth map of a portrait photo, None where it has none. Raises InputError where it is damaged."""
+    maps = _opened(path).info.get("depth_images") or []
+    if not maps:
+        return None
+    width, height = maps[0].size
+    if width < 1 or height < 1 or width * height > MAX_FILE_PIXELS:
+        raise InputError(f"{path}: its depth map of {width}x{height} pixels is absurd")
+    pixels = _pixels(path, maps[0])
+    scale = np.float32(1 / np.iinfo(pixels.dtype).max)
+    return HeicDepth(np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {}))
+
+
+def _opened(path: Path) -> Any:
+    import pillow_heif
+
+    require_file(path)
+    try:
+        file = pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
+        width, height = file.size
+    except DECODE_ERRORS as error:
+        raise InputError(f"{path}: cannot be read as a HEIC picture ({_line(error)})") from error
+    if width < 1 or height < 1 or width * height > MAX_FILE_PIXELS:
+        raise InputError(f"{path}: {width}x{height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
+    refuse_bomb(path, width * height * 4)
+    return file
+
+
+def _pixels(path: Path, picture: Any) -> NDArray[Any]:
+    try:
+        pixels = np.asarray(picture)
+    except DECODE_ERRORS as error:
+        raise InputError(f"{path}: damaged or cut off ({_line(error)}); get the whole file again") from error
+    return pixels.reshape(*pixels.shape[:2], -1)
+
+
+def _describe(spec: Any, info: dict[str, Any]) -> None:
+    """Put what `read_photo` asks for into a header: focal length and colour profile. Orientation is applied already."""
+    from PIL import Image
+
+    exif = Image.Exif()
+    try:
+        exif.load(info.get("exif") or b"")
+        tags = exif.get_ifd(EXIF_FOLDER)
+        for tag, name in EXIF_NUMBERS.items():
+            if tag in tags:
+                spec.attribute(name, float(tags[tag]))
+    except (*DECODE_ERRORS, struct.error, TypeError, ZeroDivisionError, KeyError):
+        pass  # a photo is one without its Exif too
+    if info.get("icc_profile"):
+        spec.attribute("ICCProfile", 1)
+        spec.attribute("ICCProfile:profile_description", _profile_name(info["icc_profile"]))
+
+
+def _profile_name(profile: bytes) -> str:
+    from io import BytesIO
+
+    from PIL import ImageCms
+
+    try:
+        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).strip()
+    except (ImageCms.PyCMSError, *DECODE_ERRORS):
+        return ""
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200] or type(error).__name__

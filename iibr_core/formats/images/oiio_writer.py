@@ -1,0 +1,41 @@
+"""Writes pictures through OpenImageIO, whole or not at all: it tells nothing of a disk that fills up while it closes a
+file, so what was written is looked at.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from iibr_core.formats.files import written_whole
+from iibr_core.formats.images.oiio_reader import complaint_of, require_whole_png
+from iibr_core.types import InputError
+
+
+def write_picture(path: Path, spec: Any, values: NDArray[Any]) -> None:
+    """Write values (H, W, C) with OpenImageIO's header. Raises InputError where that cannot be done."""
+    with written_whole(path) as temporary:
+        target = oiio.ImageOutput.create(str(temporary))
+        # Writing to an output that did not open crashes OpenImageIO.
+        if target is None or not (target.open(str(temporary), spec) and target.write_image(values) and target.close()):
+            reason = " ".join(complaint_of(oiio if target is None else target).split()) or "no reason given"
+            raise InputError(f"{path}: cannot be written ({reason}); choose another place")
+        if not _is_whole(temporary, spec.height):
+            raise InputError(f"{path}: cannot be written whole (is the disk full?); choose another place")
+
+
+def _is_whole(path: Path, height: int) -> bool:
+    """Whether a PNG has its end, and another picture its last row, which is written last."""
+    try:
+        require_whole_png(path)
+    except InputError:
+        return False
+    if path.suffix.lower() == ".png":
+        return True
+    source = oiio.ImageInput.open(str(path))
+    last_row = source and source.read_scanline(height - 1, 0)
+    complaint_of(source or oiio)  # or it is told on stderr
+    return last_row is not None

@@ -1,0 +1,1 @@
+"""Light fields on disk: one file a layout."""

@@ -1,0 +1,1 @@
+"""Disparity and depth files, in and out."""

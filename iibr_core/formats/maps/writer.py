@@ -1,0 +1,57 @@
+"""Writes disparity maps, one value per pixel, so that `raster.read_map` reads them again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from iibr_core.formats.files import written_whole
+from iibr_core.formats.images.oiio_writer import write_picture
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.types import FloatImage, InputError
+
+MAP_SUFFIXES = (".pfm", ".exr", ".npy", ".png")
+PNG_MOST = 65535
+"""The largest value of a 16-bit picture; 0 means unknown there."""
+
+
+def write_map(path: Path, values: FloatImage) -> str:
+    """Write an (H, W) map of finite values, whole or not at all; returns what is to be known of the file, or "".
+
+    `.pfm`, `.exr` and `.npy` hold the values as they are (float32). `.png` holds them from 1 to 65535: how much they
+    were multiplied and moved is what comes back. Raises InputError for other endings, names that end in `_depth` (read
+    as depth, not disparity), and where the file cannot be written.
+    """
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in MAP_SUFFIXES:
+        raise InputError(f"{path}: a disparity map can be written as {', '.join(MAP_SUFFIXES)}")
+    if path.stem.endswith("_depth"):
+        raise InputError(f"{path}: a name ending in _depth means depth, this is disparity; choose another name")
+    if kind == ".pfm":
+        write_pfm(path, values)
+    elif kind == ".npy":
+        with written_whole(path) as temporary:
+            np.save(temporary, np.asarray(values, np.float32))
+    elif kind == ".exr":
+        _write_picture(path, np.asarray(values, np.float32), "float")
+    else:
+        return _write_png(path, values)
+    return ""
+
+
+def _write_png(path: Path, values: FloatImage) -> str:
+    low, high = float(values.min()), float(values.max())
+    step = (high - low) / (PNG_MOST - 1) or 1.0
+    stored = np.rint((values.astype(np.float64) - low) / step).astype(np.uint16) + np.uint16(1)
+    _write_picture(path, stored, "uint16")
+    return f"Its values are disparity in steps of {step:.6g} px (--disparity-scale), moved by {step - low:.6g} px."
+
+
+def _write_picture(path: Path, values: FloatImage | NDArray[np.uint16], dtype: str) -> None:
+    spec = oiio.ImageSpec(values.shape[1], values.shape[0], 1, dtype)
+    spec.channelnames = ("Y",)
+    write_picture(path, spec, values[..., None])

@@ -1,0 +1,1 @@
+"""All views of a light field, and what making them takes."""

@@ -1,0 +1,181 @@
+"""ScenePlan: what this scene needs, and why. Nothing is modelled that the disparity does not ask for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+import psutil
+
+from iibr_core.generation.cost_model import NO_NEEDS, STILL_PX, Needs, Relief, needs_of, outermost_of, relief_of
+from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, Disparity, GridShape, InputError, Photo
+
+STEP_PX = 4.0
+"""For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity."""
+MOST_VIEWS_A_SIDE = 9
+ROBUST_PERCENTILES = (1.0, 99.0)
+"""A few wild disparities must not set the baseline."""
+DISPARITY_BYTES = 4
+
+
+@dataclass(frozen=True)
+class PlanOverrides:
+    """What the user decided; None leaves the choice to the plan.
+
+    depth_strength multiplies the parallax the plan chose; focus_disparity (px per view step, as given) is the plane
+    that stays still.
+    """
+
+    grid: GridShape | None = None
+    depth_strength: float = 1.0
+    focus_disparity: float | None = None
+    memory_bytes: int | None = None
+
+
+@dataclass(frozen=True)
+class ScenePlan:
+    """The choices for one scene.
+
+    grid: stored views. disparity_scale, disparity_zero: the field's disparity is (given - zero) * scale.
+    disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3
+    px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
+    of the light field, and at most while generating in the default quality, the field not counted. reasons: the same
+    in sentences. needs: time and memory of making all views, in each quality.
+    """
+
+    grid: GridShape
+    disparity_scale: float
+    disparity_zero: float
+    disparity_range_px: tuple[float, float]
+    edge_fraction: float
+    has_disocclusion: bool
+    field_bytes: int
+    peak_bytes: int
+    reasons: tuple[str, ...]
+    needs: Needs = NO_NEEDS
+
+    def field_disparity(self, given: Disparity) -> Disparity:
+        """The disparity the light field is generated from (px per view step of this plan's grid)."""
+        values = (given.values - np.float32(self.disparity_zero)) * np.float32(self.disparity_scale)
+        return Disparity(values, given.source, given.notes)
+
+
+def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverrides | None = None) -> ScenePlan:
+    """Plan for the viewer: picks the focus plane that stays still, the baseline and the grid.
+
+    Raises InputError if an override is out of range, or if a grid the user asked for does not fit into memory.
+    """
+    wanted = overrides or PlanOverrides()
+    if not np.isfinite(wanted.depth_strength):
+        raise InputError(f"--depth-strength {wanted.depth_strength}: give a finite number")
+    budget = _memory_budget(wanted.memory_bytes)
+    low, high = (float(p) for p in np.percentile(disparity.values, ROBUST_PERCENTILES))
+    zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
+    width = photo.size[1]
+    parallax_px = (
+        TOTAL_PARALLAX * width * abs(wanted.depth_strength) if high - low > 1e-6 * max(abs(low), abs(high), 1) else 0.0
+    )
+    reasons = []
+    if wanted.grid is not None:
+        grid = wanted.grid
+        reasons.append(f"{grid.columns} x {grid.rows} views, as asked.")
+    else:
+        most_moved = 0.5 * parallax_px / (high - low) if parallax_px else 0.0
+        relief = relief_of(disparity.values - np.float32(zero), most_moved)
+        grid = _grid_for(parallax_px, relief, _view_bytes(photo), budget)
+        reasons.append(_grid_reason(grid, parallax_px))
+    steps = max(grid.rows, grid.columns) - 1
+    scale = parallax_px / steps / (high - low) * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
+    if parallax_px:
+        reasons.append(
+            f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
+        )
+    return _finished(photo, disparity, grid, float(scale), zero, budget, reasons)
+
+
+def plan_literal(photo: Photo, disparity: Disparity, grid: GridShape, memory_bytes: int | None = None) -> ScenePlan:
+    """Plan for `iibr generate --grid`: the given disparity is taken as it is, views at integer steps.
+
+    Raises InputError if the grid has no view or generating it does not fit into memory.
+    """
+    reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
+    return _finished(photo, disparity, grid, 1.0, 0.0, _memory_budget(memory_bytes), reasons)
+
+
+def _memory_budget(memory_bytes: int | None) -> int:
+    budget = psutil.virtual_memory().total // 4 if memory_bytes is None else memory_bytes
+    if budget <= 0:
+        raise InputError(f"--memory {memory_bytes}: give a positive number of bytes")
+    return budget
+
+
+def _view_bytes(photo: Photo) -> int:
+    height, width = photo.size
+    return height * width * (3 * (2 if photo.is_hdr else 1) + DISPARITY_BYTES)
+
+
+def _grid_for(parallax_px: float, relief: Relief, view_bytes: int, budget: int) -> GridShape:
+    """The smallest odd grid whose neighbouring views differ by at most STEP_PX, as far as memory allows."""
+    if parallax_px < STILL_PX:
+        return GridShape(1, 1)
+    side = min(max(ceil(parallax_px / STEP_PX) // 2 * 2 + 1, 3), MOST_VIEWS_A_SIDE)
+    beside = needs_of(relief, GridShape(side, side)).of(DEFAULT_QUALITY).peak_bytes
+    while side > 3 and side * side * view_bytes > budget - beside:
+        side -= 2
+    return GridShape(side, side)
+
+
+def _grid_reason(grid: GridShape, parallax_px: float) -> str:
+    if grid == (1, 1):
+        return "One view: the disparity is the same everywhere, so every viewpoint shows the photo."
+    step = parallax_px / (grid.columns - 1)
+    return f"{grid.columns} x {grid.rows} views: neighbours differ by {step:.1f} px, the renderer fills in between."
+
+
+def _finished(
+    photo: Photo, disparity: Disparity, grid: GridShape, scale: float, zero: float, budget: int, reasons: list[str]
+) -> ScenePlan:
+    """The plan with what follows from grid and scale."""
+    if grid.rows < 1 or grid.columns < 1:
+        raise InputError(f"--grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
+    field = (disparity.values - np.float32(zero)) * np.float32(scale)
+    relief = relief_of(field, outermost_of(grid))
+    needs = needs_of(relief, grid)
+    field_bytes, peak_bytes = grid.rows * grid.columns * _view_bytes(photo), needs.of(DEFAULT_QUALITY).peak_bytes
+    if peak_bytes > budget:
+        raise InputError(
+            f"generating from {photo.name} takes {peak_bytes / 2**20:.0f} MiB, the budget is {budget / 2**20:.0f} MiB:"
+            " raise --memory or lower --max-pixels"
+        )
+    return ScenePlan(
+        grid,
+        scale,
+        zero,
+        (float(field.min()), float(field.max())),
+        relief.edge_share,
+        relief.has_disocclusion,
+        field_bytes,
+        peak_bytes,
+        (*reasons, *_cost_reasons(relief, needs, field_bytes)),
+        needs,
+    )
+
+
+def _cost_reasons(relief: Relief, needs: Needs, field_bytes: int) -> list[str]:
+    inpainted = (
+        "holes behind them are inpainted."
+        if relief.has_disocclusion
+        else "nothing is disoccluded, so nothing is inpainted."
+    )
+    memory = f"{field_bytes / 2**20:.0f} MiB for the views, {needs.of(DEFAULT_QUALITY).peak_bytes / 2**20:.0f} MiB"
+    return [
+        f"{relief.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}",
+        f"Making all views takes about {_seconds(needs.fast.seconds)} in fast, {_seconds(needs.balanced.seconds)} in"
+        f" balanced and {_seconds(needs.exact.seconds)} in exact quality.",
+        f"Memory: {memory} to make them.",
+    ]
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"

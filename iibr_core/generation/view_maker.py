@@ -1,0 +1,101 @@
+"""Views at any viewpoints around a given photo, made as `generate` makes a grid's: what evaluation judges."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from types import TracebackType
+
+import numpy as np
+
+from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.generation.light_field import transformer_for
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
+from iibr_core.types import FloatImage, Quality, ViewOffset
+
+
+def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
+    """Corners and side middles of the box around all viewpoints and the photo's own, in the order `generate` takes."""
+    every = [ViewOffset(0.0, 0.0), *offsets]
+    top, bottom = min(at.t for at in every), max(at.t for at in every)
+    left, right = min(at.s for at in every), max(at.s for at in every)
+    corners = [(top, left), (bottom, right), (top, right), (bottom, left)]
+    sides = [(0.0, left), (0.0, right), (top, 0.0), (bottom, 0.0)]
+    return [ViewOffset(*at) for at in dict.fromkeys(corners + sides) if at != (0.0, 0.0)]
+
+
+class ViewMaker:
+    """Makes views of one photo with one disparity map, in several qualities from one ray set; a context manager.
+
+    Raises Cancelled once should_stop is true, InputError where the trained weights cannot be read.
+    """
+
+    def __init__(
+        self,
+        photo: FloatImage,
+        disparity: FloatImage,
+        offsets: Iterable[ViewOffset],
+        qualities: Iterable[Quality],
+        should_stop: Callable[[], bool] = lambda: False,
+        slots: int = 5,
+        hypotheses: int = HYPOTHESES,
+    ) -> None:
+        """photo: (H, W, 3) sRGB-encoded. disparity: (H, W), px per view step. offsets: all that will be asked for.
+
+        slots, hypotheses: see ViewSynthesis.
+        """
+        self._should_stop, self._slots = should_stop, slots
+        self.outer = outer_views(offsets)
+        farthest = max([1.0, *(abs(part) for at in self.outer for part in at)])
+        self._rays = rays_of_photo(photo, disparity, farthest, len(self.outer))
+        self._first: dict[ViewOffset, tuple[RenderedView, float]] = {}
+        self._syntheses = {
+            quality: ViewSynthesis(
+                should_stop, transformer_for(quality), quality == "exact", slots, hypotheses=hypotheses
+            )
+            for quality in qualities
+        }
+
+    def __enter__(self) -> ViewMaker:
+        """Complete the ray set by what the outer views disocclude."""
+        try:
+            with ViewSynthesis(self._should_stop, slots=self._slots) as synthesis:
+                for offset in self.outer:
+                    start = time.perf_counter()
+                    view = synthesis.render(self._rays, offset)
+                    if view.occluded.any():
+                        self._rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
+                    self._first[offset] = view, 1e3 * (time.perf_counter() - start)
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for synthesis in self._syntheses.values():
+            synthesis.__exit__(kind, error, trace)
+
+    def view(self, quality: Quality, offset: ViewOffset) -> RenderedView:
+        """The view at an offset; of fast quality the outer ones are those that completed the ray set."""
+        return self.timed_view(quality, offset)[0]
+
+    def timed_view(self, quality: Quality, offset: ViewOffset) -> tuple[RenderedView, float]:
+        """The same, and the milliseconds it took on all cores."""
+        if quality == "fast" and offset in self._first:
+            return self._first[offset]
+        start = time.perf_counter()
+        view = self._syntheses[quality].render(self._rays, offset)
+        return view, 1e3 * (time.perf_counter() - start)
+
+    def views(self, quality: Quality, offsets: Iterable[ViewOffset]) -> Iterator[RenderedView]:
+        """Views at these offsets, in their order, several at a time, as `generate` makes them."""
+        synthesis = self._syntheses[quality]
+        return synthesis.side_by_side(lambda offset: synthesis.render_alone(self._rays, offset), offsets)
+
+
+def as_stored(colors: FloatImage) -> FloatImage:
+    """Colours as the light field keeps them: rounded to bytes, 1 = white."""
+    return encoded_from_stored(stored_from_encoded(colors, False))

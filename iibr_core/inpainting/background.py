@@ -1,0 +1,182 @@
+"""Fills occluded rays with what may lie behind: continued surfaces that the photo could not see there.
+
+A surface continued into a hole is possible only where something nearer hid it from the photo, or where it left the
+frame; else the photo would have shown it. That one test rules out the foreground beside a disocclusion, and at the
+frame's border it picks the surface that really leaves the frame, without any threshold on depth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.tiling import ShouldStop, go_on, in_bands, in_pieces, never
+from iibr_core.types import FloatImage, ViewOffset
+
+DIRECTIONS = np.array(
+    [
+        (1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1),
+        (2, 1), (-2, 1), (2, -1), (-2, -1), (1, 2), (-1, 2), (1, -2), (-1, -2),
+    ]
+)  # fmt: skip
+SMOOTH_PX = 2
+MOST_PIECE_PIXELS = 1 << 15
+"""Hole pixels that are filled between two questions whether to stop."""
+HIDDEN_PX = 0.5
+"""Something hides a surface if it lands at least this far from it."""
+
+
+def fill_background(
+    colors: FloatImage,
+    disparity: FloatImage,
+    hole: NDArray[np.bool_],
+    photo_disparity: FloatImage,
+    offset: ViewOffset,
+    should_stop: ShouldStop = never,
+    threads: int = 1,
+) -> None:
+    """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
+
+    photo_disparity: the centre view's. Every hole pixel is a mean of the nearest known pixels in sixteen directions
+    that are possible there, weighted by 1 / distance, then smoothed within its surface. A view that is all hole stays
+    as it is. Raises Cancelled once should_stop is true.
+    """
+    height, width = hole.shape
+    found = in_bands(
+        lambda first, last: first * width + np.flatnonzero(hole[first:last]), (height, width), should_stop, threads
+    )
+    pixels = np.concatenate(found)
+    known = _known_around(hole, pixels, should_stop, threads)
+    smoothed = np.empty((len(pixels), 3), np.float32)
+    tolerance = HIDDEN_PX / max(abs(offset.s), abs(offset.t))
+    parts = [slice(first, first + MOST_PIECE_PIXELS) for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
+
+    def fill(part: slice) -> None:
+        _fill(colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t)
+
+    def smooth(part: slice) -> None:
+        _smooth(colors, disparity, hole, pixels[part], tolerance, smoothed[part])
+
+    def put(part: slice) -> None:
+        _put(smoothed[part], pixels[part], colors)
+
+    for step in (fill, smooth, put):
+        in_pieces(step, parts, should_stop, threads)
+
+
+def _known_around(
+    hole: NDArray[np.bool_], pixels: NDArray[np.int64], should_stop: ShouldStop, threads: int
+) -> NDArray[np.int64]:
+    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none.
+
+    The second known pixel where there are two (the first may be mixed with what hides the hole).
+    """
+    go_on(should_stop)
+    number = np.empty(hole.shape, np.int32)
+    _number(pixels, number)
+    known = np.empty((len(pixels), len(DIRECTIONS)), np.int64)
+
+    def look(k: int) -> None:
+        _known_towards(hole, pixels, number, *DIRECTIONS[k], known[:, k])
+
+    in_pieces(look, range(len(DIRECTIONS)), should_stop, threads)
+    return known
+
+
+@kernel
+def _number(pixels, number):  # type: ignore[no-untyped-def]
+    """Tell each hole pixel which one it is."""
+    width = number.shape[1]
+    for i in range(len(pixels)):
+        number[pixels[i] // width, pixels[i] % width] = i
+
+
+@kernel
+def _known_towards(hole, pixels, number, step_x, step_y, known):  # type: ignore[no-untyped-def]
+    """What `_known_around` returns, for one direction.
+
+    pixels: flat indices of the hole pixels, ascending. Holes pass on what the next pixel in that direction found, so
+    the cost does not depend on the holes' size.
+    """
+    height, width = hole.shape
+    total = len(pixels)
+    downwards = step_y < 0 or (step_y == 0 and step_x < 0)
+    for n in range(total):
+        i = n if downwards else total - 1 - n
+        y, x = pixels[i] // width + step_y, pixels[i] % width + step_x
+        known[i] = -1
+        if not (0 <= x < width and 0 <= y < height):
+            continue
+        if hole[y, x]:
+            known[i] = known[number[y, x]]
+            continue
+        beyond_x, beyond_y = x + step_x, y + step_y
+        if 0 <= beyond_x < width and 0 <= beyond_y < height and not hole[beyond_y, beyond_x]:
+            x, y = beyond_x, beyond_y
+        known[i] = y * width + x
+
+
+@kernel
+def _fill(colors, disparity, pixels, known, photo_disparity, s, t):  # type: ignore[no-untyped-def]
+    height, width = disparity.shape
+    directions = known.shape[1]
+    possible = np.empty(directions, np.bool_)
+    parallax = max(abs(s), abs(t))
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        farthest = np.inf
+        any_possible = False
+        for k in range(directions):
+            possible[k] = False
+            if known[i, k] < 0:
+                continue
+            d = disparity[known[i, k] // width, known[i, k] % width]
+            farthest = min(farthest, d)
+            column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
+            inside = 0 <= column < width and 0 <= row < height
+            possible[k] = not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX
+            any_possible = any_possible or possible[k]
+        total = r = g = b = sum_d = 0.0
+        for k in range(directions):
+            if known[i, k] < 0:
+                continue
+            known_y, known_x = known[i, k] // width, known[i, k] % width
+            d = disparity[known_y, known_x]
+            # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
+            if not (possible[k] or (not any_possible and d <= farthest)):
+                continue
+            w = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
+            total += w
+            r += w * colors[known_y, known_x, 0]
+            g += w * colors[known_y, known_x, 1]
+            b += w * colors[known_y, known_x, 2]
+            sum_d += w * d
+        if total > 0:
+            colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
+            disparity[y, x] = sum_d / total
+
+
+@kernel
+def _smooth(colors, disparity, hole, pixels, tolerance, smoothed):  # type: ignore[no-untyped-def]
+    """Average what was filled over SMOOTH_PX each way on the same surface: neighbours took their colours from afar."""
+    height, width = disparity.shape
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        count = r = g = b = 0.0
+        for v in range(max(y - SMOOTH_PX, 0), min(y + SMOOTH_PX + 1, height)):
+            for u in range(max(x - SMOOTH_PX, 0), min(x + SMOOTH_PX + 1, width)):
+                if hole[v, u] and abs(disparity[v, u] - disparity[y, x]) <= tolerance:
+                    count += 1.0
+                    r += colors[v, u, 0]
+                    g += colors[v, u, 1]
+                    b += colors[v, u, 2]
+        smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = r / count, g / count, b / count
+
+
+@kernel
+def _put(smoothed, pixels, colors):  # type: ignore[no-untyped-def]
+    width = colors.shape[1]
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = smoothed[i, 0], smoothed[i, 1], smoothed[i, 2]

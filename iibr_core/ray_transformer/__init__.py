@@ -1,0 +1,1 @@
+"""The network that weighs rays which several surfaces may explain."""

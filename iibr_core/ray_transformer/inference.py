@@ -1,0 +1,118 @@
+"""Runs a trained ray transformer: the arithmetic of `ray_transformer.RayTransformer` as one loop, without torch.
+
+Importing torch takes longer than a light field; for networks this small a compiled loop is as fast.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.formats.weights import read_weights, require_shapes
+from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE, Contested
+from iibr_core.runtime.jit import kernel
+from iibr_core.types import FloatImage
+
+WIDTH = 16
+LEAST_PRIOR = 0.02
+"""What the closed form gives nothing may still win."""
+RAYS_A_BLOCK = 64
+"""Rays side by side in vector registers; few enough for the first cache."""
+SHAPES = {
+    "embed.0.weight": (WIDTH, FEATURES),
+    "embed.0.bias": (WIDTH,),
+    "embed.2.weight": (WIDTH, WIDTH),
+    "embed.2.bias": (WIDTH,),
+    "key.weight": (WIDTH, WIDTH),
+    "key.bias": (WIDTH,),
+    "query.weight": (WIDTH, 2 * WIDTH),
+    "score.weight": (1, WIDTH),
+}
+
+
+class TrainedWeights:
+    """The weights of a RayTransformer from a file, called with contested rays. Safe to call from several threads."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises InputError for a file that is not such weights."""
+        tensors, self.metadata = read_weights(path)
+        require_shapes(path, tensors, SHAPES)
+        self._layers = tuple(np.ascontiguousarray(tensors[name].T) for name in SHAPES)
+
+    def __call__(self, contested: Contested) -> FloatImage:
+        """Weights (N, K), 0 for unused hypotheses; rows sum to 1."""
+        weights = np.zeros(contested.mask.shape, np.float32)
+        _weigh(contested.features, contested.mask, *self._layers, weights)
+        return weights
+
+
+@kernel
+def _add_product(inputs, w, outputs, lanes):  # type: ignore[no-untyped-def]
+    """Add to outputs (J, L) w (I, J) transposed times inputs (I, L), four at a time; I is a multiple of 4."""
+    for j in range(w.shape[1]):
+        out = outputs[j]
+        for i in range(0, w.shape[0], 4):
+            a, b, c, d = w[i, j], w[i + 1, j], w[i + 2, j], w[i + 3, j]
+            x, y, z, u = inputs[i], inputs[i + 1], inputs[i + 2], inputs[i + 3]
+            for lane in range(lanes):
+                out[lane] += a * x[lane] + b * y[lane] + c * z[lane] + d * u[lane]
+
+
+@kernel
+def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weights):  # type: ignore[no-untyped-def]
+    """Arrays are (unit, lane). The hypotheses of a block's rays lie one after the other in lanes [start, end)."""
+    rays, most = mask.shape
+    inputs = np.empty((features.shape[2], most * RAYS_A_BLOCK), np.float32)
+    hidden = np.empty((WIDTH, most * RAYS_A_BLOCK), np.float32)
+    embedded = np.empty((WIDTH, most * RAYS_A_BLOCK), np.float32)
+    pooled = np.empty((2 * WIDTH, RAYS_A_BLOCK), np.float32)
+    query = np.empty((WIDTH, RAYS_A_BLOCK), np.float32)
+    score = np.empty(most * RAYS_A_BLOCK, np.float32)
+    start = np.zeros(RAYS_A_BLOCK + 1, np.int64)
+    zero = np.float32(0.0)
+    for first in range(0, rays, RAYS_A_BLOCK):
+        count = min(RAYS_A_BLOCK, rays - first)
+        for r in range(count):
+            used = mask[first + r].sum()
+            start[r + 1] = start[r] + used
+            for a in range(used):
+                for i in range(len(inputs)):
+                    inputs[i, start[r] + a] = features[first + r, a, i]
+        lanes = start[count]
+        for j in range(WIDTH):
+            hidden[j, :lanes], embedded[j, :lanes], query[j] = b1[j], b2[j], b_key[j]
+        _add_product(inputs, w1, hidden, lanes)
+        for j in range(WIDTH):
+            for lane in range(lanes):
+                hidden[j, lane] = max(hidden[j, lane], zero)
+        _add_product(hidden, w2, embedded, lanes)
+        for j in range(WIDTH):
+            for r in range(count):
+                total = peak = zero
+                for lane in range(start[r], start[r + 1]):
+                    value = max(embedded[j, lane], zero)
+                    embedded[j, lane] = value
+                    total, peak = total + value, max(peak, value)
+                pooled[j, r], pooled[WIDTH + j, r] = total / np.float32(max(start[r + 1] - start[r], 1)), peak
+        _add_product(pooled, w_query, query, count)
+        for j in range(WIDTH):
+            for r in range(count):
+                hidden[j, start[r] : start[r + 1]] = query[j, r]
+        _add_product(embedded, w_key, hidden, lanes)
+        score[:] = zero
+        for j in range(WIDTH):
+            for lane in range(lanes):
+                score[lane] += max(hidden[j, lane], zero) * w_score[j, 0]
+        for r in range(count):
+            highest, total = np.float32(-np.inf), zero
+            for lane in range(start[r], start[r + 1]):
+                score[lane] += np.float32(
+                    np.log(min(max(inputs[SHARE, lane], zero), np.float32(1.0)) + np.float32(LEAST_PRIOR))
+                )
+                highest = max(highest, score[lane])
+            for lane in range(start[r], start[r + 1]):
+                weights[first + r, lane - start[r]] = np.exp(score[lane] - highest)
+                total += weights[first + r, lane - start[r]]
+            for a in range(start[r + 1] - start[r]):
+                weights[first + r, a] /= total

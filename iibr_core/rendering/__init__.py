@@ -1,0 +1,1 @@
+"""One view from the ray set."""

@@ -1,0 +1,354 @@
+"""Contested rays: what they show lies near a depth edge of its source, so that someone has to decide what it is.
+
+For each of them K hypotheses are laid out: surfaces that land within a few pixels, as different from each other as
+possible. A hypothesis says "this ray shows the source ray that disparity d leads to"; its features say how well that
+agrees with the disparity that the source ray really has. This is what a trained T decides on; colours are never among
+the features.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.rendering.candidates import Candidates
+from iibr_core.rendering.ray_set import CELL_PX, RaySet
+from iibr_core.rendering.resampling import cubic, look_up
+from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
+from iibr_core.types import FloatImage, ViewOffset
+
+HYPOTHESES = 6
+"""K: the paper's 5 surfaces and the plain look-up. More cost time and gain little (docs/transformer.md)."""
+PLAIN = 128
+"""Added to the source of the hypothesis that the ray shows the front-most surface as the photo mixed it at its edge."""
+REACH_PX = 6
+"""Surfaces that land within this many pixels, each way, are considered."""
+AROUND = np.array(
+    [
+        (0, 1), (0, -1), (1, 0), (-1, 0), (2, 2), (2, -2), (-2, 2), (-2, -2), (0, 3), (0, -3), (3, 0), (-3, 0),
+        (4, 4), (4, -4), (-4, 4), (-4, -4), (0, 6), (0, -6), (6, 0), (-6, 0),
+    ]
+)  # fmt: skip
+"""Where, in pixels down and right, the nearest first: this is enough to meet every surface that is not a sliver."""
+AROUND_DISTANCE = np.hypot(*AROUND.T)
+AROUND_SHARP = 12
+SOFT = 0.5
+"""Where depth edges are softer than this, all of AROUND is looked at, else the first AROUND_SHARP."""
+CONTESTED_PX = 1.5
+"""A step of disparity that moves its sides apart by less than this does not contest a ray."""
+OWN_LANDING_PX = 0.75
+"""What lands near by at less than this from a hypothesis is of its surface."""
+CONTESTED_AROUND_PX = 1.5
+"""Where edges are soft there are no steps: there a surface within REACH_PX contests a ray if it is this far off."""
+DISTINCT_PX = 0.5
+"""Hypotheses closer than this are one; a ray whose surfaces all are has nothing to decide."""
+LEAST_WEIGHT = 0.02
+LEAST_VOTE = 0.004
+"""Weights below this change no colour by a visible step."""
+SAME_COLOR = 1e-5
+"""Votes no farther apart than this need no mean: so a flat scene's views are the photo to the bit."""
+INPAINTED_APART_PX = 100.0
+"""What is inpainted and what the photo shows are different hypotheses, however close their disparities."""
+PROFILE_PX = (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)
+"""Where the disparity around a source ray is sampled, along the parallax and across it."""
+MOST_PX = 1e4
+SHARE = 6
+"""The feature that is the closed form's weight."""
+PROFILE = 15
+FEATURES = PROFILE + 2 * len(PROFILE_PX) + 1
+"""The last is 0: a multiple of four suits the arithmetic."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contested:
+    """Contested rays (N) of one view and their hypotheses (K).
+
+    offset: of the view. pixel (N, 2): (row, column) in the view. mask (N, K): hypotheses in use, the first always.
+    disparity (N, K). source (N, K). features (N, K, FEATURES).
+    """
+
+    offset: ViewOffset
+    pixel: NDArray[np.int64]
+    mask: NDArray[np.bool_]
+    disparity: FloatImage
+    source: NDArray[np.uint8]
+    features: FloatImage
+
+
+def find_contested(
+    rays: RaySet,
+    candidates: Candidates,
+    weights: FloatImage,
+    shown: tuple[FloatImage, NDArray[np.uint8]],
+    rows: tuple[int, int],
+    every: bool = False,
+    hypotheses: int = HYPOTHESES,
+) -> Contested:
+    """The contested rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
+
+    shown: disparity and source (N, W) of the candidates that `lookup.heaviest` gives. every: take all rays
+    near which anything lands, contested or not. hypotheses: K, at least 2.
+    """
+    first, last = rows
+    shape = (last - first) * candidates.count.shape[1], hypotheses
+    pixel, number = np.empty((shape[0], 2), np.int64), np.zeros(shape[0], np.int64)
+    disparity, source = np.empty(shape, np.float32), np.empty(shape, np.uint8)
+    share, nearest = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    offsets, _, surfaces, coverage, _ = rays.arrays
+    around = rays.surroundings
+    from_sources = np.array(candidates.offset) - offsets
+    parallax = max(*map(abs, candidates.offset), 1e-9)
+    is_soft = around.softness > SOFT
+    looks = len(AROUND) if is_soft else AROUND_SHARP
+    certain = candidates.smooth & (not every and not is_soft)
+    count = _lay_out(
+        certain, candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step,
+        from_sources, rays.photo_images, parallax, is_soft, looks, candidates.first_row, first, last, every,
+        pixel, number, disparity, source, share, nearest,
+    )  # fmt: skip
+    pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
+    features = np.zeros((count, hypotheses, FEATURES), np.float32)
+    _describe(
+        surfaces, coverage, around.low, around.high, around.step, around.softness, from_sources, rays.photo_images,
+        candidates.count, weights, candidates.first_row, parallax,
+        pixel, number, disparity, source, share[:count], nearest[:count], features,
+    )  # fmt: skip
+    pixel[:, 0] += candidates.first_row
+    mask = np.arange(hypotheses) < number[:, None]
+    return Contested(candidates.offset, pixel, mask, disparity, source, features)
+
+
+def votes(rays: RaySet, contested: Contested) -> FloatImage:
+    """What each hypothesis would show: colours (N, K, 3), sRGB-encoded; black in unused slots."""
+    colors = np.zeros((*contested.mask.shape, 3), np.float32)
+    one = np.eye(contested.mask.shape[1], dtype=np.float32)
+    for a in range(len(one)):
+        weights = np.where(contested.mask, one[a], 0.0).astype(np.float32)
+        colors[:, a] = np.where(contested.mask[:, a, None], decide(rays, contested, weights)[0], 0.0)
+    return colors
+
+
+def decide(rays: RaySet, contested: Contested, weights: FloatImage) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
+    """Colours (N, 3), disparity (N) and source (N) of contested rays for weights (N, K) whose rows sum to 1.
+
+    Colours are summed in linear light; disparity and source are the heaviest hypothesis's.
+    """
+    colors = np.zeros((len(weights), 3), np.float32)
+    offsets, images, surfaces, *_ = rays.arrays
+    _blend(
+        images, surfaces, np.array(contested.offset) - offsets,
+        contested.pixel, contested.disparity, contested.source, weights, colors,
+    )  # fmt: skip
+    heaviest = weights.argmax(axis=1)[:, None]
+    return (
+        colors,
+        np.take_along_axis(contested.disparity, heaviest, axis=1)[:, 0],
+        np.take_along_axis(contested.source, heaviest, axis=1)[:, 0] % PLAIN,
+    )
+
+
+@kernel
+def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors):  # type: ignore[no-untyped-def]
+    _, height, width = surfaces.shape
+    for n in range(len(weights)):
+        total = red = green = blue = apart = 0.0
+        first_r = first_g = first_b = 0.0
+        for a in range(weights.shape[1]):
+            w = weights[n, a]
+            if not w > LEAST_VOTE:
+                continue
+            d, k = disparity[n, a], np.int64(source[n, a] % PLAIN)
+            t, s = offsets[k, 0], offsets[k, 1]
+            x = min(max(pixel[n, 1] + d * s, -0.5), width - 0.5)
+            y = min(max(pixel[n, 0] + d * t, -0.5), height - 0.5)
+            if source[n, a] >= PLAIN:
+                r, g, b = cubic(images, k, x, y)
+            else:
+                r, g, b = look_up(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
+            if total == 0.0:
+                first_r, first_g, first_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
+            apart = max(apart, abs(r - first_r), abs(g - first_g), abs(b - first_b))
+            total += w
+            red += w * linear_scalar(r)
+            green += w * linear_scalar(g)
+            blue += w * linear_scalar(b)
+        colors[n, 0], colors[n, 1], colors[n, 2] = first_r, first_g, first_b
+        if apart > SAME_COLOR:
+            colors[n, 0] = srgb_scalar(red / total)
+            colors[n, 1] = srgb_scalar(green / total)
+            colors[n, 2] = srgb_scalar(blue / total)
+
+
+@kernel
+def _lay_out(  # type: ignore[no-untyped-def]
+    certain, count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
+    photo_images, parallax, is_soft, looks, first_row, first, last, every,
+    pixel, number, disparity, source, share, nearest,
+):  # fmt: skip
+    """Select contested rays, none in certain cells; pick the surfaces on each, then again and again the one around it
+    farthest from those. nearest: how many pixels away each surface lands.
+    """
+    _, rows, width = surface.shape
+    height = step.shape[1]
+    near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
+    found = 0
+    for y in range(first, last):
+        certain_cells = certain[(y + first_row % CELL_PX) // CELL_PX]
+        for x in range(width):
+            if certain_cells[x // CELL_PX]:
+                continue
+            heavy = 0
+            covered = 0.0
+            for k in range(np.int64(count[y, x])):
+                heavy += weights[k, y, x] > LEAST_WEIGHT
+                covered += weights[k, y, x]
+            is_contested = every or heavy != 1 or covered < 1.0 - LEAST_WEIGHT
+            if not is_contested and is_soft:
+                for i in range(looks):
+                    v, u = y + AROUND[i, 0], x + AROUND[i, 1]
+                    if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
+                        apart = abs(shown_disparity[v, u] - shown_disparity[y, x]) * parallax
+                        is_contested |= apart > CONTESTED_AROUND_PX
+            elif not is_contested:
+                d, origin_here = shown_disparity[y, x], np.int64(shown_source[y, x])
+                t, s = offsets[origin_here, 0], offsets[origin_here, 1]
+                u = min(max(nearest_pixel(x + d * s), 0), width - 1)
+                v = min(max(nearest_pixel(first_row + y + d * t), 0), height - 1)
+                is_contested = step[origin_here, v, u] * parallax > CONTESTED_PX
+            if not is_contested:
+                continue
+            picked = 0
+            for k in range(np.int64(count[y, x])):
+                if weights[k, y, x] > LEAST_WEIGHT and picked < disparity.shape[1] - 1:
+                    disparity[found, picked], source[found, picked] = surface[k, y, x], origin[k, y, x]
+                    share[found, picked] = weights[k, y, x]
+                    picked += 1
+            n = 0
+            for i in range(looks):
+                v, u = y + AROUND[i, 0], x + AROUND[i, 1]
+                if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
+                    continue
+                d, image = shown_disparity[v, u], np.int64(shown_source[v, u])
+                source_x, source_y = x + d * offsets[image, 1], first_row + y + d * offsets[image, 0]
+                is_inside = -0.5 <= source_x <= width - 0.5 and -0.5 <= source_y <= height - 0.5
+                if is_inside or image >= photo_images:  # the photo shows nothing beyond its frame
+                    near_d[n], near_k[n], near_px[n] = d, image, AROUND_DISTANCE[i]
+                    n += 1
+            if picked == 0 and n > 0:
+                front = np.argmax(near_d[:n])
+                disparity[found, 0], source[found, 0], share[found, 0] = near_d[front], near_k[front], 0.0
+                picked = 1
+            own_picked = picked
+            while 0 < picked < disparity.shape[1] - 1:
+                best, best_distance = -1, DISTINCT_PX
+                for i in range(n):
+                    distance = np.inf
+                    for j in range(picked):
+                        apart = abs(near_d[i] - disparity[found, j]) * parallax
+                        if (near_k[i] >= photo_images) != (source[found, j] >= photo_images):
+                            apart += INPAINTED_APART_PX
+                        distance = min(distance, apart)
+                    if distance > best_distance:
+                        best, best_distance = i, distance
+                if best < 0:
+                    break
+                disparity[found, picked], source[found, picked] = near_d[best], near_k[best]
+                share[found, picked] = 0.0
+                picked += 1
+            apart = 0.0
+            for j in range(picked):
+                apart = max(apart, abs(disparity[found, j] - disparity[found, 0]) * parallax)
+            if picked > 0 and (every or apart > DISTINCT_PX):
+                mixed = 0
+                for j in range(own_picked):
+                    if disparity[found, j] > disparity[found, mixed]:
+                        mixed = j
+                disparity[found, picked], source[found, picked] = disparity[found, mixed], source[found, mixed] + PLAIN
+                share[found, picked] = 0.0
+                picked += 1
+                for j in range(picked):
+                    nearest[found, j] = 0.0 if share[found, j] > 0 else REACH_PX + 1.0
+                    if share[found, j] > 0:
+                        continue
+                    for i in range(n):
+                        if abs(near_d[i] - disparity[found, j]) * parallax < OWN_LANDING_PX:
+                            nearest[found, j] = near_px[i]
+                            break
+                pixel[found, 0], pixel[found, 1], number[found] = y, x, picked
+                found += 1
+    return found
+
+
+@kernel
+def _squashed(px):  # type: ignore[no-untyped-def]
+    """Pixels on a scale of -4..4 where small differences count most; 0 where there is no difference to tell."""
+    if px != px:
+        return 0.0
+    px = min(max(px, -MOST_PX), MOST_PX)
+    return px / (1.0 + 0.25 * abs(px))
+
+
+@kernel
+def _describe(  # type: ignore[no-untyped-def]
+    surfaces, coverage, low, high, step, softness, offsets, photo_images,
+    count, weights, first_row, parallax, pixel, number, disparity, source, share, nearest, features,
+):  # fmt: skip
+    _, height, width = surfaces.shape
+    steps = np.empty_like(offsets)
+    for image in range(len(offsets)):
+        steps[image] = offsets[image] / max(np.hypot(offsets[image, 0], offsets[image, 1]), 1e-9)
+    log_parallax = np.log1p(parallax)
+    for n in range(len(pixel)):
+        y, x = pixel[n]
+        front = back = disparity[n, 0]
+        for a in range(number[n]):
+            front, back = max(front, disparity[n, a]), min(back, disparity[n, a])
+        uncovered = 1.0
+        for slot in range(np.int64(count[y, x])):
+            uncovered -= weights[slot, y, x]
+        for a in range(number[n]):
+            d, k = disparity[n, a], np.int64(source[n, a]) % np.int64(PLAIN)
+            t, s = offsets[k, 0], offsets[k, 1]
+            source_x = min(max(x + d * s, -0.5), width - 0.5)
+            source_y = min(max(first_row + y + d * t, -0.5), height - 0.5)
+
+            # The source ray's own disparity, bilinear.
+            column, row = floor(source_x), floor(source_y)
+            fx, fy = source_x - column, source_y - row
+            own = total = 0.0
+            for j in range(2):
+                for i in range(2):
+                    v, u = min(max(row + j, 0), height - 1), min(max(column + i, 0), width - 1)
+                    w = (fx if i else 1.0 - fx) * (fy if j else 1.0 - fy)
+                    if surfaces[k, v, u] == surfaces[k, v, u]:
+                        own, total = own + w * surfaces[k, v, u], total + w
+            own = own / total if total > 0 else d
+
+            for i in range(len(PROFILE_PX)):
+                step_x, step_y = PROFILE_PX[i] * steps[k, 1], PROFILE_PX[i] * steps[k, 0]
+                for j in range(2):
+                    v = np.uint64(min(max(nearest_pixel(source_y + (step_x if j else step_y)), 0), height - 1))
+                    u = np.uint64(min(max(nearest_pixel(source_x + (-step_y if j else step_x)), 0), width - 1))
+                    features[n, a, PROFILE + 2 * i + j] = _squashed((surfaces[k, v, u] - d) * parallax)
+
+            v, u = min(max(nearest_pixel(source_y), 0), height - 1), min(max(nearest_pixel(source_x), 0), width - 1)
+            around_low, around_high = min(low[k, v, u], d), max(high[k, v, u], d)
+            out = features[n, a]
+            out[0] = _squashed((d - own) * parallax)
+            out[1] = _squashed((around_high - d) * parallax)
+            out[2] = _squashed((d - around_low) * parallax)
+            out[3] = (own - around_low) / max(around_high - around_low, 1e-6)
+            out[4] = _squashed((front - d) * parallax)
+            out[5] = _squashed((d - back) * parallax)
+            out[SHARE] = share[n, a]
+            out[7] = nearest[n, a] / (REACH_PX + 1.0)
+            out[8] = 1.0 if k >= photo_images else 0.0
+            out[9] = log_parallax
+            out[10] = coverage[k, v, u]
+            out[11] = softness
+            out[12] = max(uncovered, 0.0)
+            out[14] = 1.0 if source[n, a] >= PLAIN else 0.0
+            out[13] = _squashed(step[k, v, u] * parallax)

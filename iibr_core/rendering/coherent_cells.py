@@ -1,0 +1,158 @@
+"""Cells of target rays that one smooth surface of the photo fills: most of most views.
+
+Nobody has to wait for landings there: each ray is followed back to the point of the photo that it shows. This gives
+what landing gives, at a fraction of its cost.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.rendering.ray_set import CELL_PX, Cells, RaySet
+from iibr_core.runtime.jit import kernel
+from iibr_core.types import FloatImage, ViewOffset
+
+REACH_PX = 1.5
+"""A ray that lands farther than this from a pixel's centre does not touch the pixel."""
+ONE_SURFACE_PX = 1.0
+"""What lands on a cell with more parallax between its parts is not taken for one surface."""
+IN_FRONT_PX = 0.5
+"""An inpainted ray shows before a surface of the photo only if it is this far in front of it."""
+SETTLED_PX = 0.002
+"""A ray is followed until it moves by less than this."""
+MOST_ROUNDS = 30
+"""On a smooth surface each round comes at least a fifth closer, mostly far more."""
+ONE = np.uint64(1)
+
+
+def find_smooth_cells(rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -> tuple[NDArray[np.bool_], FloatImage]:
+    """Where all that shows in a cell of the view at `offset` is one smooth surface of the photo, (N, M); and about
+    which disparity that has, (N, M).
+
+    The first row of cells holds the target row rows[0], the last the row before rows[1].
+    """
+    cells, first = rays.cells, rows[0] // CELL_PX
+    shape = -(-rows[1] // CELL_PX) - first, cells.low.shape[2]
+    far, near = np.full(shape, np.inf, np.float32), np.full(shape, -np.inf, np.float32)
+    smooth = np.ones(shape, np.bool_)
+    parallax = max(*map(abs, offset), 1e-9)
+    _land_cells(
+        cells.low,
+        cells.high,
+        cells.row_ranges,
+        cells.rough,
+        np.array(offset) - rays.arrays[0],
+        first,
+        parallax,
+        far,
+        near,
+        smooth,
+    )
+    smooth &= (near >= far) & ((near - far) * parallax <= ONE_SURFACE_PX)
+    return smooth, np.where(smooth, far, np.float32(0.0))
+
+
+def land_on_rough(
+    cells: Cells, k: int, t: float, s: float, rows: tuple[int, int], smooth: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Which cells (M, N) of source k, t and s away, land on any cell of these rows that is not smooth."""
+    needed = np.zeros(cells.rough.shape, np.bool_)
+    _land_on_rough(cells.low[k], cells.high[k], cells.row_ranges[k], t, s, rows[0] // CELL_PX, smooth, needed)
+    return needed
+
+
+@kernel
+def _target_cells(first, least, most):  # type: ignore[no-untyped-def]
+    """The first and last cell that the pixels of cell `first` touch when moved by -least to -most pixels; fractions."""
+    shrunk = 0.5 - REACH_PX
+    return first + (shrunk - max(least, most)) / CELL_PX, first + 1 - (shrunk + min(least, most)) / CELL_PX
+
+
+@kernel
+def _touches(least, most, t, row, rows):  # type: ignore[no-untyped-def]
+    """Whether a row of cells with these disparities can land on cells [0, rows)."""
+    top, bottom = _target_cells(row, np.float64(least) * t, np.float64(most) * t)
+    return least <= most and bottom >= 0 and top < rows
+
+
+@kernel
+def _land_cells(low, high, row_ranges, rough, offsets, first_cell, parallax, far, near, smooth):  # type: ignore[no-untyped-def]
+    """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
+    rows, columns = smooth.shape
+    for k in range(len(offsets)):
+        t, s = offsets[k]
+        for v in range(low.shape[1]):
+            if not _touches(row_ranges[k, v, 0], row_ranges[k, v, 1], t, v - first_cell, rows):
+                continue
+            for u in range(low.shape[2]):
+                least, most = np.float64(low[k, v, u]), np.float64(high[k, v, u])
+                top, bottom = _target_cells(v - first_cell, least * t, most * t)
+                left, right = _target_cells(u, least * s, most * s)
+                if not (least <= most and bottom >= 0 and top < rows and right >= 0 and left < columns):
+                    continue
+                for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
+                    for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
+                        if k == 0 and not rough[v, u]:
+                            far[row, column] = min(far[row, column], least)
+                            near[row, column] = max(near[row, column], most)
+                        elif k == 0 or (most - far[row, column]) * parallax > IN_FRONT_PX:
+                            smooth[row, column] = False
+
+
+@kernel
+def _land_on_rough(low, high, row_ranges, t, s, first_cell, smooth, needed):  # type: ignore[no-untyped-def]
+    rows, columns = smooth.shape
+    for v in range(low.shape[0]):
+        if not _touches(row_ranges[v, 0], row_ranges[v, 1], t, v - first_cell, rows):
+            continue
+        for u in range(low.shape[1]):
+            least, most = np.float64(low[v, u]), np.float64(high[v, u])
+            top, bottom = _target_cells(v - first_cell, least * t, most * t)
+            left, right = _target_cells(u, least * s, most * s)
+            if not (least <= most and bottom >= 0 and top < rows and right >= 0 and left < columns):
+                continue
+            for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
+                for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
+                    needed[v, u] |= not smooth[row, column]
+
+
+@kernel
+def follow_back(  # type: ignore[no-untyped-def]
+    surface, t, s, first_row, smooth, about, count, coverage, disparity, source
+):  # fmt: skip
+    """Give every ray of the smooth cells one candidate that covers it: the photo's ray, of disparity (H, W) `surface`.
+
+    Its disparity d is the fixed point of d = surface(x + d s, y + d t), bilinear.
+    """
+    rows, width = count.shape
+    last_u, last_v = surface.shape[1] - 1.001, surface.shape[0] - 1.001
+    above = first_row % CELL_PX
+    parallax = max(abs(s), abs(t))
+    guess = np.empty(CELL_PX)
+    for cell_row in range(smooth.shape[0]):
+        top, bottom = cell_row * CELL_PX - above, min((cell_row + 1) * CELL_PX - above, rows)
+        for cell in range(smooth.shape[1]):
+            if not smooth[cell_row, cell]:
+                continue
+            left = cell * CELL_PX
+            columns = min(CELL_PX, width - left)
+            guess[:] = about[cell_row, cell]
+            for row in range(top, bottom):
+                for _ in range(MOST_ROUNDS):
+                    moved = 0.0
+                    for i in range(columns):
+                        d = guess[i]
+                        source_x = min(max(left + i + d * s, 0.0), last_u)
+                        source_y = min(max(first_row + row + d * t, 0.0), last_v)
+                        u, v = np.uint64(source_x), np.uint64(source_y)
+                        fx, fy = source_x - u, source_y - v
+                        upper = (1 - fx) * surface[v, u] + fx * surface[v, u + ONE]
+                        lower = (1 - fx) * surface[v + ONE, u] + fx * surface[v + ONE, u + ONE]
+                        guess[i] = upper + fy * (lower - upper)
+                        moved = max(moved, abs(guess[i] - d))
+                    if moved * parallax < SETTLED_PX:
+                        break
+                for i in range(columns if row >= 0 else 0):
+                    count[row, left + i], coverage[0, row, left + i], source[0, row, left + i] = 1, 1.0, 0
+                    disparity[0, row, left + i] = guess[i]

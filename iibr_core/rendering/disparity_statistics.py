@@ -1,0 +1,151 @@
+"""What lies around every source ray: the disparities next to it, and how soft the depth edges of the whole map are.
+
+Made once for a ray set; views look it up. Soft edges tell an estimated or enlarged map from an exact one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import FloatImage
+
+AROUND_PX = 2
+"""Reach of the range of disparities around a source ray."""
+STEP_AROUND_PX = 2
+"""Reach of the search for a depth edge."""
+EDGE_WINDOW_PX = 8
+"""A depth edge softer than this is a slope."""
+EDGE_PARALLAX_PX = 2.0
+"""Least parallax, in the outermost view, of the edges whose softness is measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Of S source images. low, high (S, H, W): least and greatest disparity within AROUND_PX of each ray. step
+    (S, H, W): the largest step between neighbours within STEP_AROUND_PX; all px per view step, 0 where nothing is.
+    softness: 0..1, of the photo's depth edges: 0 where each is one step, near 1 where they are slopes.
+    """
+
+    low: FloatImage
+    high: FloatImage
+    step: FloatImage
+    softness: float
+
+
+def surroundings_of(disparity: FloatImage, farthest_views: float, should_stop: ShouldStop = never) -> Surroundings:
+    """Surroundings of source images (S, H, W), the photo's first. farthest_views: the largest view offset rendered.
+
+    Raises Cancelled once should_stop is true.
+    """
+    low, high, step = (np.empty(disparity.shape, np.float32) for _ in range(3))
+    for source, *found in zip(disparity, low, high, step):
+        _survey(source, found, should_stop)
+    softness = edge_softness(disparity[0], EDGE_PARALLAX_PX / max(farthest_views, 1e-9), should_stop)
+    return Surroundings(low, high, step, softness)
+
+
+def _survey(disparity: FloatImage, found: list[FloatImage], should_stop: ShouldStop) -> None:
+    size = disparity.shape[0], disparity.shape[1]
+    in_bands(lambda first, last: _around(disparity, first, last, *found), size, should_stop)
+
+
+def edge_softness(disparity: FloatImage, least_edge: float, should_stop: ShouldStop = never) -> float:
+    """0..1: the mean share of the depth edges (H, W) that their largest step leaves to the others; 0 without edges.
+
+    An edge: a change of at least least_edge within EDGE_WINDOW_PX along a row or a column; it counts by its change.
+    Raises Cancelled once should_stop is true.
+    """
+    left = total = 0.0
+    for values in (disparity, disparity.T):
+        changes, lefts = _edges(values, least_edge, should_stop)
+        left += float(lefts.sum(dtype=np.float64))
+        total += float(changes.sum(dtype=np.float64))
+    return left / total if 0 < total < np.inf else 0.0
+
+
+def _edges(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> NDArray[np.float32]:
+    """(2, N): the change of each edge along the rows, and what its largest step leaves of it."""
+
+    def edges(first: int, last: int) -> NDArray[np.float32]:
+        rows = np.ascontiguousarray(values[first:last], np.float32)
+        found = np.empty((2, rows.size), np.float32)
+        return found[:, : _row_edges(rows, np.float32(least_edge), *found)].copy()
+
+    return np.concatenate(
+        [np.empty((2, 0), np.float32), *in_bands(edges, (values.shape[0], values.shape[1]), should_stop)], axis=1
+    )
+
+
+@kernel
+def _row_edges(rows, least_edge, changes, lefts):  # type: ignore[no-untyped-def]
+    """Writes what `_edges` returns; returns how many edges there are."""
+    count = 0
+    for y in range(rows.shape[0]):
+        for x in range(rows.shape[1] - EDGE_WINDOW_PX):
+            change = abs(rows[y, x + EDGE_WINDOW_PX] - rows[y, x])
+            if not change >= least_edge:
+                continue
+            largest = np.float32(0.0)
+            is_known = True
+            for i in range(EDGE_WINDOW_PX):
+                step = abs(rows[y, x + i + 1] - rows[y, x + i])
+                largest = max(largest, step)
+                is_known &= step == step
+            left = change - largest
+            changes[count] = change
+            lefts[count] = left if is_known and left > 0 else np.float32(0.0)
+            count += 1
+    return count
+
+
+@kernel
+def _around(disparity, first, last, low, high, step):  # type: ignore[no-untyped-def]
+    """Rows [first, last) of the range, and of the largest step, within a square: along rows first, then columns.
+
+    NaN lies around the frame, as where nothing is: it is neither less nor greater than anything.
+    """
+    height, width = disparity.shape
+    top, bottom = max(first - STEP_AROUND_PX, 0), min(last + STEP_AROUND_PX, height)
+    row_low, row_high = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
+    row_step, row_rise = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
+    here = np.full(width + 2 * STEP_AROUND_PX, np.nan, np.float32)
+    above = np.full(width + 2 * STEP_AROUND_PX, np.nan, np.float32)
+    for y in range(top, bottom):
+        here[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[y]
+        if y > 0:
+            above[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[y - 1]
+        for x in range(width):
+            least, most = np.float32(np.inf), np.float32(-np.inf)
+            for i in range(STEP_AROUND_PX - AROUND_PX, STEP_AROUND_PX + AROUND_PX + 1):
+                d = here[x + i]
+                least, most = d if d < least else least, d if d > most else most
+            widest, steepest = np.float32(0.0), np.float32(0.0)
+            for i in range(2 * STEP_AROUND_PX):
+                change = abs(here[x + i + 1] - here[x + i])
+                widest = change if change > widest else widest
+            for i in range(2 * STEP_AROUND_PX + 1):
+                change = abs(here[x + i] - above[x + i])
+                steepest = change if change > steepest else steepest
+            row_low[y - top, x], row_high[y - top, x] = least, most
+            row_step[y - top, x], row_rise[y - top, x] = widest, steepest
+    for y in range(first, last):
+        least_here, most_here, widest_here = low[y], high[y], step[y]
+        least_here[:], most_here[:], widest_here[:] = np.inf, -np.inf, 0.0
+        for v in range(max(y - STEP_AROUND_PX, 0), min(y + STEP_AROUND_PX + 1, height)):
+            for x in range(width):
+                widest_here[x] = max(widest_here[x], row_step[v - top, x])
+            if v > y - STEP_AROUND_PX:
+                for x in range(width):
+                    widest_here[x] = max(widest_here[x], row_rise[v - top, x])
+            if abs(v - y) <= AROUND_PX:
+                for x in range(width):
+                    least_here[x] = min(least_here[x], row_low[v - top, x])
+                    most_here[x] = max(most_here[x], row_high[v - top, x])
+        for x in range(width):
+            if not least_here[x] <= most_here[x]:
+                least_here[x], most_here[x] = 0.0, 0.0

@@ -1,0 +1,79 @@
+"""Which target rays nothing in the photo shows: those whose weights have high entropy (paper, section 3.3).
+
+The share of a pixel that no candidate covers could come from anywhere, so it counts as spread evenly over all K
+slots: a ray with one covering candidate has entropy 0, an uncovered one has 1. (The paper's threshold k = 2.3 is 99 %
+of log2 5, its K = 5.)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.runtime.jit import kernel
+from iibr_core.types import FloatImage
+
+LEAST_COVERED = 0.2
+"""A ray that its one candidate covers less than this counts as occluded: slivers of surface would look torn."""
+MOSTLY_COVERED = 0.5
+"""A ray covered more than this is not occluded, however many surfaces share it."""
+
+
+def entropy(weights: FloatImage) -> FloatImage:
+    """Normalised entropy (N, W) in [0, 1] of weights (K, N, W) that sum to the covered share of each ray.
+
+    With K = 1 it is the missing share.
+    """
+    return _entropy(weights)
+
+
+def occlusion_mask(weights: FloatImage) -> NDArray[np.bool_]:
+    """(N, W) bool: True where the ray is occluded in every source, that is where its entropy is above the threshold."""
+    slots = weights.shape[0]
+    limit = np.zeros((slots, 1, 1), np.float32)
+    limit[0] = LEAST_COVERED
+    return _mask(weights, _entropy(limit)[0, 0])
+
+
+@kernel
+def _covered(weights, row, x):  # type: ignore[no-untyped-def]
+    covered = 0.0
+    for k in range(weights.shape[0]):
+        covered += weights[k, row, x]
+    return min(covered, 1.0)
+
+
+@kernel
+def _entropy_at(weights, row, x, covered):  # type: ignore[no-untyped-def]
+    slots = weights.shape[0]
+    if slots == 1:
+        return 1.0 - covered
+    total = 0.0
+    for k in range(slots):
+        p = weights[k, row, x] + (1.0 - covered) / slots
+        if 0.0 < p < 1.0:
+            total -= p * np.log(p)
+    return min(total / np.log(slots), 1.0)
+
+
+@kernel
+def _entropy(weights):  # type: ignore[no-untyped-def]
+    _, rows, width = weights.shape
+    result = np.empty((rows, width), np.float32)
+    for row in range(rows):
+        for x in range(width):
+            result[row, x] = _entropy_at(weights, row, x, _covered(weights, row, x))
+    return result
+
+
+@kernel
+def _mask(weights, limit):  # type: ignore[no-untyped-def]
+    _, rows, width = weights.shape
+    mask = np.zeros((rows, width), np.bool_)
+    for row in range(rows):
+        for x in range(width):
+            if weights[0, row, x] > MOSTLY_COVERED:
+                continue
+            covered = _covered(weights, row, x)
+            mask[row, x] = covered <= MOSTLY_COVERED and _entropy_at(weights, row, x, covered) > limit
+    return mask

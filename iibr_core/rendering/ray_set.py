@@ -1,0 +1,183 @@
+"""The ray set. Every pixel of a source image is a ray with a colour and a disparity; the set is a stack of such images.
+
+The photo comes first; the fringe (what mixed pixels hold of the surface in front) and inpainted views join it.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.rendering.disparity_statistics import Surroundings, surroundings_of
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import FloatImage, ViewOffset
+
+CELL_PX = 4
+"""Side of the cells that rays are summed up by."""
+SMOOTH_SHARE = 0.8
+"""A smooth surface's steps stay below this share of the step between surfaces."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Rays of S images summed up by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
+    disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. rough (M, N): whether
+    the photo is there anything but one smooth surface.
+    """
+
+    low: FloatImage
+    high: FloatImage
+    row_ranges: FloatImage
+    rough: NDArray[np.bool_]
+
+
+class RaySet:
+    """Source images of one size (height, width), at most `capacity` of them.
+
+    All arrays are (S, ...) for the S images added so far. offsets (S, 2): the view (t, s) each is seen from. colors
+    (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN where there is no surface. coverage (S, H, W): how much of
+    its pixel a ray fills, 0 = no ray. near_edge (S, H, W) bool: True where a 4x4 look-up may meet another surface.
+    """
+
+    def __init__(self, capacity: int, size: tuple[int, int], surface_step: float, farthest_views: float = 1.0) -> None:
+        """surface_step: disparities closer than this are one surface for look-ups.
+
+        farthest_views: the largest view offset that will be rendered.
+        """
+        self._count = 0
+        self._surface_step = surface_step
+        self._farthest_views = farthest_views
+        self._surroundings: Surroundings | None = None
+        self._surveying = threading.Lock()
+        self._offsets = np.empty((capacity, 2))
+        self._colors = np.empty((capacity, *size, 3), np.float32)
+        self._disparity = np.empty((capacity, *size), np.float32)
+        self._coverage = np.empty((capacity, *size), np.float32)
+        self._near_edge = np.empty((capacity, *size), np.bool_)
+        in_cells = -(-size[0] // CELL_PX), -(-size[1] // CELL_PX)
+        self._low, self._high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
+        self._row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
+        self._rough = np.ones(in_cells, np.bool_)
+
+    def add(
+        self,
+        offset: ViewOffset,
+        colors: FloatImage,
+        disparity: FloatImage,
+        coverage: FloatImage,
+        should_stop: ShouldStop = never,
+    ) -> None:
+        """Add the rays of one image (H, W). Raises Cancelled once should_stop is true; then nothing is added."""
+        k = self._count
+
+        def band(first: int, last: int) -> None:
+            rows = slice(first, last)
+            self._colors[k, rows], self._disparity[k, rows] = colors[rows], disparity[rows]
+            self._coverage[k, rows] = coverage[rows]
+            _near_edge(disparity, self._surface_step, first, last, self._near_edge[k])
+            _sum_up(disparity, coverage, first, last, self._low[k], self._high[k])
+            if k == 0:
+                _find_rough(disparity, SMOOTH_SHARE * self._surface_step, first, last, self._rough)
+
+        in_bands(band, self.size, should_stop)
+        self._row_ranges[k, :, 0], self._row_ranges[k, :, 1] = self._low[k].min(axis=1), self._high[k].max(axis=1)
+        self._offsets[k] = offset
+        self._count += 1
+        self._surroundings = None
+
+    def survey(self, should_stop: ShouldStop = never) -> Surroundings:
+        """`surroundings`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
+        with self._surveying:
+            if self._surroundings is None:
+                disparity = self._disparity[: self._count]
+                self._surroundings = surroundings_of(disparity, self._farthest_views, should_stop)
+            return self._surroundings
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) of every image."""
+        return self._disparity.shape[1], self._disparity.shape[2]
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """(offsets, colors, disparity, coverage, near_edge) of the images added so far."""
+        everything = (self._offsets, self._colors, self._disparity, self._coverage, self._near_edge)
+        return tuple(array[: self._count] for array in everything)
+
+    @property
+    def cells(self) -> Cells:
+        """The rays added so far, summed up."""
+        low, high, row_ranges = (part[: self._count] for part in (self._low, self._high, self._row_ranges))
+        return Cells(low, high, row_ranges, self._rough)
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What lies around the rays added so far; made when first asked for after the last was added."""
+        return self._surroundings or self.survey()
+
+    @property
+    def photo_images(self) -> int:
+        """How many images, from the first on, hold what the photo shows; the others are inpainted."""
+        return int((self._offsets[: self._count] == 0).all(axis=1).sum())
+
+    @property
+    def photo_disparity(self) -> FloatImage:
+        """(H, W) disparity of the first image."""
+        return self._disparity[0]
+
+
+@kernel
+def _sum_up(disparity, coverage, first, last, low, high):  # type: ignore[no-untyped-def]
+    """Of the cells that begin in rows [first, last)."""
+    height, width = disparity.shape
+    for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
+        low[v], high[v] = np.inf, -np.inf
+        for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
+            for x in range(width):
+                d, u = disparity[y, x], x // CELL_PX
+                if coverage[y, x] > 0 and d == d:
+                    low[v, u], high[v, u] = min(low[v, u], d), max(high[v, u], d)
+
+
+@kernel
+def _find_rough(disparity, smooth_step, first, last, rough):  # type: ignore[no-untyped-def]
+    """Of the cells that begin in rows [first, last): True on either side of a step larger than smooth_step, of a pixel
+    without surface, of the border.
+    """
+    height, width = disparity.shape
+    for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
+        rough[v] = False
+        for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
+            for x in range(width):
+                is_smooth = 0 < y < height - 1 and 0 < x < width - 1
+                if is_smooth:
+                    here = disparity[y, x]
+                    is_smooth &= abs(disparity[y, x - 1] - here) <= smooth_step
+                    is_smooth &= abs(disparity[y, x + 1] - here) <= smooth_step
+                    is_smooth &= abs(disparity[y - 1, x] - here) <= smooth_step
+                    is_smooth &= abs(disparity[y + 1, x] - here) <= smooth_step
+                if not is_smooth:
+                    rough[v, x // CELL_PX] = True
+
+
+@kernel
+def _near_edge(disparity, surface_step, first, last, near_edge):  # type: ignore[no-untyped-def]
+    """Of rows [first, last): True where the 4x4 pixels from (x - 1, y - 1) to (x + 2, y + 2) hold a larger step, or no
+    surface.
+    """
+    height, width = disparity.shape
+    near_edge[first:last] = False
+    for y in range(max(first - 2, 0), min(last + 2, height)):
+        for x in range(width):
+            here = disparity[y, x]
+            right = disparity[y, min(x + 1, width - 1)]
+            below = disparity[min(y + 1, height - 1), x]
+            if not (abs(right - here) <= surface_step and abs(below - here) <= surface_step):
+                near_edge[max(y - 2, first) : min(y + 3, last), max(x - 2, 0) : x + 3] = True

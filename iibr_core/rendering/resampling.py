@@ -1,0 +1,257 @@
+"""The colour of target rays: every candidate looks it up in its own source, continuously along its own slope.
+
+Looking up with the surface's exact disparity, instead of moving colours about, keeps sub-pixel accuracy: candidates
+of one surface agree, and the weights only have to pick the surface. Keys' cubic convolution, on encoded values (less
+ringing at highlights); surfaces that share a pixel are summed in linear light. Near depth edges only pixels of the
+candidate's own surface count.
+"""
+
+from __future__ import annotations
+
+from math import floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.rendering.candidates import Candidates
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
+from iibr_core.types import FloatImage
+
+KEYS_A = -0.75
+"""The sharper of the usual cubic kernels; it scored as well as longer ones on held-out light fields."""
+OWN_SURFACE_PX = 0.5
+"""Pixels whose landing differs by more than this from the candidate's belong to another surface."""
+SOLE = 1 - 1e-6
+"""A candidate with at least this share of the weights is the only one."""
+LEAST_TAP_WEIGHT = 0.3
+"""Less cubic weight than this on the own surface: take its nearest pixel instead."""
+ONE, TWO = np.uint64(1), np.uint64(2)
+"""Unsigned indices need no test for counting from the end."""
+
+
+def look_up_colors(
+    rays: RaySet, candidates: Candidates, weights: FloatImage, wanted: NDArray[np.bool_] | None = None
+) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
+    """Colours (N, W, 3), sRGB-encoded, of target rays; disparity (N, W) and source (N, W) of the heaviest candidates.
+
+    Rays without candidates, or not wanted (N, W), are black at disparity 0 of source 0.
+    """
+    shape = candidates.count.shape
+    colors, disparity = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
+    source = np.zeros(shape, np.uint8)
+    remaining = np.ones(shape, np.bool_) if wanted is None else wanted.copy()
+    offsets, images, surfaces, _, near_edge = rays.arrays
+    from_sources = np.array(candidates.offset) - offsets
+    _gather_plain(
+        images, near_edge, from_sources, candidates.first_row,
+        candidates.count, candidates.disparity[0], candidates.source[0], remaining, colors, disparity, source,
+    )  # fmt: skip
+    _gather(
+        images, surfaces, near_edge, from_sources, candidates.first_row,
+        candidates.count, candidates.disparity, candidates.source, weights, remaining, colors, disparity, source,
+    )  # fmt: skip
+    return colors, disparity, source
+
+
+def heaviest(candidates: Candidates, weights: FloatImage) -> tuple[FloatImage, NDArray[np.uint8]]:
+    """Disparity and source, each (N, W), of the heaviest candidates; 0 where there is none."""
+    disparity, source = np.zeros(candidates.count.shape, np.float32), np.zeros(candidates.count.shape, np.uint8)
+    _heaviest(candidates.count, candidates.disparity, candidates.source, weights, disparity, source)
+    return disparity, source
+
+
+@kernel
+def _keys(f):  # type: ignore[no-untyped-def]
+    """Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1)."""
+    g = 1.0 - f
+    a = KEYS_A
+    return (
+        a * f * g * g,
+        1.0 - f * f * (a + 3.0 - (a + 2.0) * f),
+        1.0 - g * g * (a + 3.0 - (a + 2.0) * g),
+        a * g * f * f,
+    )
+
+
+@kernel
+def _keys_single(f):  # type: ignore[no-untyped-def]
+    """The same in single precision."""
+    one, a = np.float32(1.0), np.float32(KEYS_A)
+    g = one - f
+    return (
+        a * f * g * g,
+        one - f * f * (a + np.float32(3.0) - (a + np.float32(2.0)) * f),
+        one - g * g * (a + np.float32(3.0) - (a + np.float32(2.0)) * g),
+        a * g * f * f,
+    )
+
+
+@kernel
+def cubic(images, index, x, y):  # type: ignore[no-untyped-def]
+    """Colour at a position of one image; its border is repeated beyond it."""
+    _, height, width, _ = images.shape
+    column, row = floor(x), floor(y)
+    (x0, x1, x2, x3), weight_y = _keys(x - column), _keys(y - row)
+    a, b = max(column - 1, 0), max(column, 0)
+    c, d = min(column + 1, width - 1), min(column + 2, width - 1)
+    red = green = blue = 0.0
+    for j in range(4):
+        v, w = min(max(row - 1 + j, 0), height - 1), weight_y[j]
+        red += w * (
+            x0 * images[index, v, a, 0] + x1 * images[index, v, b, 0]
+            + x2 * images[index, v, c, 0] + x3 * images[index, v, d, 0]
+        )  # fmt: skip
+        green += w * (
+            x0 * images[index, v, a, 1] + x1 * images[index, v, b, 1]
+            + x2 * images[index, v, c, 1] + x3 * images[index, v, d, 1]
+        )  # fmt: skip
+        blue += w * (
+            x0 * images[index, v, a, 2] + x1 * images[index, v, b, 2]
+            + x2 * images[index, v, c, 2] + x3 * images[index, v, d, 2]
+        )  # fmt: skip
+    return red, green, blue
+
+
+@kernel
+def look_up(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-untyped-def]
+    """Colour at a position from the pixels of disparity d, kept within their range where some are missing."""
+    _, height, width, _ = images.shape
+    tolerance = OWN_SURFACE_PX / parallax
+    column, row = floor(x), floor(y)
+    weight_x, weight_y = _keys(x - column), _keys(y - row)
+    total = red = green = blue = 0.0
+    low_r = low_g = low_b = nearest = np.inf
+    high_r = high_g = high_b = -np.inf
+    near_x = near_y = -1
+    taps = 0
+    for j in range(4):
+        v = min(max(row - 1 + j, 0), height - 1)
+        for i in range(4):
+            u = min(max(column - 1 + i, 0), width - 1)
+            if not abs(surfaces[index, v, u] - d) <= tolerance:
+                continue
+            w = weight_x[i] * weight_y[j]
+            r, g, b = images[index, v, u, 0], images[index, v, u, 1], images[index, v, u, 2]
+            total, red, green, blue = total + w, red + w * r, green + w * g, blue + w * b
+            low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
+            high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
+            taps += 1
+            distance = (u - x) ** 2 + (v - y) ** 2
+            if distance < nearest:
+                nearest, near_x, near_y = distance, u, v
+    if taps == 16:
+        return red, green, blue
+    if taps == 0:
+        return cubic(images, index, x, y)
+    if total < LEAST_TAP_WEIGHT:
+        return (
+            np.float64(images[index, near_y, near_x, 0]),
+            np.float64(images[index, near_y, near_x, 1]),
+            np.float64(images[index, near_y, near_x, 2]),
+        )
+    return (
+        min(max(red / total, low_r), high_r),
+        min(max(green / total, low_g), high_g),
+        min(max(blue / total, low_b), high_b),
+    )
+
+
+@kernel
+def _gather_plain(  # type: ignore[no-untyped-def]
+    images, near_edge, offsets, first_row, count, candidate_disparity, candidate_source, remaining,
+    colors, disparity, source,
+):  # fmt: skip
+    """What `_gather` does, for the rays that are easiest, and most: one candidate, no edge and no border near it.
+
+    They are struck off from remaining. This is `cubic` written out, in single precision and without tests.
+    """
+    _, height, width, _ = images.shape
+    for row in range(count.shape[0]):
+        for x in range(count.shape[1]):
+            if count[row, x] != 1 or not remaining[row, x]:
+                continue
+            d, k = candidate_disparity[row, x], np.uint64(candidate_source[row, x])
+            source_x, source_y = x + d * offsets[k, 1], first_row + row + d * offsets[k, 0]
+            if not (1 <= source_x < width - 2 and 1 <= source_y < height - 2):
+                continue
+            u, v = np.uint64(source_x), np.uint64(source_y)
+            if near_edge[k, v, u]:
+                continue
+            remaining[row, x] = False
+            disparity[row, x], source[row, x] = d, k
+            x0, x1, x2, x3 = _keys_single(np.float32(source_x - u))
+            y0, y1, y2, y3 = _keys_single(np.float32(source_y - v))
+            for c in range(3):
+                colors[row, x, c] = max(
+                    y0 * (x0 * images[k, v - ONE, u - ONE, c] + x1 * images[k, v - ONE, u, c]
+                          + x2 * images[k, v - ONE, u + ONE, c] + x3 * images[k, v - ONE, u + TWO, c])
+                    + y1 * (x0 * images[k, v, u - ONE, c] + x1 * images[k, v, u, c]
+                            + x2 * images[k, v, u + ONE, c] + x3 * images[k, v, u + TWO, c])
+                    + y2 * (x0 * images[k, v + ONE, u - ONE, c] + x1 * images[k, v + ONE, u, c]
+                            + x2 * images[k, v + ONE, u + ONE, c] + x3 * images[k, v + ONE, u + TWO, c])
+                    + y3 * (x0 * images[k, v + TWO, u - ONE, c] + x1 * images[k, v + TWO, u, c]
+                            + x2 * images[k, v + TWO, u + ONE, c] + x3 * images[k, v + TWO, u + TWO, c]),
+                    np.float32(0.0),
+                )  # fmt: skip
+
+
+@kernel
+def _gather(  # type: ignore[no-untyped-def]
+    images, surfaces, near_edge, offsets, first_row,
+    count, candidate_disparity, candidate_source, weights, wanted, colors, disparity, source,
+):  # fmt: skip
+    """What `look_up_colors` returns. offsets (S, 2): from each source to the target view."""
+    _, height, width, _ = images.shape
+    for row in range(count.shape[0]):
+        for x in range(count.shape[1]):
+            used = np.int64(count[row, x])
+            if used == 0 or not wanted[row, x]:
+                continue
+            total, heavy = 0.0, 0
+            for k in range(used):
+                total += weights[k, row, x]
+                if weights[k, row, x] > weights[heavy, row, x]:
+                    heavy = k
+            disparity[row, x] = candidate_disparity[heavy, row, x]
+            source[row, x] = candidate_source[heavy, row, x]
+            sole = weights[heavy, row, x] >= SOLE * total
+            sum_r = sum_g = sum_b = 0.0
+            for k in range(used):
+                w = weights[k, row, x] / total
+                if not w > 1.0 - SOLE:
+                    continue
+                d = candidate_disparity[k, row, x]
+                index = np.int64(candidate_source[k, row, x])
+                t, s = offsets[index, 0], offsets[index, 1]
+                source_x = min(max(x + d * s, -0.5), width - 0.5)
+                source_y = min(max(first_row + row + d * t, -0.5), height - 0.5)
+                if near_edge[index, max(floor(source_y), 0), max(floor(source_x), 0)]:
+                    parallax = max(abs(s), abs(t), 1e-9)
+                    r, g, b = look_up(images, surfaces, index, source_x, source_y, d, parallax)
+                else:
+                    r, g, b = cubic(images, index, source_x, source_y)
+                if sole:
+                    sum_r, sum_g, sum_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
+                else:
+                    sum_r += w * linear_scalar(r)
+                    sum_g += w * linear_scalar(g)
+                    sum_b += w * linear_scalar(b)
+            if not sole:
+                sum_r, sum_g, sum_b = srgb_scalar(sum_r), srgb_scalar(sum_g), srgb_scalar(sum_b)
+            colors[row, x, 0], colors[row, x, 1], colors[row, x, 2] = sum_r, sum_g, sum_b
+
+
+@kernel
+def _heaviest(count, candidate_disparity, candidate_source, weights, disparity, source):  # type: ignore[no-untyped-def]
+    for row in range(count.shape[0]):
+        for x in range(count.shape[1]):
+            used = np.int64(count[row, x])
+            if used == 0:
+                continue
+            heavy = 0
+            for k in range(1, used):
+                if weights[k, row, x] > weights[heavy, row, x]:
+                    heavy = k
+            disparity[row, x] = candidate_disparity[heavy, row, x]
+            source[row, x] = candidate_source[heavy, row, x]

@@ -1,0 +1,192 @@
+"""One view from the ray set: candidates, weights, colours, occlusion mask, fill. Row bands, or views, side by side."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import islice
+from types import TracebackType
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.inpainting.background import fill_background
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, Contested, decide, find_contested
+from iibr_core.rendering.candidates import Candidates, find_candidates
+from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.rendering.occlusion import entropy, occlusion_mask
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.resampling import OWN_SURFACE_PX, heaviest, look_up_colors
+from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.runtime import tiling
+from iibr_core.runtime.tiling import ShouldStop, go_on, in_bands, never
+from iibr_core.types import FloatImage, ViewOffset
+
+EDGE_PX = 2.0
+"""A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
+EVERY_COST = 8
+"""How many times as long a band takes where the transformer is asked for every ray."""
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedView:
+    """A view without holes.
+
+    colors: (H, W, 3) sRGB-encoded. disparity: (H, W). occluded: (H, W), True where no source showed anything, so that
+    it was filled here. inpainted: (H, W), True where the photo showed nothing: filled here or in an earlier view.
+    entropy: (H, W) in [0, 1], of the closed form's weights, or None where it was not asked for.
+    """
+
+    colors: FloatImage
+    disparity: FloatImage
+    occluded: NDArray[np.bool_]
+    inpainted: NDArray[np.bool_]
+    entropy: FloatImage | None = None
+
+
+def rays_of_photo(
+    colors: FloatImage, disparity: FloatImage, farthest_views: float, more: int, should_stop: ShouldStop = never
+) -> RaySet:
+    """The ray set of a photo: its own rays, and the fringe of its mixed pixels, with room for `more` images.
+
+    farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
+    Raises Cancelled once should_stop is true.
+    """
+    centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
+    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
+    rays = RaySet(2 + more, disparity.shape, OWN_SURFACE_PX / farthest_views, farthest_views)
+    rays.add(centre, own, disparity, np.ones_like(disparity), should_stop)
+    if coverage.any():
+        rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
+    return rays
+
+
+class ViewSynthesis:
+    """Renders views on all cores; a context manager. Results do not depend on the number of threads or bands."""
+
+    def __init__(
+        self,
+        should_stop: ShouldStop = never,
+        transformer: Callable[[Contested], FloatImage] | None = None,
+        every: bool = False,
+        slots: int = 5,
+        keeps_entropy: bool = False,
+        hypotheses: int = HYPOTHESES,
+    ) -> None:
+        """transformer: gives the weights (N, K) of contested rays; None: closed form. every: of all rays.
+
+        slots: candidates kept a ray. keeps_entropy: whether views bring the entropy of their weights. hypotheses: the
+        transformer's K.
+        """
+        self._asked_to_stop, self._is_over = should_stop, False
+        self._transformer, self._every = transformer, every
+        self._slots, self._hypotheses, self._keeps_entropy = slots, hypotheses, keeps_entropy
+        self._threads = ThreadPoolExecutor(tiling.THREADS, thread_name_prefix="iibr-views")
+
+    def __enter__(self) -> ViewSynthesis:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Wait for the threads; views under way stop at their next band."""
+        self._is_over = True
+        self._threads.shutdown(cancel_futures=True)
+
+    def render(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
+        """The view at an offset, its holes filled; row bands run side by side.
+
+        Raises Cancelled once should_stop is true, ValueError for an offset that is not finite.
+        """
+        return self._view(rays, offset, tiling.THREADS)
+
+    def render_alone(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
+        """The same view, its row bands one after the other in the calling thread: the way for many views."""
+        return self._view(rays, offset, 1)
+
+    def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """The results of work on all items, in their order. An item is only taken when a thread is free for it."""
+        items, running = iter(items), deque[Future[Result]]()
+        while True:
+            running.extend(self._threads.submit(work, item) for item in islice(items, tiling.THREADS - len(running)))
+            if not running:
+                return
+            go_on(self._should_stop)
+            yield running.popleft().result()
+
+    def _should_stop(self) -> bool:
+        return self._is_over or self._asked_to_stop()
+
+    def _view(self, rays: RaySet, offset: ViewOffset, threads: int) -> RenderedView:
+        if not np.isfinite(offset).all():
+            raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
+        if self._transformer:
+            rays.survey(self._should_stop)
+        view = _blank(rays.size, self._keeps_entropy)
+        most_pixels = tiling.MOST_BAND_PIXELS // (EVERY_COST if self._every else 1)
+        in_bands(
+            lambda first, last: self._render_rows(rays, offset, (first, last), view),
+            rays.size, self._should_stop, threads, most_pixels,
+        )  # fmt: skip
+        if view.occluded.any():
+            fill_background(
+                view.colors, view.disparity, view.occluded, rays.photo_disparity, offset, self._should_stop, threads
+            )
+        return view
+
+    def _render_rows(self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: RenderedView) -> None:
+        """Write rows [first, last) of the view, holes not filled yet."""
+        around = REACH_PX if self._transformer else 0
+        above = min(rows[0], around)
+        candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + around, rays.size[0])), self._slots)
+        go_on(self._should_stop)
+        weights = closed_form_weights(candidates)
+        occluded = occlusion_mask(weights)
+        inner = slice(above, above + rows[1] - rows[0])
+        go_on(self._should_stop)
+        if self._transformer:
+            colors, disparity, source = self._decided(rays, candidates, weights, inner)
+        else:
+            colors, disparity, source = look_up_colors(rays, candidates, weights)
+        shown = slice(*rows)
+        view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
+        view.occluded[shown] = occluded[inner]
+        view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
+        if view.entropy is not None:
+            view.entropy[shown] = entropy(weights)[inner]
+
+    def _decided(
+        self, rays: RaySet, candidates: Candidates, weights: FloatImage, inner: slice
+    ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
+        """What `look_up_colors` gives for the inner rows, but what contested rays show is the transformer's choice."""
+        assert self._transformer is not None
+        rows = inner.start, inner.stop
+        shown = heaviest(candidates, weights)
+        contested = find_contested(rays, candidates, weights, shown, rows, self._every, self._hypotheses)
+        at = contested.pixel[:, 0] - candidates.first_row, contested.pixel[:, 1]
+        wanted = np.zeros(candidates.count.shape, np.bool_)
+        wanted[inner] = True
+        wanted[at] = False
+        go_on(self._should_stop)
+        colors, disparity, source = look_up_colors(rays, candidates, weights, wanted)
+        chosen = self._transformer(contested)
+        go_on(self._should_stop)
+        colors[at], disparity[at], source[at] = decide(rays, contested, chosen)
+        return colors, disparity, source
+
+
+def _blank(size: tuple[int, int], with_entropy: bool) -> RenderedView:
+    """A view (height, width) to be written to."""
+    return RenderedView(
+        np.empty((*size, 3), np.float32),
+        np.empty(size, np.float32),
+        np.empty(size, np.bool_),
+        np.empty(size, np.bool_),
+        np.empty(size, np.float32) if with_entropy else None,
+    )

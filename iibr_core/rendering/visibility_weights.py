@@ -1,0 +1,46 @@
+"""How much each candidate contributes to its target ray: the closed form, the limit that a trained T approaches.
+
+Surfaces are taken front to back, each gets what those before it leave of the pixel's area. Weights of a ray sum to
+the covered share of its pixel, at most 1; what is missing is disoccluded.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from iibr_core.rendering.candidates import Candidates
+from iibr_core.runtime.jit import kernel
+from iibr_core.types import FloatImage
+
+
+def closed_form_weights(candidates: Candidates) -> FloatImage:
+    """Weights (K, N, W) in [0, 1], 0 in unused slots; their sum over K is the covered share of the pixel."""
+    weights = np.zeros_like(candidates.coverage)
+    _front_to_back(candidates.count, candidates.coverage, candidates.disparity, weights)
+    return weights
+
+
+@kernel
+def _front_to_back(count, coverage, disparity, weights):  # type: ignore[no-untyped-def]
+    rows, width = count.shape
+    for row in range(rows):
+        for x in range(width):
+            used = np.int64(count[row, x])
+            if used == 1:
+                weights[0, row, x] = min(coverage[0, row, x], np.float32(1.0))
+                continue
+            left = np.float32(1.0)
+            ahead = np.float32(np.inf)
+            ahead_slot = -1
+            for _ in range(used):
+                # The frontmost surface behind the last one; equal disparities in slot order.
+                front = -1
+                for k in range(used):
+                    d = disparity[k, row, x]
+                    if (d < ahead or (d == ahead and k > ahead_slot)) and (front < 0 or d > disparity[front, row, x]):
+                        front = k
+                if front < 0 or left <= 0:
+                    break
+                ahead, ahead_slot = disparity[front, row, x], front
+                weights[front, row, x] = min(coverage[front, row, x], left)
+                left -= weights[front, row, x]

@@ -1,0 +1,316 @@
+"""Casts rays into procedural scenes: exact disparities, and colours with mixed pixels at edges, of any view.
+
+World: the camera of view offset (t, s) stands at (s, t, 0) and looks along z; x is right, y down, one unit is one view
+step. All pictures are sheared to the zero plane, so that a point at depth z has disparity focal / z - infinity_px.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iibr_core.runtime.jit import kernel, srgb_scalar
+from iibr_core.runtime.tiling import THREADS
+from iibr_core.training.scenes.textures import inside_pattern, is_cut, noise, pattern, rough_noise
+from iibr_core.types import FloatImage, ViewOffset
+
+PLANE, BOX, BALL, WIRE = range(4)
+"""A rectangle, a box, an ellipsoid, the side of a cylinder along its third axis."""
+
+PRIMITIVE = np.dtype(
+    [
+        ("shape", "i8"),
+        ("centre", "f8", 3),
+        ("axes", "f8", (3, 3)),  # rows: the primitive's own axes in the world, orthonormal
+        ("half", "f8", 3),  # half extents along them
+        ("nearest_z", "f8"),
+        ("cut", "i8"),  # of planes: surfaces.WHOLE, ...
+        ("cut_period", "f8"),
+        ("cut_width", "f8"),
+        ("pattern", "i8"),
+        ("period", "f8"),
+        ("roughness", "f8"),  # share of rough noise against the pattern
+        ("wavelength", "f8"),  # of the coarsest rough noise
+        ("gain", "f8"),  # strength of each octave of rough noise against the coarser
+        ("tint", "f8"),  # share of the third colour
+        ("phase", "f8", 3),
+        ("palette", "f8", (3, 3)),  # three colours in linear light, 0 .. 1
+        ("seed", "i8"),
+    ],
+    align=True,
+)
+
+CHUNK_PIXELS = 4096
+FARTHEST = 1e7
+"""Positions (px) and view offsets are cast no farther out than this."""
+STEEPEST = 0.5
+"""A surface seen at a smaller cosine than this gets a coarser pattern; above, the samples of a pixel average it."""
+TENT_STEPS = sqrt(6.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What can be seen, and the cameras that see it.
+
+    primitives: (N,) PRIMITIVE, nearest first; the last is a plane without bounds at the greatest depth, seen wherever
+    nothing else is. centre_px: (x, y) of the centre view's axis. infinity_px: minus the disparity of infinity.
+    depths: least and greatest z; nothing is seen outside. light: unit vector towards it; ambient: share of light from
+    everywhere, 1 = no shading.
+    """
+
+    primitives: NDArray[Any]
+    centre_px: tuple[float, float]
+    focal_px: float
+    infinity_px: float
+    depths: tuple[float, float]
+    light: tuple[float, float, float]
+    ambient: float
+
+
+def render(
+    scene: Scene, size: tuple[int, int], offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
+) -> tuple[FloatImage, FloatImage]:
+    """The view at an offset: colours (H, W, 3), sRGB-encoded, and disparity (H, W), exact at pixel centres.
+
+    size: (height, width). See `cast`.
+    """
+    y, x = np.indices(size)
+    colors, disparity = cast(scene, x.ravel(), y.ravel(), offset, samples, blur_px)
+    return colors.reshape(*size, 3), disparity.reshape(size)
+
+
+def cast(
+    scene: Scene, x: ArrayLike, y: ArrayLike, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
+) -> tuple[FloatImage, FloatImage]:
+    """Colours (N, 3), sRGB-encoded, and disparities (N,) of the pixels centred at (x, y), px, of the view at an offset.
+
+    x, y: (N,), any real positions. samples: squared, the rays of a pixel, averaged in linear light over its square.
+    blur_px: how much wider the lens spreads a pixel (standard deviation, px). The disparity is that of the pixel's
+    centre. Finite whatever the input. Raises ValueError if x and y differ in shape or there is no sample.
+    """
+    x, y = np.atleast_1d(_bounded(x)), np.atleast_1d(_bounded(y))
+    if x.shape != y.shape or x.ndim != 1 or samples < 1:
+        raise ValueError(f"x is {x.shape}, y {y.shape}, samples {samples}: give equal (N,) and at least one sample")
+    colors, disparity = np.empty((len(x), 3), np.float32), np.empty(len(x), np.float32)
+    places, weights = sample_places(samples, blur_px)
+    margin = float(np.abs(places).max())
+    view = _view_of(scene, offset)
+
+    def chunk(first: int) -> None:
+        part = slice(first, first + CHUNK_PIXELS)
+        _cast(x[part], y[part], places, weights, margin, *view, colors[part], disparity[part])
+
+    if len(x) <= CHUNK_PIXELS:
+        chunk(0)
+    else:
+        list(_threads().map(chunk, range(0, len(x), CHUNK_PIXELS)))
+    return colors, disparity
+
+
+def disparity_at(scene: Scene, x: ArrayLike, y: ArrayLike, offset: ViewOffset) -> FloatImage:
+    """Disparities (N,) seen at the positions (x, y), (N,), px, of the view at an offset."""
+    return cast(scene, x, y, offset, samples=1)[1]
+
+
+def seen_from(
+    scene: Scene,
+    x: ArrayLike,
+    y: ArrayLike,
+    disparity: ArrayLike,
+    offset: ViewOffset,
+    other: ViewOffset = ViewOffset(0.0, 0.0),  # noqa: B008 (immutable)
+    tolerance_px: float = 1e-3,
+) -> NDArray[np.bool_]:
+    """(N,): whether the points at (x, y) with this disparity in one view are seen from another, in frame or not.
+
+    True disocclusion is its negation. tolerance_px: of disparity.
+    """
+    x, y, d = (np.asarray(a, np.float64) for a in (x, y, disparity))
+    across, down = offset.s - other.s, offset.t - other.t
+    there = disparity_at(scene, x + d * across, y + d * down, other)
+    return np.abs(there - d) <= tolerance_px
+
+
+def _bounded(values: ArrayLike) -> NDArray[np.float64]:
+    """float64; what is not finite or lies too far off counts as 0 or as far off as possible."""
+    return np.clip(np.nan_to_num(np.asarray(values, np.float64)), -FARTHEST, FARTHEST)
+
+
+@lru_cache(maxsize=1)
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rays")
+
+
+def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where a pixel's rays go: offsets (S, 2) in (x, y), px, the centre first; and their weights (S,), sum 1.
+
+    All rays differ in x and in y, so that edges in rows and columns are mixed in samples**2 steps.
+    """
+    i, j = (a.ravel() for a in np.indices((samples, samples)))
+    q = np.stack([(i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples], axis=-1)
+    tent = np.where(q < 0.5, np.sqrt(2 * q) - 1, 1 - np.sqrt(2 * (1 - q)))
+    places = q - 0.5 + max(blur_px, 0.0) * TENT_STEPS * tent
+    weights = np.full(len(q), 1 / len(q))
+    centre = len(q) // 2
+    if samples % 2:
+        order = np.r_[centre, np.delete(np.arange(len(q)), centre)]
+        places[centre] = 0.0
+        return places[order], weights
+    return np.concatenate([np.zeros((1, 2)), places]), np.r_[0.0, weights]
+
+
+def _view_of(scene: Scene, offset: ViewOffset) -> tuple[Any, ...]:
+    """What the kernel needs to know of a view."""
+    primitives = scene.primitives
+    camera = _bounded([offset.s, offset.t, 0.0])
+    axes = np.ascontiguousarray(primitives["axes"])
+    origins = np.einsum("nij,nj->ni", axes, camera - primitives["centre"])
+    lens = np.array([*scene.centre_px, scene.focal_px, scene.infinity_px, *scene.depths])
+    light = np.array([*scene.light, scene.ambient])
+    return primitives, axes, origins, _bounds(scene, camera), camera, lens, light
+
+
+def _bounds(scene: Scene, camera: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4): each primitive lies within these x and y (first x, last x, first y, last y) of the view, px."""
+    primitives = scene.primitives
+    signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 1, 3)
+    corners = primitives["centre"] + np.einsum("cnj,njk->cnk", signs * primitives["half"], primitives["axes"])
+    in_front = corners[..., 2:] > 1e-9
+    scale = scene.focal_px / np.where(in_front, corners[..., 2:], 1.0)
+    xy = np.array(scene.centre_px) + scene.infinity_px * camera[:2] + scale * (corners[..., :2] - camera[:2])
+    low, high = np.where(in_front, xy, -inf).min(axis=0) - 1e-6, np.where(in_front, xy, inf).max(axis=0) + 1e-6
+    return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=-1)
+
+
+@kernel
+def _distance(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):  # type: ignore[no-untyped-def]
+    """How far along a ray it meets a primitive, both in the primitive's own frame; infinite where it does not."""
+    if shape == PLANE:
+        z = -oz / ez if ez != 0.0 else inf
+        return z if abs(ox + z * ex) <= hx and abs(oy + z * ey) <= hy else inf
+    if shape == BOX:
+        ax, bx = (-hx - ox) / ex, (hx - ox) / ex
+        ay, by = (-hy - oy) / ey, (hy - oy) / ey
+        az, bz = (-hz - oz) / ez, (hz - oz) / ez
+        enter = max(min(ax, bx), min(ay, by), min(az, bz))
+        leave = min(max(ax, bx), max(ay, by), max(az, bz))
+        return enter if enter <= leave else inf
+    if shape == BALL:
+        ox, oy, oz, ex, ey, ez = ox / hx, oy / hy, oz / hz, ex / hx, ey / hy, ez / hz
+        a, b, c = ex * ex + ey * ey + ez * ez, ox * ex + oy * ey + oz * ez, ox * ox + oy * oy + oz * oz - 1
+    else:
+        a, b, c = ex * ex + ey * ey, ox * ex + oy * ey, ox * ox + oy * oy - hx * hx
+    inside = b * b - a * c
+    if not inside > 0.0 or b >= 0.0:
+        return inf
+    z = c / (sqrt(inside) - b)
+    return z if shape == BALL or abs(oz + z * ez) <= hz else inf
+
+
+@kernel
+def _normal(shape, x, y, z, hx, hy, hz):  # type: ignore[no-untyped-def]
+    """The unit normal at a point of a primitive, in its own frame."""
+    if shape == PLANE:
+        return 0.0, 0.0, 1.0
+    if shape == BOX:
+        ax, ay, az = abs(x) / hx, abs(y) / hy, abs(z) / hz
+        if ax >= ay and ax >= az:
+            return 1.0 if x > 0 else -1.0, 0.0, 0.0
+        return (0.0, 1.0 if y > 0 else -1.0, 0.0) if ay >= az else (0.0, 0.0, 1.0 if z > 0 else -1.0)
+    nx, ny, nz = x / (hx * hx), y / (hy * hy), z / (hz * hz) if shape == BALL else 0.0
+    length = max(sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
+    return nx / length, ny / length, nz / length
+
+
+@kernel
+def _albedo(p, x, y, z, pixel):  # type: ignore[no-untyped-def]
+    """Colour of a primitive at a point of its own frame, linear light; see surfaces for `pixel`."""
+    x, y, z = inside_pattern(x) + p.phase[0], inside_pattern(y) + p.phase[1], inside_pattern(z) + p.phase[2]
+    rough = rough_noise(x, y, z, p.wavelength, p.gain, pixel, p.seed)
+    share = pattern(p.pattern, x, y, z, p.period, pixel, p.seed + 11)
+    share += (rough - share) * p.roughness
+    coarse = 1.7 * p.wavelength
+    tint = p.tint * noise(x / coarse, y / coarse, z / coarse, p.seed + 12)
+    r = p.palette[0, 0] + (p.palette[1, 0] - p.palette[0, 0]) * share
+    g = p.palette[0, 1] + (p.palette[1, 1] - p.palette[0, 1]) * share
+    b = p.palette[0, 2] + (p.palette[1, 2] - p.palette[0, 2]) * share
+    return (
+        r + (p.palette[2, 0] - r) * tint,
+        g + (p.palette[2, 1] - g) * tint,
+        b + (p.palette[2, 2] - b) * tint,
+    )
+
+
+@kernel
+def _cast(  # type: ignore[no-untyped-def]
+    xs, ys, places, weights, margin, primitives, axes, origins, bounds, camera, lens, light, colors, disparity
+):
+    """See `cast`. places, weights: `sample_places`; lens: centre x, y, focal, infinity, least and greatest z."""
+    focal, infinity, least_z, greatest_z = lens[2], lens[3], lens[4], lens[5]
+    backdrop = len(primitives) - 1
+    met = np.empty(len(primitives), np.int64)
+    for n in range(len(xs)):
+        count = 0
+        for k in range(backdrop):
+            if not (
+                xs[n] + margin < bounds[k, 0]
+                or xs[n] - margin > bounds[k, 1]
+                or ys[n] + margin < bounds[k, 2]
+                or ys[n] - margin > bounds[k, 3]
+            ):
+                met[count] = k
+                count += 1
+        red, green, blue = 0.0, 0.0, 0.0
+        for sample in range(len(places)):
+            wx = (xs[n] + places[sample, 0] - lens[0] - infinity * camera[0]) / focal
+            wy = (ys[n] + places[sample, 1] - lens[1] - infinity * camera[1]) / focal
+            depth, hit = greatest_z, backdrop
+            for m in range(count):
+                k = met[m]
+                p = primitives[k]
+                if p.nearest_z >= depth:
+                    break
+                ex = axes[k, 0, 0] * wx + axes[k, 0, 1] * wy + axes[k, 0, 2]
+                ey = axes[k, 1, 0] * wx + axes[k, 1, 1] * wy + axes[k, 1, 2]
+                ez = axes[k, 2, 0] * wx + axes[k, 2, 1] * wy + axes[k, 2, 2]
+                hx, hy, hz = p.half[0], p.half[1], p.half[2]
+                z = _distance(p.shape, origins[k, 0], origins[k, 1], origins[k, 2], ex, ey, ez, hx, hy, hz)
+                if least_z <= z < depth:
+                    u, v = origins[k, 0] + z * ex, origins[k, 1] + z * ey
+                    if p.cut == 0 or not is_cut(p.cut, u, v, hx, hy, p.cut_period, p.cut_width, p.seed):
+                        depth, hit = z, k
+            if sample == 0:
+                disparity[n] = focal / depth - infinity
+            if weights[sample] == 0.0:
+                continue
+
+            p = primitives[hit]
+            hx, hy, hz = p.half[0], p.half[1], p.half[2]
+            ex = axes[hit, 0, 0] * wx + axes[hit, 0, 1] * wy + axes[hit, 0, 2]
+            ey = axes[hit, 1, 0] * wx + axes[hit, 1, 1] * wy + axes[hit, 1, 2]
+            ez = axes[hit, 2, 0] * wx + axes[hit, 2, 1] * wy + axes[hit, 2, 2]
+            u, v, w = origins[hit, 0] + depth * ex, origins[hit, 1] + depth * ey, origins[hit, 2] + depth * ez
+            a, b, c = _normal(p.shape, u, v, w, hx, hy, hz)
+            nx = axes[hit, 0, 0] * a + axes[hit, 1, 0] * b + axes[hit, 2, 0] * c
+            ny = axes[hit, 0, 1] * a + axes[hit, 1, 1] * b + axes[hit, 2, 1] * c
+            nz = axes[hit, 0, 2] * a + axes[hit, 1, 2] * b + axes[hit, 2, 2] * c
+
+            # From the centre camera, so that all views see the same pattern.
+            px, py = camera[0] + depth * wx, camera[1] + depth * wy
+            towards = nx * px + ny * py + nz * depth
+            cosine = abs(towards) / sqrt(px * px + py * py + depth * depth)
+            pixel = depth / focal * min(max(STEEPEST / max(cosine, 1e-6), 1.0), 20.0)
+            r, g, b = _albedo(p, u, v, w, pixel)
+
+            # Planes have the same light on both sides, or a view from the other side would change their colour.
+            facing = -1.0 if p.shape == PLANE and towards > 0 else 1.0
+            lit = max(facing * (nx * light[0] + ny * light[1] + nz * light[2]), 0.0)
+            lit = weights[sample] * (light[3] + (1 - light[3]) * lit)
+            red, green, blue = red + lit * r, green + lit * g, blue + lit * b
+        colors[n, 0], colors[n, 1], colors[n, 2] = srgb_scalar(red), srgb_scalar(green), srgb_scalar(blue)

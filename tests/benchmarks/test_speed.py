@@ -1,0 +1,255 @@
+"""The bench's arithmetic against slow twins, its variants on a small field, its tables and plots."""
+
+from __future__ import annotations
+
+import io
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from benchmarks.speed.figures import SceneFigures, measure_scene
+from benchmarks.speed.measure import Cost, exponent, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
+from benchmarks.speed.plot import plotted
+from benchmarks.speed.prediction import Foretold, fitted_nanoseconds, foretell, is_near, make_field, whole_field
+from benchmarks.speed.rendering_figures import DrawingFigures, Drawn
+from benchmarks.speed.report import Bench, markdown_of, means, panels, write_bench
+from benchmarks.speed.scaling import Point, growth, made_up
+from benchmarks.speed.targets import Target, foretold_targets, front_targets
+from benchmarks.speed.variants import (
+    REFERENCE,
+    VARIANTS,
+    BenchScene,
+    Stored,
+    Variant,
+    bench_scenes,
+    field_cost,
+    is_possible,
+    judged_views,
+    stored_offsets,
+)
+from iibr_core.evaluation.datasets import read_scene
+from iibr_core.evaluation.metrics import psnr
+from iibr_core.generation.cost_model import CORES, NANOSECONDS, Work
+from iibr_core.types import FloatImage, ViewOffset
+from tests.iibr_core.known_scenes import HEIGHT, WIDTH, view_of_square, write_grid
+
+SMALL = (
+    REFERENCE,
+    Variant("balanced", "balanced"),
+    Variant("K = 1 candidates", slots=1),
+    Variant("half width", shrink=2),
+)
+
+
+def true_drawing(stored: Stored, offsets: object) -> list[FloatImage]:
+    """As good as drawing can be."""
+    return [view_of_square(at) for at in offsets]  # type: ignore[attr-defined]
+
+
+def quiet(done: int, total: int, doing: str) -> None:
+    assert 0 <= done <= total
+    assert doing
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> list[BenchScene]:
+    known = read_scene(write_grid(tmp_path_factory.mktemp("bench") / "square", 5))
+    assert known is not None
+    return bench_scenes(known, 10**6)
+
+
+@pytest.fixture(scope="module")
+def figures(scenes: list[BenchScene]) -> tuple[SceneFigures, ...]:
+    variants = [*SMALL, Variant("every 2nd view stored, balanced", "balanced", every=2)]
+    return tuple(measure_scene(scene, variants, 2, quiet, true_drawing) for scene in scenes)
+
+
+def test_ratios_are_taken_within_a_round() -> None:
+    reference = [Cost(1, 1.0), Cost(1, 10.0), Cost(1, 2.0)]
+    assert median_ratio([Cost(1, 3.0), Cost(1, 30.0), Cost(1, 8.0)], reference) == 3.0
+    assert math.isnan(median_ratio([Cost(1, 1)], [Cost(1, 0)]))
+    assert median_cost([Cost(1, 5), Cost(3, 4), Cost(2, 6)]) == Cost(2, 5)
+    assert Cost(1, 2) + Cost(3, 4).times(2) == Cost(7, 10)
+
+
+def test_rounds_go_through_all_ways_in_turn() -> None:
+    order: list[str] = []
+
+    def way(name: str) -> Cost:
+        order.append(name)
+        return Cost(len(order), 0)
+
+    found = in_turns({name: lambda name=name: way(name) for name in "ab"}, 3, quiet)  # type: ignore[misc]
+    assert "".join(order) == "ababab"
+    assert [cost.wall_s for cost in found["b"]] == [2, 4, 6]
+
+
+@pytest.mark.parametrize("power", [0.0, 0.5, 1.0, 2.0])
+def test_exponents_of_known_powers(power: float) -> None:
+    x = [1.0, 3.0, 10.0, 50.0]
+    assert exponent(x, [7 * value**power for value in x]) == pytest.approx(power)
+    assert exponent([0.0, *x], [5.0, *(value**power for value in x)]) == pytest.approx(power)
+    assert math.isnan(exponent([1.0, 1.0], [2.0, 3.0]))
+    assert math.isnan(exponent([1.0, 2.0], [math.nan, 3.0]))
+
+
+def test_the_front_is_what_nothing_beats() -> None:
+    rng = np.random.default_rng(0)
+    points = {str(k): (float(c), float(g)) for k, (c, g) in enumerate(rng.integers(0, 6, (30, 2)))}
+    front = on_the_front(points)
+    for name, (cost, gain) in points.items():
+        beaten = any((c < cost and g >= gain) or (c <= cost and g > gain) for c, g in points.values())
+        assert (name in front) != beaten
+    assert on_the_front({"a": (math.nan, 1.0), "b": (1.0, 1.0)}) == {"b"}
+
+
+def take_memory(lasting_mib: int, passing_mib: int) -> object:
+    passing = np.ones(passing_mib << 20, np.uint8)
+    return np.ones(lasting_mib << 20, np.uint8) + passing[0]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells")
+def test_peak_memory_sees_what_was_freed_again() -> None:
+    for _ in range(2):  # what the first kept back must not help the second
+        assert peak_bytes(take_memory, 8, 64) == pytest.approx(80 << 20, rel=0.2)
+
+
+def test_a_scene_comes_with_its_own_map_and_a_soft_one(scenes: list[BenchScene]) -> None:
+    own, soft = scenes
+    assert (own.is_soft, soft.is_soft) == (False, True)
+    assert own.reach == 2
+    assert len(own.field) == 25
+    assert len(np.unique(soft.disparity)) > len(np.unique(own.disparity)) == 2
+    for at, truth in own.truth.items():
+        assert psnr(truth, view_of_square(at)) > 45
+    assert {ViewOffset(t, s) for t in (-2.0, 2.0) for s in (-2.0, 2.0)} <= own.truth.keys()
+    assert any(at.t % 2 for at in own.truth)  # fields with views left out must be judged between those they store
+
+
+def test_stored_views_of_variants(scenes: list[BenchScene]) -> None:
+    counts = {v.name: len(stored_offsets(v, scenes[0])) for v in VARIANTS if v.quality == "fast"}
+    assert counts["fast"] == 24
+    assert counts["every 2nd view stored"] == 8
+    assert counts["centre and corners stored"] == 4
+    assert is_possible(Variant("", every=2), scenes[0], has_drawing=True)
+    assert not is_possible(Variant("", every=2), scenes[0], has_drawing=False)
+
+
+@pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.name)
+def test_every_variant_makes_views_of_the_scenes_size(scenes: list[BenchScene], variant: Variant) -> None:
+    made = judged_views(variant, scenes[0], true_drawing)
+    assert made.keys() == scenes[0].truth.keys()
+    for image in made.values():
+        assert image.shape == (HEIGHT, WIDTH, 3)
+        assert np.isfinite(image).all()
+    cost = field_cost(variant, scenes[0])
+    assert cost.wall_s > 0
+
+
+def test_what_is_left_out_shows(figures: tuple[SceneFigures, ...]) -> None:
+    own = {m.variant.name: m for m in figures[0].measured}
+    assert own["fast"].ratio == 1
+    assert own["half width"].psnr_db < own["fast"].psnr_db
+    assert figures[0].planned in own
+    assert figures[0].behind_front_db >= 0
+    assert figures[0].front <= own.keys()
+
+
+def test_the_plan_beside_what_was_measured(scenes: list[BenchScene]) -> None:
+    fast, balanced = foretell([whole_field(scenes[0])], ("fast", "balanced"), 1, quiet)
+    assert 0 < fast.foretold_s < balanced.foretold_s
+    assert min(fast.measured_s, balanced.measured_s) > 0
+    assert balanced.foretold_bytes > fast.foretold_bytes > 25 * HEIGHT * WIDTH * 7
+    assert fast.time_ratio == fast.foretold_s / fast.measured_s
+    assert len(make_field(whole_field(scenes[0]), "fast")) == 25
+
+
+def test_constants_are_recovered_from_what_they_foretold() -> None:
+    true = Work(200.0, 80.0, 300.0, 40.0, 2000.0, NANOSECONDS.soft_rays, NANOSECONDS.plain_rays)
+    rng = np.random.default_rng(0)
+    found = []
+    for _ in range(12):
+        work = Work(*(float(amount) for amount in rng.uniform(1e7, 1e8, 5)), 0.0, 0.0)
+        seconds = sum(amount * each for amount, each in zip(work, true)) * 1e-9 / CORES
+        found.append(Foretold("", "fast", 1.0, seconds, 1.0, 1.0, work))
+    assert fitted_nanoseconds(found) == pytest.approx(true, rel=1e-6)
+
+
+def test_near_is_within_a_quarter() -> None:
+    assert [is_near(ratio) for ratio in (0.7, 0.8, 1.2, 1.3, math.nan)] == [False, True, True, False, None]
+    work = Work(*7 * [0.0])
+    near, off = Foretold("a", "fast", 1.0, 1.1, 5.0, 5.0, work), Foretold("b", "fast", 1.0, 2.0, 5.0, math.nan, work)
+    time, memory = foretold_targets([near, off])
+    assert (time.is_met, memory.is_met) == (False, True)
+    assert time.measured.startswith("1 of 2")
+
+
+def test_the_plans_choice_is_judged_on_every_scene(figures: tuple[SceneFigures, ...]) -> None:
+    for scene, target in zip(figures, front_targets(figures), strict=True):
+        assert scene.name in target.what
+        assert target.is_met == (scene.behind_front_db <= 0.1)
+
+
+def test_made_up_scenes_have_what_is_asked_for() -> None:
+    photo, disparity = made_up(64, 4.0, 5)
+    assert photo.size == (64, 64)
+    assert 0 <= photo.pixels.min() < photo.pixels.max() <= 1
+    assert disparity.values.min() == 0
+    assert 2 <= disparity.values.max() <= 4
+    assert not made_up(64, 4.0, 0)[1].values.any()
+    np.testing.assert_array_equal(made_up(64, 4.0, 5)[0].pixels, photo.pixels)
+
+
+def test_growth_is_fitted_to_the_measured_points() -> None:
+    points = [Point(float(side**2), side, 3, 2.0, 4) for side in (24, 64)]
+    found = growth("pixels", points, 1, quiet)
+    assert [x for x, _, _ in found.points] == [24**2, 64**2]
+    assert found.time_exponent == pytest.approx(exponent([24.0**2, 64.0**2], [s for _, s, _ in found.points]))
+
+
+def bench_of(figures: tuple[SceneFigures, ...]) -> Bench:
+    targets = (Target("a", "<= 1", "2", False), Target("b", ">= 1", "2", True), Target("c", "d", "–", None))
+    drawn = tuple(Drawn(name, Cost(1, ratio), ratio, 9, 40 + ratio, 0.01) for name, ratio in (("once", 1), ("all", 5)))
+    foretold = (Foretold("a scene", "fast", 1.0, 2.0, 3e6, math.nan, Work(*7 * [0.0])),)
+    growths = (growth("pixels", [Point(1.0, 16, 3, 1.0, 1)], 1, quiet),)
+    drawings = (DrawingFigures("a picture", drawn),)
+    return Bench(figures, drawings, foretold, growths, targets, "a machine", "iibr bench")
+
+
+def test_tables_name_every_variant_and_mark_the_front(figures: tuple[SceneFigures, ...]) -> None:
+    text = markdown_of(bench_of(figures))
+    for title in ("## Mean over scenes, maps as they are", "## Mean over scenes, soft maps", "## Growth", "## Targets"):
+        assert title in text
+    for scene in figures:
+        part = text.split(f"## {scene.name}\n")[1].split("##")[0]
+        for measured in scene.measured:
+            (line,) = [row for row in part.splitlines() if row.startswith(f"| {measured.variant.name} |")]
+            assert ("●" in line) == (measured.variant.name in scene.front)
+    assert text.index("## Mean") < text.index(f"## {figures[0].name}")  # the first table is the one to show
+    assert "| all | ● | 5.00 |" in text.split("## Drawing: a picture")[1]
+    assert "| a scene | fast | 1.00 | 2.00 | 0.50 | off |" in text
+    assert "nan" not in text
+    assert "| missed |" in text
+
+
+def test_means_are_geometric_for_time(figures: tuple[SceneFigures, ...]) -> None:
+    (half,) = [mean for mean in means(figures) if mean.name == "half width"]
+    ratios = [m.ratio for scene in figures for m in scene.measured if m.variant.name == "half width"]
+    assert half.ratio == pytest.approx(math.sqrt(math.prod(ratios)))
+    assert half.scenes == 2
+
+
+def test_plots_are_pictures(figures: tuple[SceneFigures, ...], tmp_path: Path) -> None:
+    svg, png = plotted(panels(bench_of(figures)), ("svg", "png"))
+    assert svg.startswith(b"<?xml")
+    assert b"<svg" in svg
+    picture = Image.open(io.BytesIO(png))
+    assert picture.size[0] > 500
+    assert len(np.unique(np.asarray(picture.convert("L")))) > 20
+    paths = write_bench(tmp_path, bench_of(figures))
+    assert [path.name for path in paths] == ["speed.md", "speed.svg", "speed.png"]
+    assert sorted(tmp_path.iterdir()) == sorted(paths)

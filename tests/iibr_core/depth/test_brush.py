@@ -1,0 +1,223 @@
+"""Strokes: their reach against a slow search of shortest ways, contours, and a canvas that forgets nothing."""
+
+from __future__ import annotations
+
+import heapq
+from math import floor, hypot
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from iibr_core.depth.editing.brush import (
+    CONTOUR_CONTRAST,
+    LIKENESS,
+    DepthCanvas,
+    edited,
+    falloff,
+    smoothed,
+    stroke_distance,
+    touched_colours,
+)
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
+from iibr_core.types import InputError
+
+HEIGHT, WIDTH = 30, 40
+
+
+def plain_photo(left: float = 0.3, right: float = 0.7) -> np.ndarray:
+    """Two areas, parted by a contour in the middle."""
+    photo = np.full((HEIGHT, WIDTH, 3), left, np.float32)
+    photo[:, WIDTH // 2 :] = right
+    return photo
+
+
+def plane() -> np.ndarray:
+    """A disparity that rises from left to right, 0 to 1."""
+    return np.tile(np.linspace(0, 1, WIDTH, dtype=np.float32), (HEIGHT, 1))
+
+
+def dab(
+    tool: BrushTool = "nearer", x: float = 0.4, y: float = 0.5, radius: float = 0.2, strength: float = 0.5
+) -> Stroke:
+    return Stroke(tool, ((x, y),), radius, strength)
+
+
+def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
+    """Dijkstra over all pixels from the one under the dab's middle."""
+    height, width = photo.shape[:2]
+    (x, y), radius = stroke.points[0], stroke.radius * width
+    column, row = floor(x * width), floor(y * height)
+    distance = np.ones((height, width))
+    distance[row, column] = hypot(column - (x * width - 0.5), row - (y * height - 0.5)) / radius
+    waiting = [(distance[row, column], row, column)]
+    colors = touched_colours(photo, stroke, 0)
+    away = np.linalg.norm(photo[:, :, None] - colors, axis=3).min(axis=2)
+    unlike = np.maximum(away - LIKENESS, 0)  # of blocks of 5 x 5: there are no specks but at the window's border
+    while waiting:
+        here, row, column = heapq.heappop(waiting)
+        if here > distance[row, column]:
+            continue
+        for down in (-1, 0, 1):
+            for across in (-1, 0, 1):
+                other = row + down, column + across
+                if other == (row, column) or not (0 <= other[0] < height and 0 <= other[1] < width):
+                    continue
+                length = hypot(down, across)
+                way = here + length / radius + max(unlike[other] - unlike[row, column], 0) / CONTOUR_CONTRAST
+                if way < distance[other]:
+                    distance[other] = way
+                    heapq.heappush(waiting, (way, *other))
+    return distance
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 1000), st.floats(0.05, 0.25), st.floats(0.1, 0.9), st.floats(0.1, 0.9))
+def test_distances_are_shortest_ways(seed: int, radius: float, x: float, y: float) -> None:
+    rng = np.random.default_rng(seed)
+    photo = rng.uniform(0, 0.4, (HEIGHT // 5, WIDTH // 5, 3)).repeat(5, 0).repeat(5, 1).astype(np.float32)
+    stroke = dab(x=x, y=y, radius=radius)
+    np.testing.assert_allclose(stroke_distance(photo, stroke), slow_distance(photo, stroke), atol=1e-5)
+
+
+@pytest.mark.parametrize(("tool", "sign"), [("nearer", 1), ("farther", -1)])
+def test_a_dab_moves_its_middle_by_its_strength_and_ends_at_its_radius(tool: BrushTool, sign: int) -> None:
+    photo = np.full((61, 81, 3), 0.5, np.float32)
+    disparity = np.linspace(0, 10, 61 * 81, dtype=np.float32).reshape(61, 81)
+    stroke = Stroke(tool, ((0.5, 0.5),), 10 / 81, 0.25)
+    change = edited(photo, disparity, DepthEdits(strokes=(stroke,))) - disparity
+    assert change[30, 40] == pytest.approx(sign * 0.25 * 10, rel=0.01)
+    y, x = np.mgrid[:61, :81]
+    away = np.hypot(x - 40, y - 30)
+    assert not change[away > 11].any()
+    assert (sign * change[away < 8] > 0).all()
+    assert abs(change[30, 45]) == pytest.approx(abs(change[30, 40]) * (1 - 0.5**2) ** 2, rel=0.01)
+
+
+@pytest.mark.parametrize("tool", BRUSH_TOOLS)
+def test_a_stroke_does_not_cross_a_contour(tool: BrushTool) -> None:
+    photo, disparity = plain_photo(), plane()
+    disparity[:, WIDTH // 2 :] += 3
+    disparity[::2, : WIDTH // 2] += 0.5
+    change = edited(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),))) - disparity
+    assert np.abs(change[:, : WIDTH // 2]).max() > 0.1
+    assert not change[:, WIDTH // 2 :].any()
+
+
+def test_noise_is_no_contour() -> None:
+    rng = np.random.default_rng(0)
+    photo = np.clip(0.5 + rng.normal(0, 0.005, (HEIGHT, WIDTH, 3)), 0, 1).astype(np.float32)
+    plain = stroke_distance(np.full_like(photo, 0.5), dab())
+    assert np.abs(falloff(stroke_distance(photo, dab())) - falloff(plain)).max() < 0.15
+
+
+def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
+    photo = plain_photo(0.9, 0.9)
+    photo[:, : WIDTH // 2 : 2] = 0.1
+    photo[:, 1 : WIDTH // 2 : 2] = 0.4
+    near = falloff(stroke_distance(photo, dab(x=0.25)))
+    plain = falloff(stroke_distance(np.full_like(photo, 0.5), dab(x=0.25)))
+    np.testing.assert_allclose(near[:, : WIDTH // 2], plain[:, : WIDTH // 2], atol=1e-5)
+    assert not near[:, WIDTH // 2 :].any()
+
+
+def test_smoothing_is_its_slow_twin_along_a_row_and_keeps_a_constant() -> None:
+    rng = np.random.default_rng(1)
+    photo, values = plain_photo(), rng.normal(size=(HEIGHT, WIDTH)).astype(np.float32)
+    smooth = smoothed(photo, values, 5.0, 0.0)
+    for part in (np.s_[:, : WIDTH // 2], np.s_[:, WIDTH // 2 :]):
+        assert smooth[part].std() < 0.3 * values[part].std()
+        assert smooth[part].mean() == pytest.approx(values[part].mean(), abs=0.1)
+    constant = np.full_like(values, 2.5)
+    np.testing.assert_allclose(smoothed(photo, constant, 5.0, 0.0), constant, rtol=1e-6)
+
+
+def test_smoothing_does_not_mix_what_a_contour_parts() -> None:
+    values = np.zeros((HEIGHT, WIDTH), np.float32)
+    values[:, WIDTH // 2 :] = 1
+    np.testing.assert_allclose(smoothed(plain_photo(), values, 8.0, 0.0), values, atol=0.02)
+
+
+strokes = st.builds(
+    Stroke,
+    st.sampled_from(BRUSH_TOOLS),
+    st.lists(st.tuples(st.floats(-0.2, 1.2), st.floats(-0.2, 1.2)), min_size=1, max_size=4).map(tuple),
+    st.floats(0.01, 0.25),
+    st.floats(0, 1),
+)
+edits = st.builds(
+    lambda inverted, gamma, strokes: DepthEdits(inverted, gamma=gamma, strokes=tuple(strokes)),
+    st.booleans(),
+    st.sampled_from((0.5, 1.0)),
+    st.lists(strokes, max_size=3),
+)
+
+
+def begun(wanted: DepthEdits, points: int) -> DepthEdits:
+    """The same with no more points in the last stroke."""
+    if not wanted.strokes:
+        return wanted
+    last = wanted.strokes[-1]
+    short = Stroke(last.tool, last.points[:points], last.radius, last.strength)
+    return DepthEdits(wanted.is_inverted, gamma=wanted.gamma, strokes=(*wanted.strokes[:-1], short))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(edits, min_size=1, max_size=4), st.randoms())
+def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdits], random: object) -> None:
+    rng = np.random.default_rng(0)
+    photo = rng.uniform(0, 0.3, (HEIGHT // 5, WIDTH // 5, 3)).repeat(5, 0).repeat(5, 1).astype(np.float32)
+    canvas = DepthCanvas(photo, plane())
+    for one in wanted:
+        steps = [
+            begun(one, 1),
+            begun(one, 2),
+            one,
+            DepthEdits(one.is_inverted, gamma=one.gamma, strokes=one.strokes[:-1]),
+        ]
+        for step in steps:
+            shown = canvas.shown(step)
+            before = shown.copy()
+            np.testing.assert_array_equal(shown, edited(photo, plane(), step))
+            canvas.shown(one)
+            np.testing.assert_array_equal(shown, before, "what was handed out must not change")
+
+
+def test_the_map_before_strokes_is_not_painted() -> None:
+    photo, disparity = plain_photo(), plane()
+    canvas = DepthCanvas(photo, disparity)
+    np.testing.assert_array_equal(canvas.before_strokes(DepthEdits(strokes=(dab(),))), disparity)
+    assert canvas.shown(UNEDITED) is disparity
+
+
+@pytest.mark.parametrize("tool", BRUSH_TOOLS)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (3, 2)])
+def test_tiny_photos_can_be_painted_on(shape: tuple[int, int], tool: BrushTool) -> None:
+    photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
+    result = edited(photo, disparity, DepthEdits(strokes=(dab(tool, 0.5, 0.5, 0.25),)))
+    assert np.isfinite(result).all()
+    assert tool == "smooth" or result.any()
+
+
+@pytest.mark.parametrize("tool", BRUSH_TOOLS)
+@pytest.mark.parametrize("wild", [np.nan, np.inf, -np.inf, 3e38, -3e38])
+def test_wild_values_stay_finite(wild: float, tool: BrushTool) -> None:
+    disparity = plane()
+    disparity[10:20, 10:30] = wild
+    stroke = Stroke(tool, ((0.1, 0.1), (0.9, 0.9)), 0.2, 1.0)
+    assert np.isfinite(edited(plain_photo(), disparity, DepthEdits(strokes=(stroke, stroke)))).all()
+
+
+@pytest.mark.parametrize("place", [(-5.0, 0.5), (1e30, -1e30), (0.5, 40.0)])
+def test_a_stroke_outside_the_photo_changes_nothing(place: tuple[float, float]) -> None:
+    disparity = plane()
+    result = edited(plain_photo(), disparity, DepthEdits(strokes=(Stroke("nearer", (place,), 0.1, 1.0),)))
+    np.testing.assert_array_equal(result, disparity)
+
+
+def test_sizes_must_agree_and_something_must_be_known() -> None:
+    with pytest.raises(ValueError, match="disparity"):
+        DepthCanvas(plain_photo(), np.zeros((3, 3), np.float32))
+    with pytest.raises(InputError, match="no disparity is known"):
+        edited(plain_photo(), np.full((HEIGHT, WIDTH), np.nan, np.float32), DepthEdits(strokes=(dab(),)))

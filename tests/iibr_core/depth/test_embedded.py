@@ -1,0 +1,435 @@
+"""Depth within photos: every container read back from files written here, and every way such a file can be wrong."""
+
+from __future__ import annotations
+
+import io
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.depth.embedded.apple import heic_estimate
+from iibr_core.depth.embedded.images import MAX_MAP_PIXELS, decoded_map
+from iibr_core.depth.embedded.reader import embedded_in_jpeg, read_embedded
+from iibr_core.depth.embedded.xmp import MAX_ELEMENTS, jpeg_layout, parsed
+from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.types import InputError
+from tests.iibr_core import embedded_files as files
+
+SIZE = (24, 36)
+RNG = np.random.default_rng(5)
+STORED = RNG.integers(0, 256, SIZE).astype(np.uint8)
+DEEP = RNG.integers(0, 65536, SIZE).astype(np.uint16)
+NEAR, FAR = 2.0, 10.0
+
+
+def inverse_of(stored: np.ndarray, kind: str = "RangeInverse", near: float = NEAR, far: float = FAR) -> np.ndarray:
+    """1 / distance, by the formulas of the GDepth specification, one value after the other."""
+    result = np.empty(stored.shape)
+    for place, value in np.ndenumerate(stored):
+        n = value / np.iinfo(stored.dtype).max
+        distance = (far * near) / (far - n * (far - near)) if kind == "RangeInverse" else near + n * (far - near)
+        result[place] = 1 / distance
+    return result
+
+
+def gdepth(depth: bytes | None = None, **options: object) -> bytes:
+    depth = files.picture(STORED, "PNG") if depth is None else depth
+    return files.with_segments(files.grey_photo(SIZE), files.gdepth_segments(depth, **options))  # type: ignore[arg-type]
+
+
+def relative(data: bytes) -> np.ndarray:
+    found = embedded_in_jpeg(data)
+    assert found is not None
+    assert isinstance(found.estimate, RelativeInverseDepth)
+    assert found.estimate.values.dtype == np.float32
+    return found.estimate.values
+
+
+# ---- Google
+
+
+@pytest.mark.parametrize("part_bytes", [None, 100, 60_000])
+@pytest.mark.parametrize("kind", ["RangeInverse", "RangeLinear"])
+@pytest.mark.parametrize("stored", [STORED, DEEP])
+def test_gdepth_is_read_by_its_formula(stored: np.ndarray, kind: str, part_bytes: int | None) -> None:
+    found = relative(gdepth(files.picture(stored, "PNG"), kind=kind, part_bytes=part_bytes))
+    np.testing.assert_allclose(found, inverse_of(stored, kind), rtol=1e-5)
+
+
+def test_gdepth_as_jpeg_is_near() -> None:
+    smooth = np.tile(np.linspace(0, 255, SIZE[1]).astype(np.uint8), (SIZE[0], 1))
+    np.testing.assert_allclose(relative(gdepth(files.picture(smooth))), inverse_of(smooth), atol=0.01)
+
+
+def test_units_tell_metres_from_a_mere_scale() -> None:
+    for units, scale in (("m", 1.0), ("Meters", 1.0), ("mm", 1e-3)):
+        found = embedded_in_jpeg(gdepth(units=units))
+        assert found is not None
+        assert isinstance(found.estimate, MetricDepth)
+        np.testing.assert_allclose(found.estimate.metres, scale / inverse_of(STORED), rtol=1e-5)
+    assert relative(gdepth(units="furlongs")).shape == SIZE
+
+
+def test_an_inverse_range_may_reach_to_infinity() -> None:
+    found = relative(gdepth(far="Infinity"))
+    np.testing.assert_allclose(found, (1 - STORED / 255) / NEAR, atol=1e-6)
+    metric = embedded_in_jpeg(gdepth(far="inf", units="m"))
+    assert metric is not None
+    assert isinstance(metric.estimate, MetricDepth)
+    assert np.isfinite(metric.estimate.metres).all()
+
+
+def test_unsure_depth_is_unknown() -> None:
+    sure = np.full(SIZE, 200, np.uint8)
+    sure[3:5, 7:9] = 2
+    found = relative(gdepth(confidence=files.picture(sure, "PNG")))
+    assert np.isnan(found[3:5, 7:9]).all()
+    assert np.isnan(found).sum() == 4
+    # A map that is sure of nothing says nothing.
+    assert not np.isnan(relative(gdepth(confidence=files.picture(np.zeros(SIZE, np.uint8), "PNG")))).any()
+
+
+def test_the_sharp_picture_comes_along() -> None:
+    sharp = files.grey_photo((5, 6))
+    found = embedded_in_jpeg(gdepth(sharp=sharp))
+    assert found is not None
+    assert found.all_in_focus == sharp
+
+
+def test_parts_in_any_order_twice_and_of_another_guid() -> None:
+    segments = files.gdepth_segments(files.picture(STORED, "PNG"), part_bytes=150)
+    standard, *parts = segments
+    _, strangers = files.extended_parts(files.packet({f"{files.GDEPTH} Data": "AAAA"}), 50)
+    shuffled = [*strangers, *reversed(parts), standard, parts[1]]
+    np.testing.assert_allclose(
+        relative(files.with_segments(files.grey_photo(SIZE), shuffled)), inverse_of(STORED), rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("lost", [0, 1, -1])
+def test_a_lost_part_is_told(lost: int) -> None:
+    standard, *parts = files.gdepth_segments(files.picture(STORED, "PNG"), part_bytes=150)
+    del parts[lost]
+    with pytest.raises(InputError, match="cut short"):
+        embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [standard, *parts]))
+
+
+def test_an_extended_packet_that_is_named_and_not_there() -> None:
+    standard, *_ = files.gdepth_segments(files.picture(STORED, "PNG"), part_bytes=150)
+    with pytest.raises(InputError, match="missing"):
+        embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [standard]))
+
+
+@pytest.mark.parametrize("shared_container", [False, True])
+@pytest.mark.parametrize(
+    "trailers",
+    [
+        {},
+        {"behind": b"somebody else's trailer"},
+        {"between": b"somebody else's trailer"},
+        {"before": files.grey_photo((3, 4))},
+        {"before": files.grey_photo((3, 4)), "behind": b"..."},
+    ],
+)
+def test_dynamic_depth_is_found_among_trailers(trailers: dict[str, bytes], shared_container: bool) -> None:
+    data = files.dynamic_depth_jpeg(
+        files.grey_photo(SIZE), files.picture(STORED, "PNG"), shared_container=shared_container, **trailers
+    )
+    found = embedded_in_jpeg(data)
+    assert found is not None
+    assert isinstance(found.estimate, MetricDepth)
+    assert found.format == "Dynamic Depth"
+    np.testing.assert_allclose(1 / found.estimate.metres, inverse_of(STORED), rtol=1e-5)
+
+
+@pytest.mark.parametrize("length", [1, 10**12, -5, "many"])
+def test_dynamic_depth_of_a_wrong_length_is_told(length: object) -> None:
+    data = files.dynamic_depth_jpeg(files.grey_photo(SIZE), files.picture(STORED, "PNG"), length=length)
+    if length == 10**12:  # what there is of it is whole
+        assert embedded_in_jpeg(data) is not None
+        return
+    with pytest.raises(InputError):
+        embedded_in_jpeg(data)
+
+
+# ---- Apple and Samsung
+
+
+@pytest.mark.parametrize("kind", ["disparity", "depth"])
+def test_a_portrait_saved_as_jpeg(kind: str) -> None:
+    smooth = np.tile(np.linspace(0, 255, SIZE[1]).astype(np.uint8), (SIZE[0], 1))
+    found = relative(files.apple_jpeg(files.grey_photo(SIZE) + b"padding", smooth, 0.5, 2.5, kind))
+    linear = 0.5 + smooth / 255 * 2.0
+    np.testing.assert_allclose(found, linear if kind == "disparity" else 1 / linear, atol=0.03)
+
+
+def test_other_pictures_behind_a_photo_are_not_depth() -> None:
+    assert embedded_in_jpeg(files.apple_jpeg(files.grey_photo(SIZE), STORED, 0, 1, "urn:matte")) is None
+    assert embedded_in_jpeg(files.grey_photo(SIZE) + files.grey_photo(SIZE)) is None
+
+
+def test_the_depth_of_a_heic(tmp_path: Path) -> None:
+    depth = np.tile(np.arange(64, dtype=np.uint8) * 4, (48, 1))
+    path = tmp_path / "portrait.jpg"  # by its content, whatever its name
+    path.write_bytes(files.heic(np.full((96, 128, 3), 100, np.uint8), depth))
+    found = read_embedded(path)
+    assert found is not None
+    assert isinstance(found.estimate, RelativeInverseDepth)
+    np.testing.assert_allclose(found.estimate.values, depth / 255, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("metadata", "expected"),
+    [
+        ({}, [0.0, 0.5, 1.0]),
+        ({"representation_type": 1, "d_min": 1.0, "d_max": 3.0}, [1.0, 2.0, 3.0]),
+        ({"representation_type": 0, "d_min": 1.0, "d_max": 3.0}, [1.0, 2.0, 3.0]),
+        ({"representation_type": 0, "z_near": 0.5, "z_far": 1.0}, [1.0, 1.5, 2.0]),
+        ({"representation_type": 2, "z_near": 1.0, "z_far": 3.0}, [1.0, 0.5, 1 / 3]),
+    ],
+)
+def test_the_ranges_of_a_heic(metadata: dict[str, float], expected: list[float]) -> None:
+    found = heic_estimate(np.array([[0, 0.5, 1]], np.float32), metadata)
+    np.testing.assert_allclose(found.values, [expected], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [
+        {"d_min": 2.0, "d_max": 2.0},
+        {"d_min": 3.0, "d_max": 2.0},
+        {"d_min": float("nan"), "d_max": 2.0},
+        {"d_min": 0.0, "d_max": float("inf")},
+        {"representation_type": 2},
+        {"representation_type": 2, "z_near": 0.0, "z_far": 1.0},
+        {"representation_type": 9},
+    ],
+)
+def test_senseless_ranges_of_a_heic(metadata: dict[str, float]) -> None:
+    with pytest.raises(InputError):
+        heic_estimate(np.zeros((2, 2), np.float32), metadata)
+
+
+def test_a_heic_opens_as_a_photo_with_its_focal_length(tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = 26
+    pixels = np.zeros((64, 96, 3), np.uint8)
+    pixels[:, 48:] = (200, 100, 50)
+    path = tmp_path / "a.heic"
+    path.write_bytes(files.heic(pixels, exif=exif.tobytes()))
+    photo = read_photo(path)
+    np.testing.assert_allclose(photo.pixels * 255, pixels, atol=4)
+    assert photo.focal_px == pytest.approx(26 / np.hypot(36, 24) * np.hypot(64, 96))
+    assert read_embedded(path) is None
+    assert read_photo(path, max_pixels=1000).size == (25, 38)
+
+
+@pytest.mark.parametrize("audio", [False, True])
+def test_samsung_live_focus(audio: bool) -> None:
+    found = relative(files.samsung_jpeg(files.grey_photo(SIZE), STORED, audio=audio))
+    np.testing.assert_allclose(found, 1 - STORED / 255, atol=1e-6)
+
+
+def test_samsung_of_another_size_than_told() -> None:
+    with pytest.raises(InputError, match="40x24"):
+        embedded_in_jpeg(files.samsung_jpeg(files.grey_photo(SIZE), STORED, size=(40, 24)))
+
+
+# ---- what is wrong
+
+
+@pytest.mark.parametrize(
+    "range_",
+    [
+        {"near": 3, "far": 3},
+        {"near": 5, "far": 3},
+        {"near": 0, "far": 3},
+        {"near": -1, "far": 3},
+        {"near": "nan", "far": 3},
+        {"near": "", "far": 3},
+        {"near": "near", "far": 3},
+        {"near": 1, "far": "inf", "kind": "RangeLinear"},
+        {"kind": "RangeLogarithmic"},
+        {"kind": ""},
+    ],
+)
+def test_senseless_ranges(range_: dict[str, object]) -> None:
+    with pytest.raises(InputError):
+        embedded_in_jpeg(gdepth(**range_))
+    with pytest.raises(InputError):
+        embedded_in_jpeg(
+            files.dynamic_depth_jpeg(files.grey_photo(SIZE), files.picture(STORED, "PNG"), **range_)  # type: ignore[arg-type]
+        )
+
+
+PNG = files.picture(STORED, "PNG")
+
+
+@pytest.mark.parametrize(
+    "depth",
+    [
+        b"",
+        b"no picture",
+        PNG[:100],
+        PNG[:-20],
+        files.picture(np.dstack([STORED, STORED[::-1], STORED]), "PNG"),
+        PNG[:16] + bytes(8) + PNG[24:],  # a size of 0 x 0
+        PNG[:16] + b"\x7f\xff\xff\xff" * 2 + PNG[24:],
+    ],
+)
+def test_depth_pictures_that_are_none(depth: bytes) -> None:
+    with pytest.raises(InputError):
+        embedded_in_jpeg(gdepth(depth))
+
+
+def test_sizes_are_looked_at_before_memory_is_spent() -> None:
+    """A PNG of a few kilobytes that unpacks to more pixels than any phone stores."""
+    file = io.BytesIO()
+    Image.new("L", (9000, MAX_MAP_PIXELS // 9000 + 1)).save(file, "PNG")
+    assert len(file.getvalue()) < 200_000
+    with pytest.raises(InputError, match="9000x7112"):
+        decoded_map(file.getvalue(), "a bomb")
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3, 50])
+def test_base64_cut_short(cut: int) -> None:
+    packet = files.gdepth_segments(PNG)[0]
+    end = packet.index(b'"', packet.index(b'Data="') + 6)
+    with pytest.raises(InputError):
+        embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [packet[: end - cut] + packet[end:]]))
+
+
+BOMB = (
+    '<!DOCTYPE bomb [<!ENTITY a "aaaaaaaaaa">'
+    + "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefgh", "bcdefghi"))
+    + "]>"
+)
+
+
+@pytest.mark.parametrize("prolog", [BOMB, '<!DOCTYPE x SYSTEM "file:///etc/passwd">'])
+def test_entities_are_never_expanded(prolog: str) -> None:
+    xmp = files.STANDARD + files.packet({f"{files.GDEPTH} Near": "1"}, "&i;", prolog)
+    with pytest.raises(InputError, match="document type"):
+        embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [xmp]))
+
+
+@pytest.mark.parametrize("packet", [b"", b"<", b"<a><b></a>", b"\xff\xfe\x00", b"<a/><b/>", b"plain text"])
+def test_damaged_xml(packet: bytes) -> None:
+    with pytest.raises(InputError):
+        parsed(packet)
+
+
+def test_too_many_elements() -> None:
+    with pytest.raises(InputError, match="elements"):
+        parsed(b"<a>" + b"<b/>" * MAX_ELEMENTS + b"</a>")
+
+
+def test_photos_without_depth(tmp_path: Path) -> None:
+    assert embedded_in_jpeg(files.grey_photo(SIZE)) is None
+    assert embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [files.STANDARD + files.packet({})])) is None
+    png = tmp_path / "a.png"
+    png.write_bytes(PNG)
+    assert read_embedded(png) is None
+
+
+def test_the_error_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "bad.jpg"
+    path.write_bytes(gdepth(b"no picture"))
+    with pytest.raises(InputError, match=r"bad\.jpg: the depth map of GDepth"):
+        read_embedded(path)
+
+
+def test_one_damaged_format_does_not_hide_another() -> None:
+    damaged = files.with_segments(files.grey_photo(SIZE), files.gdepth_segments(b"no picture"))
+    found = embedded_in_jpeg(files.samsung_jpeg(damaged, STORED))
+    assert found is not None
+    assert found.format == "Samsung Live focus"
+
+
+def test_the_end_of_a_picture_is_found() -> None:
+    """Restart markers and stuffed bytes do not end a scan; the end is where the next thing begins."""
+    file = io.BytesIO()
+    Image.fromarray(RNG.integers(0, 256, (40, 50, 3)).astype(np.uint8)).save(
+        file, "JPEG", quality=100, restart_marker_rows=1
+    )
+    data = file.getvalue()
+    assert jpeg_layout(data + b"\xff\xd8behind").end == len(data)
+    assert jpeg_layout(data[:-300]).end == len(data) - 300
+
+
+# ---- hostile files, by the hundred
+
+FUZZED = {
+    "gdepth": gdepth(part_bytes=None),
+    "extended": gdepth(part_bytes=200, confidence=PNG, sharp=files.grey_photo((3, 4))),
+    "dynamic": files.dynamic_depth_jpeg(files.grey_photo(SIZE), PNG),
+    "apple": files.apple_jpeg(files.grey_photo(SIZE), STORED, 0, 1),
+    "samsung": files.samsung_jpeg(files.grey_photo(SIZE), STORED, audio=True),
+}
+MUTATIONS = 300
+
+
+def mutated(data: bytes, random_: random.Random) -> bytes:
+    """Bytes flipped, cut out, doubled, or the end lost."""
+    result = bytearray(data)
+    for _ in range(random_.randint(1, 6)):
+        at = random_.randrange(len(result))
+        length = random_.choice((1, 1, 2, 4, 40, 400))
+        match random_.randrange(5):
+            case 0:
+                result[at] ^= 1 << random_.randrange(8)
+            case 1:
+                result[at : at + length] = bytes(random_.randrange(256) for _ in range(length))
+            case 2:
+                del result[at : at + length]
+            case 3:
+                result[at:at] = result[at : at + length]
+            case 4:
+                result[at : at + 4] = random_.choice((b"\xff\xff\xff\xff", b"\0\0\0\0", b"\x7f\xff\xff\xff"))
+        if len(result) < 8:
+            break
+    return bytes(result[: random_.randrange(len(result))] if random_.random() < 0.1 else result)
+
+
+@pytest.mark.parametrize("name", FUZZED)
+def test_damaged_files_give_depth_or_one_line(name: str) -> None:
+    random_ = random.Random(name)
+    outcomes = {"depth": 0, "none": 0, "refused": 0}
+    lines: set[str] = set()
+    for _ in range(MUTATIONS):
+        try:
+            found = embedded_in_jpeg(mutated(FUZZED[name], random_))
+        except InputError as error:
+            outcomes["refused"] += 1
+            lines.add(str(error))
+            continue
+        outcomes["none" if found is None else "depth"] += 1
+        if found is not None:
+            values = found.estimate.metres if isinstance(found.estimate, MetricDepth) else found.estimate.values  # type: ignore[union-attr]
+            assert values.ndim == 2
+            assert 0 < values.size < 1e6
+            assert not np.isinf(values).any()
+    assert all(outcomes.values()), outcomes
+    assert not any("\n" in line for line in lines)
+
+
+def test_damaged_heics_give_depth_or_one_line(tmp_path: Path) -> None:
+    random_ = random.Random(1)
+    data = files.heic(np.full((48, 64, 3), 100, np.uint8), np.zeros((24, 32), np.uint8))
+    path, outcomes = tmp_path / "a.heic", {"read": 0, "refused": 0}
+    lines: set[str] = set()
+    for _ in range(MUTATIONS):
+        path.write_bytes(data[:12] + mutated(data[12:], random_))
+        for read in (read_embedded, read_photo):
+            try:
+                read(path)
+                outcomes["read"] += 1
+            except InputError as error:
+                outcomes["refused"] += 1
+                lines.add(str(error))
+    assert all(outcomes.values()), outcomes
+    assert not any("\n" in line for line in lines)

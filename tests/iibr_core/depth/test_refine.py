@@ -1,0 +1,173 @@
+"""Soft depth edges made sharp: against the exact maps they came from, and the cases that must stay as they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from iibr_core.depth.refine import edge_blur_px, refine
+from iibr_core.training.degradation import blurred, coarse
+from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.types import InputError, ViewOffset
+from tests.iibr_core.scenes import smooth_texture, square_before_wall
+
+CENTRE = ViewOffset(0.0, 0.0)
+
+
+def disc_before_slope(size: int = 120) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Photo, exact disparity, foreground: a tilted disc before a tilted wall."""
+    y, x = np.mgrid[:size, :size]
+    front = (x - 55) ** 2 + (y - 62) ** 2 < 32**2
+    photo = np.where(front[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4)
+    disparity = np.where(front, 2.0 + 0.002 * x, 0.3 + 0.003 * y)
+    return photo.astype(np.float32), disparity.astype(np.float32), front
+
+
+def rms(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((a - b) ** 2)))
+
+
+@pytest.mark.parametrize("sigma", [0.8, 1.0, 2.0, 4.0])
+def test_the_blur_of_a_map_is_measured(sigma: float) -> None:
+    _, disparity, _ = disc_before_slope()
+    assert edge_blur_px(blurred(disparity, sigma)) == pytest.approx(sigma, rel=0.2)
+
+
+def test_a_wide_blur_is_measured_on_a_smaller_map() -> None:
+    disparity = np.zeros((400, 400), np.float32)
+    disparity[:, 200:] = 1
+    assert edge_blur_px(blurred(disparity, 8.0)) == pytest.approx(8.0, rel=0.2)
+
+
+@pytest.mark.parametrize("sigma", [1.0, 2.0, 4.0])
+def test_blurred_edges_become_steps_where_they_were(sigma: float) -> None:
+    photo, disparity, front = disc_before_slope()
+    soft = blurred(disparity, sigma)
+    sharp = refine(photo, soft)
+    assert rms(sharp, disparity) < 0.35 * rms(soft, disparity)
+    assert np.mean((sharp > 1.2) != front) < 0.01
+    flying = (sharp > 0.9) & (sharp < 1.7)
+    assert flying.mean() < 0.05 * ((soft > 0.9) & (soft < 1.7)).mean()
+
+
+def test_half_resolution_becomes_steps() -> None:
+    photo, disparity, _ = disc_before_slope()
+    soft = coarse(disparity, 2)
+    assert rms(refine(photo, soft), disparity) < 0.7 * rms(soft, disparity)
+
+
+def test_the_edge_follows_the_photo_where_the_map_is_beside_it() -> None:
+    photo, disparity, front = disc_before_slope()
+    soft = blurred(np.roll(disparity, 1, axis=1), 1.5)
+    without_photo = refine(np.full_like(photo, 0.5), soft)
+    wrong, wrong_without = ((sharp > 1.2) != front for sharp in (refine(photo, soft), without_photo))
+    assert wrong.sum() < 0.7 * wrong_without.sum()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_exact_maps_stay_as_they_are(seed: int) -> None:
+    colors, disparity = render(random_scene(np.random.default_rng(seed), (128, 160), 3.0), (128, 160), CENTRE, 1)
+    np.testing.assert_array_equal(refine(colors, disparity), disparity)
+
+
+def test_slanted_surfaces_stay_as_they_are_beside_soft_edges() -> None:
+    photo, disparity, _ = disc_before_slope()
+    soft = blurred(disparity, 2.0)
+    y, x = np.mgrid[:120, :120]
+    far_from_edge = np.abs(np.hypot(x - 55, y - 62) - 32) > 14
+    np.testing.assert_array_equal(refine(photo, soft)[far_from_edge], soft[far_from_edge])
+
+
+def test_a_steep_slope_is_no_edge_beside_sharper_ones() -> None:
+    disparity = np.zeros((80, 160), np.float32)
+    disparity[:, 80:] = 2.0
+    disparity[:40] = np.clip((np.arange(160) - 50) / 30, 0, 2)
+    soft = blurred(disparity, 1.0)
+    refined = refine(smooth_texture(80, 160), soft)
+    np.testing.assert_allclose(refined[:34], soft[:34], atol=1e-5)
+    assert np.minimum(np.abs(refined[46:]), np.abs(refined[46:] - 2)).max() < 0.1
+
+
+def test_thin_structures_are_kept() -> None:
+    photo, disparity, _ = disc_before_slope()
+    disparity[:, 100:104] = 2.5
+    photo[:, 100:104] = [0.9, 0.9, 0.2]
+    soft = blurred(disparity, 1.0)
+    sharp = refine(photo, soft)
+    assert sharp[:, 100:104].mean() >= soft[:, 100:104].mean()
+    assert sharp[20:100, [97, 106]].mean() <= soft[20:100, [97, 106]].mean()
+
+
+def test_strength_zero_is_off_and_between_is_between() -> None:
+    photo, disparity, _ = disc_before_slope()
+    soft = blurred(disparity, 2.0)
+    np.testing.assert_array_equal(refine(photo, soft, 0.0), soft)
+    errors = [rms(refine(photo, soft, strength), disparity) for strength in (0.0, 0.4, 0.8, 1.0)]
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_scale_and_offset_of_the_map_do_not_matter() -> None:
+    photo, disparity, _ = disc_before_slope()
+    soft = blurred(disparity, 2.0)
+    other = refine(photo, soft * 8 - 16)
+    # At the threshold of a decision rounding may tip it.
+    assert np.mean(np.abs((other + 16) / 8 - refine(photo, soft)) > 1e-3) < 1e-3
+
+
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    photo, disparity, _ = disc_before_slope()
+    soft = blurred(disparity, 2.0)
+    reference = refine(photo, soft)
+    monkeypatch.setattr("iibr_core.runtime.tiling.THREADS", 7)
+    np.testing.assert_array_equal(refine(photo, soft), reference)
+
+
+def test_the_input_is_left_alone() -> None:
+    photo, disparity, _ = disc_before_slope()
+    soft = blurred(disparity, 2.0)
+    before = soft.copy()
+    refine(photo, soft)
+    np.testing.assert_array_equal(soft, before)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1), (2, 2), (3, 3), (31, 17)])
+@pytest.mark.parametrize("value", [0.0, -3.0, 1e30])
+def test_constant_maps_of_any_size_stay_as_they_are(size: tuple[int, int], value: float) -> None:
+    disparity = np.full(size, value, np.float32)
+    np.testing.assert_array_equal(refine(np.zeros((*size, 3), np.float32), disparity), disparity)
+
+
+def test_unknown_disparity_is_filled() -> None:
+    photo, disparity = square_before_wall()
+    values = disparity.values.copy()
+    values[5:9, 5:9], values[30, 40] = np.nan, np.inf
+    assert np.isfinite(refine(photo.pixels, values)).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    hnp.arrays(
+        np.float32,
+        st.tuples(st.integers(2, 24), st.integers(2, 24)),
+        elements=st.floats(-1e6, 1e6, width=32) | st.sampled_from([np.nan, np.inf, 1.0, 0.0]),
+    )
+)
+def test_any_map_comes_back_finite(disparity: np.ndarray) -> None:
+    photo = np.random.default_rng(0).random((*disparity.shape, 3), dtype=np.float32)
+    if not np.isfinite(disparity).any():
+        with pytest.raises(InputError, match="no disparity is known"):
+            refine(photo, disparity)
+    else:
+        assert np.isfinite(refine(photo, disparity)).all()
+
+
+def test_bad_arguments_are_told() -> None:
+    photo, disparity = np.zeros((4, 5, 3), np.float32), np.zeros((4, 5), np.float32)
+    with pytest.raises(ValueError, match=r"\(4, 5, 3\).*\(4, 4\)"):
+        refine(photo, disparity[:, :4])
+    for strength in (-0.1, 1.5, np.nan):
+        with pytest.raises(InputError, match="from 0"):
+            refine(photo, disparity, strength)

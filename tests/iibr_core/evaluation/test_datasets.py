@@ -1,0 +1,326 @@
+"""Readers of data sets on small folders: viewpoints, maps, and one clear line for what is damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.evaluation.datasets import find_scenes, read_known_disparity, read_scene, read_view, turned_back
+from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.light_fields.scene import KnownView, MultiView, nearest_view
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.types import InputError, ViewOffset
+from tests.iibr_core.known_scenes import (
+    HEIGHT,
+    WIDTH,
+    disparity_of_square,
+    offsets_of,
+    view_of_wall,
+    write_grid,
+    write_hci,
+    write_numbered,
+)
+
+
+def scene_of(folder: Path) -> MultiView:
+    scene = read_scene(folder)
+    assert scene is not None
+    return scene
+
+
+def offset_by_file(scene: MultiView) -> dict[str, ViewOffset]:
+    """Viewpoints from the centre view's, by the stem of the file."""
+    origin = scene.views[scene.centre].offset
+    return {v.path.stem: ViewOffset(v.offset.t - origin.t, v.offset.s - origin.s) for v in scene.views}
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(3, 3), (1, 3), (3, 5)])
+def test_hci_names_count_row_by_row(tmp_path: Path, rows: int, columns: int) -> None:
+    folder = write_hci(tmp_path / "dino", rows, columns)
+    write_picture(folder / "objectids_highres.png", np.zeros((9, 9, 3), np.uint8))  # comes with the data set
+    scene = scene_of(folder)
+    assert scene.name == "dino"
+    assert scene.layout == f"HCI 4D light field, {columns}x{rows}"
+    wanted = {f"input_Cam{v * columns + u:03d}": at for (v, u), at in offsets_of(rows, columns).items()}
+    assert offset_by_file(scene) == wanted
+    assert list(scene.disparity) == [scene.centre]
+    known = scene.disparity[scene.centre]
+    assert known.is_truth
+    np.testing.assert_array_equal(read_known_disparity(known, (HEIGHT, WIDTH)).values, disparity_of_square())
+
+
+def test_views_in_a_subfolder_with_truth_and_estimates(tmp_path: Path) -> None:
+    folder = write_grid(tmp_path / "scene")
+    np.save(folder / "disp_est_u02_v00.npy", disparity_of_square())
+    scene = scene_of(folder)
+    assert scene.layout == "grid folder, 3x3"
+    assert offset_by_file(scene) == {f"v{v:02d}_u{u:02d}": at for (v, u), at in offsets_of(3, 3).items()}
+    names = {scene.views[index].name: known.is_truth for index, known in scene.disparity.items()}
+    assert names == {"v01 u01": True, "v00 u02": False}
+
+
+@pytest.mark.parametrize("name", ["lf_{v:02d}_{u:02d}.png", "scene7_{v1}_{u1}.png", "{k:03d}.png", "img-{k1}.png"])
+def test_hebers_grid_under_any_numbering(tmp_path: Path, name: str) -> None:
+    """By row and column or row by row, counted from 0 or from 1; the map without a number is the centre view's."""
+    offsets = offsets_of(11, 11)
+    names = {
+        name.format(v=v, u=u, v1=v + 1, u1=u + 1, k=v * 11 + u, k1=v * 11 + u + 1): at for (v, u), at in offsets.items()
+    }
+    folder = write_numbered(tmp_path / "pov", names)
+    write_pfm(folder / "disparity.pfm", np.ones((8, 8), np.float32))
+    scene = scene_of(folder)
+    assert scene.layout == "Pov-ray (Heber), 11x11"
+    assert offset_by_file(scene) == {Path(name).stem: at for name, at in names.items()}
+    assert list(scene.disparity) == [scene.centre]
+
+
+def stanford_names(jitter: float = 0.0) -> dict[str, ViewOffset]:
+    """5 rows counted upwards, 4 columns; positions in millimetres, x growing to the left, up to `jitter` steps off."""
+    rng, found = np.random.default_rng(3), {}
+    for row in range(5):
+        for column in range(4):
+            t, s = -row + rng.uniform(-jitter, jitter), column + rng.uniform(-jitter, jitter)
+            found[f"out_{row:02d}_{column:02d}_{100 + 30 * t:.6f}_{-30 * s:.6f}_.png"] = ViewOffset(t, s)
+    return found
+
+
+@pytest.mark.parametrize("inside", ["", "rectified"])
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_stanford_viewpoints_are_the_cameras_positions(tmp_path: Path, inside: str, jitter: float) -> None:
+    names = stanford_names(jitter)
+    write_numbered(tmp_path / "lego" / inside, names)
+    scene = scene_of(tmp_path / "lego")
+    assert scene.layout == "Stanford archive, 4x5"
+    found = np.array([view.offset for view in scene.views])
+    wanted = np.array([names[view.path.name] for view in scene.views])
+    np.testing.assert_allclose(found - found[0], wanted - wanted[0], atol=0.1 * jitter * 20 + 1e-6)
+    by_index = {view.name: view.offset for view in scene.views}
+    assert by_index["row 4 column 0"].t < by_index["row 0 column 0"].t  # rows are counted upwards
+    assert by_index["row 0 column 3"].s > by_index["row 0 column 0"].s
+
+
+def test_stanford_positions_that_make_no_grid_are_told(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    names = {
+        f"out_{v:02d}_{u:02d}_{rng.uniform():.5f}_{rng.uniform():.5f}.png": ViewOffset(0, 0)
+        for v in range(3)
+        for u in range(3)
+    }
+    scene = scene_of(write_numbered(tmp_path / "odd", names))
+    assert "regular" in scene.notes[0]
+    assert {tuple(view.offset) for view in scene.views} == {(-float(v), float(u)) for v in range(3) for u in range(3)}
+
+
+def test_middlebury_pair_from_the_left(tmp_path: Path) -> None:
+    folder = write_numbered(tmp_path / "pair", {f"im{n}.png": ViewOffset(0, n) for n in (0, 1)}, (HEIGHT, WIDTH))
+    disparity = np.full((HEIGHT, WIDTH), 7.5, np.float32)
+    disparity[0, 0] = np.inf
+    write_pfm(folder / "disp0.pfm", disparity)
+    scene = scene_of(folder)
+    assert scene.layout == "Middlebury pair"
+    assert scene.centre == 0
+    assert offset_by_file(scene) == {"im0": (0, 0), "im1": (0, 1)}
+    known = read_known_disparity(scene.disparity[0], (HEIGHT, WIDTH))
+    assert known.values[1, 1] == 7.5
+    assert np.isfinite(known.values).all()
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "truths", "extension", "width", "factor"),
+    [
+        ("im", 9, (2, 6), ".png", 450, 4.0),  # 2003, quarter size
+        ("im", 9, (2, 6), ".ppm", 434, 8.0),  # 2001
+        ("view", 7, (1, 5), ".png", 463, 3.0),  # 2005, third size
+    ],
+)
+def test_middlebury_rows_store_four_steps_times_a_factor(
+    tmp_path: Path, kind: str, count: int, truths: tuple[int, int], extension: str, width: int, factor: float
+) -> None:
+    pixels = np.zeros((4, width, 3), np.uint8)
+    for n in range(count):
+        write_picture(tmp_path / f"{kind}{n}{extension}", pixels)
+    for n in truths:
+        stored = np.full((4, width), 120, np.uint8)
+        stored[0, 0] = 0  # unknown
+        write_picture(tmp_path / f"disp{n}.png", stored)
+    scene = scene_of(tmp_path)
+    assert [view.offset.s for view in scene.views] == list(range(count))
+    assert list(scene.disparity) == list(truths)
+    for known in scene.disparity.values():
+        values = read_known_disparity(known, (4, width)).values
+        np.testing.assert_allclose(values, 120 / factor / 4, rtol=1e-5)
+
+
+def write_picture(path: Path, pixels: np.ndarray) -> None:
+    import cv2
+
+    assert cv2.imwrite(str(path), pixels)
+
+
+def rotation(axis: str, degrees: float) -> np.ndarray:
+    """World-to-camera rotation for x right, y down, z forward."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array({"y": [[c, 0, s], [0, 1, 0], [-s, 0, c]], "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]]}[axis])
+
+
+def write_llff(folder: Path, cameras: list[tuple[tuple[float, float, float], np.ndarray]], focal: float) -> Path:
+    """Pictures of a wall at depth 10, as these cameras (position, world-to-camera) see it."""
+    folder.mkdir()
+    (folder / "images").mkdir()
+    rows = []
+    for k, (position, camera) in enumerate(cameras):
+        write_image(folder / "images" / f"IMG_{k:02d}.png", seen_wall(np.array(position), camera, focal))
+        right, down, forward = camera
+        pose = np.column_stack([down, right, -forward, position, [HEIGHT, WIDTH, focal]])
+        rows.append(np.concatenate([pose.ravel(), [8.0, 40.0]]))
+    np.save(folder / "poses_bounds.npy", np.array(rows))
+    return folder
+
+
+def seen_wall(position: np.ndarray, camera: np.ndarray, focal: float, depth: float = 10.0) -> np.ndarray:
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    rays = np.stack([(x - (WIDTH - 1) / 2) / focal, (y - (HEIGHT - 1) / 2) / focal, np.ones_like(x)], -1) @ camera
+    at = position + rays * ((depth - position[2]) / rays[..., 2])[..., None]
+    waves = [np.sin(2.1 * at[..., 0] + k) * np.cos(1.7 * at[..., 1] - 2 * k) for k in range(3)]
+    return (0.5 + 0.3 * np.stack(waves, -1)).astype(np.float32)
+
+
+def test_llff_viewpoints_and_turned_cameras(tmp_path: Path) -> None:
+    """Cameras on a plane: viewpoints in mean steps, pictures turned back as cameras that look the same way see them."""
+    straight, focal = np.eye(3), 60.0
+    places = [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0)]
+    turns = [straight, rotation("y", 5), rotation("z", -4), straight]
+    cameras = [((x, y, 0.0), turn) for (x, y), turn in zip(places, turns)]
+    scene = scene_of(write_llff(tmp_path / "fern", cameras, focal))
+    assert scene.centre == 0
+    assert offset_by_file(scene) == {f"IMG_{k:02d}": (y, x) for k, (x, y) in enumerate(places)}
+    assert scene.range_px == pytest.approx((focal / 40, focal / 8))
+    for k, (x, y) in enumerate(places):
+        pixels, known = read_view(scene.views[k], 10**6)
+        wanted = seen_wall(np.array([x, y, 0.0]), straight, focal)
+        assert known.mean() > 0.7
+        assert np.abs(pixels - wanted)[known].max() < 0.02
+
+
+def test_llff_in_a_turned_world_gives_the_same(tmp_path: Path) -> None:
+    world = rotation("y", 70) @ rotation("z", 20)
+    places = [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 2.0, 0.5)]
+    plain = scene_of(write_llff(tmp_path / "a", [(p, np.eye(3)) for p in places], 50.0))
+    turned = [(tuple(world.T @ p), world) for p in np.array(places)]
+    other = scene_of(write_llff(tmp_path / "b", turned, 50.0))
+    np.testing.assert_allclose(
+        np.array([v.offset for v in plain.views]), np.array([v.offset for v in other.views]), atol=1e-9
+    )
+    for one, two in zip(plain.views, other.views):
+        assert one.turned is not None
+        assert two.turned is not None
+        np.testing.assert_allclose(one.turned, two.turned, atol=1e-6)
+    assert "0.2 view steps before or behind" in plain.notes[0]
+
+
+def test_turning_back_by_nothing_changes_nothing() -> None:
+    pixels = view_of_wall(ViewOffset(0, 0))
+    same, known = turned_back(pixels, np.eye(3))
+    assert known.all()
+    np.testing.assert_allclose(same, pixels, atol=1e-5)
+
+
+def test_a_turned_view_made_smaller_is_the_small_turned_view(tmp_path: Path) -> None:
+    cameras = [((0.0, 0.0, 0.0), np.eye(3)), ((1.0, 0.0, 0.0), rotation("y", 4)), ((-1.0, 0, 0), np.eye(3))]
+    scene = scene_of(write_llff(tmp_path / "fern", cameras, 60.0))
+    small, known = read_view(scene.views[1], HEIGHT * WIDTH // 4)
+    full = seen_wall(np.array([1.0, 0, 0]), np.eye(3), 60.0)
+    wanted = full.reshape(HEIGHT // 2, 2, WIDTH // 2, 2, 3).mean(axis=(1, 3))
+    assert small.shape == wanted.shape
+    assert np.abs(small - wanted)[known].max() < 0.03
+
+
+def test_folders_of_scenes_are_looked_through(tmp_path: Path) -> None:
+    write_grid(tmp_path / "b")
+    write_hci(tmp_path / "a")
+    (tmp_path / "other").mkdir()
+    assert [scene.name for scene in find_scenes(tmp_path)] == ["a", "b"]
+
+
+def test_the_centre_of_an_even_grid_is_farther_down_and_right() -> None:
+    views = tuple(KnownView("", ViewOffset(t, s), Path()) for t in (0.0, 1.0) for s in (0.0, 1.0, 2.0, 3.0))
+    assert views[nearest_view(views, ViewOffset(0.5, 1.5))].offset == (1.0, 2.0)
+
+
+Damage = Callable[[Path], object]
+
+
+def rows_of(folder: Path) -> np.ndarray:
+    return np.load(folder / "poses_bounds.npy")
+
+
+def spoil(folder: Path, row: int, column: int, value: float) -> None:
+    rows = rows_of(folder)
+    rows[row, column] = value
+    np.save(folder / "poses_bounds.npy", rows)
+
+
+GRID_DAMAGE: list[tuple[Damage, str]] = [
+    (lambda f: (f / "views/v01_u02.png").unlink(), "row 1, column 2"),
+    (lambda f: (f / "views/v01_u02.png").rename(f / "views/v01_u03.png"), "missing"),
+    (lambda f: write_image(f / "views/v02_u02.png", np.zeros((5, 5, 3), np.float32)), "v02_u02.png"),
+    (lambda f: (f / "views/v02_u02.png").write_bytes(b"\x89PNG\r\n\x1a\n"), "v02_u02.png"),
+    (lambda f: write_image(f / "views/v1_u1.exr", np.zeros((5, 5, 3), np.float32)), "same view"),
+]
+LLFF_DAMAGE: list[tuple[Damage, str]] = [
+    (lambda f: (f / "images/IMG_01.png").unlink(), "3 poses for 2 pictures"),
+    (lambda f: (f / "poses_bounds.npy").write_bytes(b"no array"), "poses_bounds.npy"),
+    (lambda f: np.save(f / "poses_bounds.npy", rows_of(f)[:, :16]), "17 numbers"),
+    (lambda f: np.save(f / "poses_bounds.npy", np.zeros((3, 17), object), allow_pickle=True), "poses_bounds.npy"),
+    (lambda f: spoil(f, 0, 0, np.nan), "rotations"),
+    (lambda f: spoil(f, 1, 0, 3.0), "rotations"),
+    (lambda f: spoil(f, 1, 4, 0.0), "positive"),
+    (lambda f: spoil(f, 2, 15, -1.0), "depths"),
+]
+
+
+@pytest.mark.parametrize(("damage", "named"), GRID_DAMAGE)
+def test_a_damaged_grid_is_one_clear_line(tmp_path: Path, damage: Damage, named: str) -> None:
+    folder = write_grid(tmp_path / "scene")
+    damage(folder)
+    with pytest.raises(InputError, match=named) as caught:
+        list(find_scenes(folder))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("damage", "named"), LLFF_DAMAGE)
+def test_damaged_poses_are_one_clear_line(tmp_path: Path, damage: Damage, named: str) -> None:
+    folder = write_llff(tmp_path / "fern", [((float(k), 0.0, 0.0), np.eye(3)) for k in range(3)], 50.0)
+    damage(folder)
+    with pytest.raises(InputError, match=named) as caught:
+        list(find_scenes(folder))
+    assert "\n" not in str(caught.value)
+
+
+def test_damaged_parameters_and_gaps_of_hci_are_told(tmp_path: Path) -> None:
+    folder = write_hci(tmp_path / "dino")
+    (folder / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 3\n")
+    with pytest.raises(InputError, match=r"9 views do not fill a grid of 4x3"):
+        read_scene(folder)
+    (folder / "parameters.cfg").write_text("num_cams_x = many")
+    with pytest.raises(InputError, match=r"parameters\.cfg"):
+        read_scene(folder)
+    (folder / "input_Cam004.png").unlink()
+    with pytest.raises(InputError, match="view 4 is missing"):
+        read_scene(folder)
+
+
+def test_what_is_no_data_set_is_told(tmp_path: Path) -> None:
+    (tmp_path / "photo.png").touch()
+    for path in (tmp_path, tmp_path / "gone", tmp_path / "photo.png"):
+        with pytest.raises(InputError, match="HCI, Stanford"):
+            list(find_scenes(path))
+
+
+def test_a_single_view_cannot_be_compared(tmp_path: Path) -> None:
+    write_numbered(tmp_path / "one", {"out_00_00_1.0_2.0.png": ViewOffset(0, 0)})
+    with pytest.raises(InputError, match="only view"):
+        read_scene(tmp_path / "one")

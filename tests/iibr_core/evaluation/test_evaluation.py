@@ -1,0 +1,265 @@
+"""Whole evaluations of small scenes: what is judged, what is always there, reports that are complete."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.evaluation import report
+from iibr_core.evaluation.datasets import read_scene
+from iibr_core.evaluation.metrics import flip, psnr, ssim
+from iibr_core.evaluation.protocol import Judgement, Options, evaluate
+from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
+from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, given_of, trials_of
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.view_maker import ViewMaker, as_stored, outer_views
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import GridShape, InputError, Quality, ViewOffset
+from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid, write_numbered
+from tests.iibr_core.scenes import disparity_of, literal_plan, photo_of
+
+ALWAYS = ["identity", "reference warp", "fast", "balanced", "exact"]
+UNREFINED = DepthChoice(refine=0.0)
+
+
+def scene_of(folder: Path) -> MultiView:
+    scene = read_scene(folder)
+    assert scene is not None
+    return scene
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_grid(tmp_path_factory.mktemp("scenes") / "square")
+
+
+@pytest.fixture(scope="module")
+def judgements(folder: Path) -> list[Judgement]:
+    return evaluate(scene_of(folder), Options(choice=UNREFINED))
+
+
+@pytest.mark.parametrize("quality", ["fast", "balanced"])
+def test_views_are_those_that_generate_makes(quality: Quality) -> None:
+    photo, disparity = photo_of(view_of_square(ViewOffset(0, 0))), disparity_of(disparity_of_square())
+    grid = GridShape(5, 5)
+    made = {
+        (u.row, u.column): u for u in generate(photo, disparity, literal_plan(photo, disparity, 5), quality=quality)
+    }
+    offsets = {(v, u): grid.offset(v, u) for v, u in made if (v, u) != grid.centre}
+    with ViewMaker(photo.pixels, disparity.values, offsets.values(), (quality,)) as maker:
+        for index, offset in offsets.items():
+            shown = np.rint(255 * as_stored(maker.view(quality, offset).colors)).astype(np.uint8)
+            np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
+
+
+def test_outer_views_are_corners_and_side_middles_of_what_is_asked_for() -> None:
+    square = [ViewOffset(t, s) for t in (-2.0, 1.0) for s in (-1.0, 3.0)]
+    assert set(outer_views(square)) == {(-2, -1), (1, 3), (-2, 3), (1, -1), (0, -1), (0, 3), (-2, 0), (1, 0)}
+    assert outer_views([ViewOffset(0.0, 1.0)]) == [(0, 1)]
+    assert outer_views([ViewOffset(0.0, 0.0)]) == []
+
+
+def test_both_trials_show_every_row(judgements: list[Judgement]) -> None:
+    assert [j.trial for j in judgements] == [CENTRE_TRIAL, CORNER_TRIAL]
+    centre, corner = judgements
+    for judgement in judgements:
+        assert [row.method for row in judgement.rows] == ALWAYS
+        assert judgement.size == (HEIGHT, WIDTH)
+    assert centre.given == "v01 u01"
+    assert set(centre.rows[0].of_views) == {f"v{v:02d} u{u:02d}" for v in range(3) for u in range(3)} - {"v01 u01"}
+    assert corner.given == "v02 u00"
+    assert list(corner.rows[0].of_views) == ["v00 u00"]
+    assert any("carried over" in note for note in corner.notes)
+
+
+def test_figures_are_of_the_right_pictures(folder: Path, judgements: list[Judgement]) -> None:
+    """Identity and reference warp, worked out anew from the files."""
+    photo = read_photo(folder / "views/v01_u01.png").pixels
+    truth = read_photo(folder / "views/v00_u02.png").pixels
+    offset = ViewOffset(-1.0, 1.0)
+    warped = reference_warp(photo, disparity_of_square(), offset)
+    rows = {row.method: row.of_views["v00 u02"] for row in judgements[0].rows}
+    for name, image in (("identity", photo), ("reference warp", as_stored(warped.colors))):
+        figures = rows[name]
+        assert figures.full_db == pytest.approx(psnr(image, truth))
+        assert figures.visible_db == pytest.approx(psnr(image, truth, warped.visible))
+        assert figures.hole_db == pytest.approx(psnr(image, truth, warped.hole))
+        assert figures.ssim == pytest.approx(ssim(image, truth))
+        assert figures.flip == pytest.approx(flip(image, truth))
+        assert math.isnan(figures.lpips)
+
+
+def test_means_and_the_worst_view(judgements: list[Judgement]) -> None:
+    for row in judgements[0].rows:
+        full = {name: figures.full_db for name, figures in row.of_views.items()}
+        assert row.mean.full_db == pytest.approx(np.mean(list(full.values())))
+        assert (row.worst_view, row.worst_db) == min(full.items(), key=lambda item: item[1])
+        holes = [figures.hole_db for figures in row.of_views.values() if math.isfinite(figures.hole_db)]
+        assert row.mean.hole_db == pytest.approx(np.mean(holes))
+
+
+def test_every_way_beats_doing_nothing(judgements: list[Judgement]) -> None:
+    for judgement in judgements:
+        full = {row.method: row.mean.full_db for row in judgement.rows}
+        assert full["identity"] + 10 < min(full["reference warp"], full["fast"])
+        assert set(judgement.consistency) >= {"fast", "balanced", "exact"}
+    assert judgements[0].consistency["truth"].line_off_px < 0.1
+
+
+def test_a_pair_is_judged_from_the_left_without_a_corner_trial(tmp_path: Path) -> None:
+    names = {f"views/v00_u{s:02d}.png": ViewOffset(0.0, float(s)) for s in (0, 1)}
+    (tmp_path / "views").mkdir()
+    scene = scene_of(write_numbered(tmp_path, names, (9, 9)))
+    (trial,) = trials_of(scene, "auto")
+    assert (scene.views[trial.given].name, trial.offset(trial.judged[0])) == ("v00 u00", (0, 1))
+
+
+def test_only_so_many_views_the_farthest_among_them(folder: Path) -> None:
+    centre, _ = trials_of(scene_of(folder), "auto", 3)
+    assert len(centre.judged) == 3
+    assert (-1.0, -1.0) in [centre.offset(index) for index in centre.judged]
+    with pytest.raises(InputError, match="--views 0"):
+        trials_of(scene_of(folder), "auto", 0)
+
+
+def test_an_estimate_is_judged_as_it_is_and_aligned(folder: Path) -> None:
+    choice = DepthChoice(start="rough", refine=0.0)
+    options = Options("estimate", choice, ("fast",), most_views=2, with_consistency=False)
+    plain, aligned = evaluate(scene_of(folder), options)[:2]
+    assert "estimate" in plain.disparity
+    assert aligned.disparity.endswith("scale and shift fitted to the true disparity")
+    assert aligned.consistency == {}
+    # holes are told by the true disparity, whatever is judged
+    assert plain.hole_share == aligned.hole_share
+
+
+def test_without_true_disparity_an_estimate_is_aligned_to_views(tmp_path: Path) -> None:
+    folder = write_grid(tmp_path / "scene")
+    (folder / "gt_disp_u01_v01.npy").unlink()
+    scene = scene_of(folder)
+    trial = trials_of(scene, "auto")[0]
+    given = given_of(trial, "auto", DepthChoice(start="rough"), 10**6)
+    assert [disparity.source.split(",")[-1] for disparity in given.maps][1].endswith("fitted to true views")
+    with pytest.raises(InputError, match="no true disparity"):
+        given_of(trial, "gt", UNREFINED, 10**6)
+
+
+def test_a_file_is_the_centre_views_and_carried_to_the_corner(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "mine.npy"
+    np.save(path, disparity_of_square() + 1)
+    scene = scene_of(folder)
+    centre, corner = trials_of(scene, "auto")
+    (own,) = given_of(centre, path, UNREFINED, 10**6).maps
+    np.testing.assert_array_equal(own.values, disparity_of_square() + 1)
+    (moved,) = given_of(corner, path, UNREFINED, 10**6).maps
+    assert moved.source == "mine.npy, carried over"
+    assert given_of(centre, path, UNREFINED, 10**6).judge.source == "gt_disp_u01_v01.npy"
+
+
+def test_an_estimate_in_the_folder_is_used_where_there_is_no_truth(tmp_path: Path) -> None:
+    folder = write_grid(tmp_path / "scene")
+    (folder / "gt_disp_u01_v01.npy").rename(folder / "disp_est_u01_v01.npy")
+    (given,) = given_of(trials_of(scene_of(folder), "auto")[0], "auto", UNREFINED, 10**6).maps
+    assert given.source == "disp_est_u01_v01.npy"
+
+
+def test_smaller_pictures_with_disparity_to_match(folder: Path) -> None:
+    (judgement, *_) = evaluate(
+        scene_of(folder), Options(choice=UNREFINED, qualities=("fast",), max_pixels=HEIGHT * WIDTH // 4)
+    )
+    assert judgement.size == (HEIGHT // 2, WIDTH // 2)
+    full = {row.method: row.mean.full_db for row in judgement.rows}
+    assert full["fast"] > full["identity"] + 5
+
+
+def test_stopping_ends_it(folder: Path) -> None:
+    with pytest.raises(Cancelled):
+        evaluate(scene_of(folder), Options(choice=UNREFINED), should_stop=lambda: True)
+
+
+def test_the_json_holds_every_figure(judgements: list[Judgement]) -> None:
+    read = json.loads(report.json_of(judgements, "iibr evaluate x"), parse_constant=lambda name: pytest.fail(name))
+    assert read["command"] == "iibr evaluate x"
+    for judgement, stored in zip(judgements, read["judgements"]):
+        assert stored["trial"] == judgement.trial
+        for row, stored_row in zip(judgement.rows, stored["rows"]):
+            assert stored_row["mean"]["full_db"] == row.mean.full_db
+            assert stored_row["mean"]["lpips"] is None
+            assert stored_row["of_views"].keys() == row.of_views.keys()
+        assert stored["consistency"].keys() == judgement.consistency.keys()
+
+
+def test_the_markdown_has_a_table_for_each_judgement(judgements: list[Judgement]) -> None:
+    text = report.markdown_of(judgements, "iibr evaluate x")
+    for method in ALWAYS:
+        assert len(re.findall(rf"(?m)^\| {method} \|", text)) >= len(judgements)
+    for line in text.splitlines():
+        assert "nan" not in line
+    assert text.count(ABOUT_CONSISTENCY) == 1
+    assert ABOUT_CONSISTENCY not in report.markdown_of([replace(judgements[0], consistency={})], "x")
+    assert f"| fast | – | {judgements[0].consistency['fast'].hole_pixels} |" in text
+    blocks = re.findall(r"(?m)(?:^\|.*\n?)+", text)
+    assert len(blocks) == 1 + sum(2 + bool(judgement.refocus) for judgement in judgements)
+    for block in blocks:
+        assert len({line.count("|") for line in block.strip().splitlines()}) == 1
+
+
+def test_the_page_needs_nothing_else(judgements: list[Judgement]) -> None:
+    text = report.page_of(judgements, "iibr <evaluate>")
+    assert "iibr &lt;evaluate&gt;" in text
+    assert not re.findall(r'(?:src|href)="(?!data:)|url\(|@import|<script|<link', text)
+    images = re.findall(r'alt="([^"]+)" src="data:image/\w+;base64,([^"]+)"', text)
+    per_judgement = 1 + 2 * len(ALWAYS)
+    epis = len(judgements[0].pictures.epis)
+    assert epis == len(ALWAYS)  # the truth and all but identity
+    refocused = ("near", "middle", "far")
+    assert len(images) == per_judgement * len(judgements) + epis + 3 * len(refocused)
+    for name, data in images:
+        picture = Image.open(io.BytesIO(base64.b64decode(data)))
+        picture.load()
+        if name.startswith(refocused):
+            assert picture.width < WIDTH
+            continue
+        assert picture.size == ((WIDTH, 3) if name.startswith("EPI") else (WIDTH, HEIGHT))
+
+
+def test_epis_of_the_truth_hold_the_views_own_rows(folder: Path, judgements: list[Judgement]) -> None:
+    pictures = judgements[0].pictures
+    rows = [read_photo(folder / f"views/v01_u{u:02d}.png").pixels[pictures.epi_row] for u in range(3)]
+    np.testing.assert_array_equal(pictures.epis["truth"], np.rint(255 * np.stack(rows)))
+
+
+def test_reports_replace_older_ones_whole(judgements: list[Judgement], tmp_path: Path) -> None:
+    out = tmp_path / "made" / "report"
+    report.write_report(out, judgements, "first")
+    report.write_report(out, judgements[:1], "second")
+    assert sorted(path.name for path in out.iterdir()) == sorted(report.FILES)
+    assert "`second`" in (out / "report.md").read_text()
+
+
+def test_places_where_no_report_can_be_are_told_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    report.require_report_folder(tmp_path / "new" / "deep")
+    for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(InputError, match="file"):
+            report.require_report_folder(folder)
+
+
+def test_the_summary_takes_means_over_scenes(judgements: list[Judgement]) -> None:
+    other = replace(judgements[0], scene="other")
+    text = report.markdown_of([*judgements, other], "x")
+    assert re.search(r"(?m)^\| mean of 2 scenes \|", text)
+    assert "mean of" not in report.markdown_of(judgements, "x")

@@ -1,0 +1,146 @@
+"""PSNR, SSIM, FLIP and LPIPS against slow twins and known values."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.evaluation.lpips import Lpips
+from iibr_core.evaluation.metrics import flip, flip_map, flip_picture, psnr, ssim
+from iibr_core.types import InputError
+from tests.iibr_core.scenes import smooth_texture
+
+
+def pair(seed: int = 0, size: tuple[int, int] = (24, 30)) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    truth = smooth_texture(*size, seed)
+    return np.clip(truth + rng.normal(0, 0.05, truth.shape), 0, 1).astype(np.float32), truth
+
+
+def slow_ssim(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """SSIM of each pixel (H, W) whose 11x11 window lies inside, as Wang et al. write it; NaN elsewhere."""
+    steps = np.arange(-5, 6)
+    window = np.exp(-(steps**2) / (2 * 1.5**2))
+    window = np.outer(window, window) / window.sum() ** 2
+    result = np.full(truth.shape, np.nan)
+    for c in range(3):
+        for y in range(5, truth.shape[0] - 5):
+            for x in range(5, truth.shape[1] - 5):
+                a, b = (p[y - 5 : y + 6, x - 5 : x + 6, c].astype(float) for p in (image, truth))
+                mean_a, mean_b = (window * a).sum(), (window * b).sum()
+                variance_a, variance_b = (window * a * a).sum() - mean_a**2, (window * b * b).sum() - mean_b**2
+                covariance = (window * a * b).sum() - mean_a * mean_b
+                result[y, x, c] = (
+                    (2 * mean_a * mean_b + 0.01**2)
+                    * (2 * covariance + 0.03**2)
+                    / ((mean_a**2 + mean_b**2 + 0.01**2) * (variance_a + variance_b + 0.03**2))
+                )
+    return result
+
+
+def test_psnr_of_known_errors() -> None:
+    truth = np.full((4, 5, 3), 0.5, np.float32)
+    assert psnr(truth + np.float32(0.1), truth) == pytest.approx(20, abs=1e-4)
+    assert psnr(truth, truth) == pytest.approx(100)
+    mask = np.zeros((4, 5), bool)
+    assert math.isnan(psnr(truth, truth, mask))
+    worse = truth.copy()
+    worse[0, 0] += 0.5
+    mask[0, 0] = True
+    assert psnr(worse, truth, mask) == pytest.approx(10 * math.log10(1 / 0.25), abs=1e-4)
+    assert psnr(worse, truth, ~mask) == pytest.approx(100)
+
+
+def test_ssim_is_its_slow_twin() -> None:
+    image, truth = pair()
+    slow = slow_ssim(image, truth)
+    assert ssim(image, truth) == pytest.approx(float(np.nanmean(slow)), abs=2e-4)
+    inside = ~np.isnan(slow[..., 0])
+    inside[:, :10] = False
+    assert ssim(image, truth, inside) == pytest.approx(float(slow[inside].mean()), abs=2e-4)
+
+
+def test_ssim_of_equal_and_of_tiny_pictures() -> None:
+    image, truth = pair()
+    assert ssim(truth, truth) == pytest.approx(1)
+    assert math.isnan(ssim(image[:5], truth[:5]))
+    assert math.isnan(ssim(image, truth, np.zeros(truth.shape[:2], bool)))
+
+
+def test_flip_of_known_pairs() -> None:
+    """Black against white is nearly 1; equal is 0; more noise is more."""
+    black, white = np.zeros((40, 40, 3), np.float32), np.ones((40, 40, 3), np.float32)
+    assert flip(black, white) == pytest.approx(0.97, abs=0.02)
+    _, truth = pair()
+    assert flip(truth, truth) == 0
+    errors = [flip(np.clip(truth + np.float32(step), 0, 1), truth) for step in (0.01, 0.05, 0.2)]
+    assert errors == sorted(errors)
+    assert errors[0] > 0
+
+
+def test_flip_masks_and_pictures() -> None:
+    image, truth = pair()
+    of_pixels = flip_map(image, truth)
+    assert of_pixels.shape == truth.shape[:2]
+    mask = np.zeros(of_pixels.shape, bool)
+    mask[3:9, 4:20] = True
+    assert flip(image, truth, mask) == pytest.approx(float(of_pixels[mask].mean()), rel=1e-5)
+    assert flip(image, truth) == pytest.approx(float(of_pixels.mean()), rel=1e-4)
+    assert math.isnan(flip(image, truth, np.zeros_like(mask)))
+    shown = flip_picture(truth, truth)
+    assert shown.shape == truth.shape
+    assert shown.max() < 0.05
+
+
+@pytest.fixture(scope="module")
+def networks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """AlexNet and LPIPS's weights as their authors save them, random ones."""
+    import torch
+
+    torch.manual_seed(0)
+    folder = tmp_path_factory.mktemp("lpips")
+    channels, sizes = (3, 64, 192, 384, 256, 256), (11, 5, 3, 3, 3)
+    stored = {}
+    for k, (number, size) in enumerate(zip((0, 3, 6, 8, 10), sizes)):
+        stored[f"features.{number}.weight"] = torch.randn(channels[k + 1], channels[k], size, size) / size
+        stored[f"features.{number}.bias"] = torch.randn(channels[k + 1])
+    torch.save(stored, folder / "alexnet-owt-7be5be79.pth")
+    shares = {f"lin{k}.model.1.weight": torch.rand(1, channels[k + 1], 1, 1) for k in range(5)}
+    torch.save(shares, folder / "alex.pth")
+    return folder
+
+
+def test_lpips_tells_more_from_less(networks: Path) -> None:
+    lpips = Lpips(networks)
+    truth = smooth_texture(80, 96)
+    noise = np.random.default_rng(0).normal(0, 1, truth.shape).astype(np.float32)
+    distances = [lpips(np.clip(truth + strength * noise, 0, 1), truth) for strength in (0.0, 0.05, 0.3)]
+    assert distances[0] == 0
+    assert 0 < distances[1] < distances[2]
+    assert math.isnan(lpips(truth[:30], truth[:30]))
+
+
+@pytest.mark.parametrize("name", ["alexnet-owt-7be5be79.pth", "alex.pth"])
+@pytest.mark.parametrize("content", ["missing", "empty", "text", "other names", "other shapes"])
+def test_bad_networks_are_one_clear_line(networks: Path, tmp_path: Path, name: str, content: str) -> None:
+    import torch
+
+    for path in networks.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    path = tmp_path / name
+    if content == "missing":
+        path.unlink()
+    elif content in ("empty", "text"):
+        path.write_bytes(b"" if content == "empty" else b"no weights")
+    else:
+        stored = torch.load(path, weights_only=True)
+        kept = {key: value[:, :7] for key, value in stored.items() if value.ndim == 4} | {
+            key: value for key, value in stored.items() if value.ndim == 1
+        }
+        torch.save({key + ("x" if content == "other names" else ""): value[:7] for key, value in kept.items()}, path)
+    with pytest.raises(InputError, match=name) as caught:
+        Lpips(tmp_path)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+
+from iibr_core.generation.cost_model import outermost_of, relief_of
+from iibr_core.generation.light_field import ray_set
+from iibr_core.generation.plan import MOST_VIEWS_A_SIDE, STEP_PX, PlanOverrides, plan_for_viewing, plan_literal
+from iibr_core.training.batches import contested_rays
+from iibr_core.training.degradation import blurred
+from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.types import TOTAL_PARALLAX, GridShape, InputError, ViewOffset
+from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture, square_before_wall
+
+
+def test_constant_disparity_needs_one_view():
+    photo = photo_of(smooth_texture(40, 60))
+    plan = plan_for_viewing(photo, disparity_of(np.full((40, 60), 7.0)))
+    assert plan.grid == (1, 1)
+    assert not plan.has_disocclusion
+    assert plan.edge_fraction == 0
+    assert np.abs(plan.field_disparity(disparity_of(np.full((40, 60), 7.0))).values).max() == 0
+
+
+def test_parallax_is_a_share_of_the_width_whatever_the_units():
+    photo, disparity = square_before_wall(60, 500)
+    for scale in (1e-3, 1.0, 1e3):
+        plan = plan_for_viewing(photo, disparity_of(disparity.values * scale))
+        low, high = plan.disparity_range_px
+        assert (high - low) * (plan.grid.columns - 1) == pytest.approx(TOTAL_PARALLAX * 500, rel=1e-3)
+    assert plan.has_disocclusion
+
+
+def test_grid_follows_the_parallax():
+    photo, disparity = square_before_wall(60, 500)
+    small = plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=0.3))
+    assert small.grid.columns < plan_for_viewing(photo, disparity).grid.columns
+    assert 0.3 * TOTAL_PARALLAX * 500 / (small.grid.columns - 1) <= STEP_PX
+    huge = plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=50))
+    assert huge.grid.columns == MOST_VIEWS_A_SIDE
+
+
+def test_every_choice_can_be_overridden():
+    photo, disparity = square_before_wall(60, 200)
+    plan = plan_for_viewing(photo, disparity, PlanOverrides(GridShape(3, 7), -1.0, focus_disparity=2.0))
+    assert plan.grid == (3, 7)
+    assert plan.disparity_zero == 2.0
+    assert plan.disparity_scale < 0
+    assert plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=0.0)).grid == (1, 1)
+
+
+def test_a_flat_scene_needs_next_to_nothing():
+    photo, disparity = square_before_wall(300, 400)
+    flat = plan_for_viewing(photo, disparity_of(np.zeros((300, 400))))
+    deep = plan_for_viewing(photo, disparity)
+    for quality in ("fast", "balanced", "exact"):
+        assert flat.needs.of(quality).seconds == 0
+        assert 0 < flat.needs.of(quality).peak_bytes < deep.needs.of(quality).peak_bytes
+    assert deep.needs.fast.seconds < deep.needs.balanced.seconds < deep.needs.exact.seconds
+    assert deep.peak_bytes == deep.needs.balanced.peak_bytes
+
+
+def test_needs_follow_views_pixels_and_depth_edges():
+    def seconds(size, side, front=2.0):
+        photo, disparity = square_before_wall(*size, front=front)
+        return plan_literal(photo, disparity, GridShape(side, side)).needs
+
+    small, wider = seconds((120, 160), 5), seconds((240, 320), 5)
+    assert 3 < wider.fast.seconds / small.fast.seconds < 4.2
+    assert seconds((120, 160), 9).fast.seconds / small.fast.seconds == pytest.approx(80 / 24, rel=0.2)
+    even = seconds((120, 160), 5, front=0.0)
+    assert even.balanced.seconds == pytest.approx(even.fast.seconds)
+    assert small.balanced.seconds > 1.2 * small.fast.seconds
+
+
+@pytest.mark.parametrize("blur_px", [0.0, 2.0])
+def test_the_rays_foretold_are_those_really_contested(blur_px):
+    size, grid = (120, 160), GridShape(9, 9)
+    foretold, found = [], []
+    for seed in range(4):
+        scene = random_scene(np.random.default_rng(seed), size, 2.0)
+        colors, values = render(scene, size, ViewOffset(0.0, 0.0))
+        photo, disparity = photo_of(colors), disparity_of(blurred(values, blur_px))
+        rays, completing = ray_set(photo, disparity, plan_literal(photo, disparity, grid))
+        assert len(list(completing)) == 8
+        relief = relief_of(disparity.values, outermost_of(grid))
+        for reach in (1.0, 2.0, 4.0):
+            foretold.append(relief.contested_share(reach / 4) * disparity.values.size)
+            found.append(len(contested_rays(rays, ViewOffset(reach, -reach), (0, size[0]), False).pixel))
+    assert sum(foretold) == pytest.approx(sum(found), rel=0.3), (foretold, found)
+
+
+def test_one_wild_value_does_not_set_the_baseline():
+    photo, disparity = square_before_wall(60, 200)
+    reference = plan_for_viewing(photo, disparity).disparity_scale
+    values = disparity.values.copy()
+    values[0, 0] = 1e6
+    assert plan_for_viewing(photo, disparity_of(values)).disparity_scale == pytest.approx(reference)
+
+
+def test_literal_takes_disparity_as_it_is():
+    photo, disparity = square_before_wall()
+    plan = plan_literal(photo, disparity, GridShape(3, 3))
+    assert (plan.field_disparity(disparity).values == disparity.values).all()
+    assert plan.disparity_range_px == (0.0, 2.0)
+    assert 0 < plan.edge_fraction < 0.5
+
+
+def test_less_memory_gives_fewer_views():
+    photo, disparity = square_before_wall(300, 800)
+    roomy = plan_for_viewing(photo, disparity)
+    tight = plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=roomy.peak_bytes + roomy.field_bytes // 2))
+    assert tight.grid.columns < roomy.grid.columns
+
+
+@pytest.mark.parametrize(
+    ("grid", "memory", "words"),
+    [(GridShape(0, 3), None, "--grid 3x0"), (GridShape(3, 3), 1000, "--memory"), (GridShape(3, 3), -1, "--memory -1")],
+)
+def test_what_cannot_be_is_refused_in_one_line(grid, memory, words):
+    photo, disparity = square_before_wall()
+    with pytest.raises(InputError, match=words) as error:
+        plan_literal(photo, disparity, grid, memory)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("strength", [float("nan"), float("inf")])
+def test_depth_strength_must_be_finite(strength):
+    with pytest.raises(InputError, match="depth-strength"):
+        plan_for_viewing(*square_before_wall(), PlanOverrides(depth_strength=strength))

@@ -1,0 +1,85 @@
+"""Light fields whose every view is known, written to disk in the layouts of data sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.types import ViewOffset
+from tests.iibr_core.scenes import smooth_texture
+
+HEIGHT, WIDTH = 40, 48
+FRONT, WALL = 2.0, 0.5
+MARGIN = 40
+
+
+def view_of_wall(offset: ViewOffset, disparity: float = WALL, size: tuple[int, int] = (HEIGHT, WIDTH)) -> np.ndarray:
+    """(H, W, 3) of a textured wall seen from an offset: what is at x in the centre is at x - disparity * s."""
+    height, width = size
+    texture = smooth_texture(height + 2 * MARGIN, width + 2 * MARGIN)
+    y = np.arange(height) + MARGIN + disparity * offset.t
+    x = np.arange(width) + MARGIN + disparity * offset.s
+    top, left = np.floor(y).astype(int), np.floor(x).astype(int)
+    down, across = (y - top)[:, None, None], (x - left)[None, :, None]
+
+    def at(j: int, i: int) -> np.ndarray:
+        return texture[np.ix_(top + j, left + i)]
+
+    above = at(0, 0) * (1 - across) + at(0, 1) * across
+    below = at(1, 0) * (1 - across) + at(1, 1) * across
+    return np.asarray(above * (1 - down) + below * down, np.float32)
+
+
+def view_of_square(offset: ViewOffset) -> np.ndarray:
+    """(H, W, 3) of a reddish square at FRONT before the wall; offsets at which it moves by whole pixels."""
+    pixels = view_of_wall(offset) * np.float32([0.4, 0.6, 1.0])
+    top, left = round(HEIGHT / 3 - FRONT * offset.t), round(WIDTH / 3 - FRONT * offset.s)
+    square = np.s_[top : top + HEIGHT // 3, left : left + WIDTH // 3]
+    own = (smooth_texture(HEIGHT, WIDTH, 1) * np.float32([1.0, 0.4, 0.2]))[: HEIGHT // 3, : WIDTH // 3]
+    pixels[square] = own[: pixels[square].shape[0], : pixels[square].shape[1]]
+    return pixels
+
+
+def disparity_of_square() -> np.ndarray:
+    """(H, W) of the centre view of `view_of_square`."""
+    disparity = np.full((HEIGHT, WIDTH), WALL, np.float32)
+    top, left = round(HEIGHT / 3), round(WIDTH / 3)
+    disparity[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FRONT
+    return disparity
+
+
+def offsets_of(rows: int, columns: int) -> dict[tuple[int, int], ViewOffset]:
+    """Offsets by (v, u), from the centre view."""
+    return {
+        (v, u): ViewOffset(float(v - rows // 2), float(u - columns // 2)) for v in range(rows) for u in range(columns)
+    }
+
+
+def write_grid(folder: Path, side: int = 3) -> Path:
+    """views/v00_u00.png .. and gt_disp_uUU_vVV.npy of the square."""
+    (folder / "views").mkdir(parents=True)
+    for (v, u), offset in offsets_of(side, side).items():
+        write_image(folder / "views" / f"v{v:02d}_u{u:02d}.png", view_of_square(offset))
+    np.save(folder / f"gt_disp_u{side // 2:02d}_v{side // 2:02d}.npy", disparity_of_square())
+    return folder
+
+
+def write_hci(folder: Path, rows: int = 3, columns: int = 3) -> Path:
+    """input_Cam000.png .. row by row, gt_disp_lowres.pfm, parameters.cfg."""
+    folder.mkdir(parents=True)
+    for (v, u), offset in offsets_of(rows, columns).items():
+        write_image(folder / f"input_Cam{v * columns + u:03d}.png", view_of_square(offset))
+    write_pfm(folder / "gt_disp_lowres.pfm", disparity_of_square())
+    (folder / "parameters.cfg").write_text(f"[extrinsics]\nnum_cams_x = {columns}\nnum_cams_y = {rows}\n")
+    return folder
+
+
+def write_numbered(folder: Path, names: dict[str, ViewOffset], size: tuple[int, int] = (8, 8)) -> Path:
+    """Small pictures of the wall under any names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, offset in names.items():
+        write_image(folder / name, view_of_wall(offset, size=size))
+    return folder

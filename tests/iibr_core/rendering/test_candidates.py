@@ -1,0 +1,132 @@
+import numpy as np
+import pytest
+
+from iibr_core.rendering.candidates import SAME_SURFACE_PX, SEALED_GAP_PX, find_candidates
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.types import ViewOffset
+
+
+def ray_set(*disparities, coverage=None):
+    disparities = [np.asarray(d, np.float32) for d in disparities]
+    rays = RaySet(len(disparities), disparities[0].shape, 0.1)
+    for d in disparities:
+        colors = np.zeros((*d.shape, 3), np.float32)
+        rays.add(ViewOffset(0, 0), colors, d, np.ones_like(d) if coverage is None else coverage)
+    return rays
+
+
+def footprints_slowly(disparity, offset):
+    """Every ray's landed rectangle, its neighbours' midpoints where they are close, else one pixel wide."""
+
+    def reach(gap):
+        return (1 + gap) / 2 if abs(gap) <= SEALED_GAP_PX else 0.5
+
+    height, width = disparity.shape
+    t, s = offset
+    for y in range(height):
+        for x in range(width):
+            d = float(disparity[y, x])
+            left = reach((disparity[y, x - 1] - d) * s) if x > 0 else 0.5
+            right = reach((d - disparity[y, x + 1]) * s) if x + 1 < width else 0.5
+            top = reach((disparity[y - 1, x] - d) * t) if y > 0 else 0.5
+            bottom = reach((d - disparity[y + 1, x]) * t) if y + 1 < height else 0.5
+            yield d, x - d * s - left, x - d * s + right, y - d * t - top, y - d * t + bottom
+
+
+def total_coverage_slowly(disparity, offset):
+    """Area of every target pixel that any footprint covers, counted as often as it is covered."""
+    height, width = disparity.shape
+    total = np.zeros((height, width))
+    for _, left, right, top, bottom in footprints_slowly(disparity, offset):
+        for y in range(height):
+            for x in range(width):
+                overlap_x = min(right, x + 0.5) - max(left, x - 0.5)
+                overlap_y = min(bottom, y + 0.5) - max(top, y - 0.5)
+                if overlap_x > 0 and overlap_y > 0:
+                    total[y, x] += overlap_x * overlap_y
+    return total
+
+
+def used(candidates, values):
+    """Values of used slots, 0 elsewhere."""
+    slots = np.arange(values.shape[0])[:, None, None]
+    return np.where(slots < candidates.count, values, 0)
+
+
+@pytest.mark.parametrize("offset", [ViewOffset(0, 0), ViewOffset(0, 1.3), ViewOffset(-2.4, 0.7), ViewOffset(3, 3)])
+def test_coverage_agrees_with_a_slow_twin(offset):
+    disparity = np.random.default_rng(3).uniform(-0.6, 0.6, (9, 11)).astype(np.float32)
+    found = find_candidates(ray_set(disparity), offset, (0, 9), most=30)
+    assert used(found, found.coverage).sum(axis=0) == pytest.approx(total_coverage_slowly(disparity, offset), abs=2e-3)
+
+
+def test_a_constant_surface_covers_every_pixel_once():
+    found = find_candidates(ray_set(np.full((8, 9), 0.37)), ViewOffset(1.1, -2.3), (0, 8))
+    inside = np.s_[2:6, 2:7]
+    assert (found.count[inside] == 1).all()
+    assert found.coverage[0][inside] == pytest.approx(1, abs=1e-5)
+    assert found.disparity[0][inside] == pytest.approx(0.37, abs=1e-6)
+
+
+def test_a_stretched_slope_stays_sealed():
+    slope = np.tile(np.arange(30, dtype=np.float32) * -0.2, (5, 1))
+    found = find_candidates(ray_set(slope), ViewOffset(0, 3), (0, 5))
+    landed_right = 29 + 0.2 * 29 * 3
+    assert used(found, found.coverage).sum(axis=0)[:, 1:29] == pytest.approx(1, abs=1e-4)
+    assert landed_right > 29
+
+
+def test_two_surfaces_make_two_candidates_however_many_rays_land():
+    front, back = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
+    found = find_candidates(ray_set(front, back), ViewOffset(0, 1), (0, 6))
+    assert (found.count[:, :7] == 2).all()
+    assert {*found.source[:2, 3, 3]} == {0, 1}
+
+
+def test_surfaces_closer_than_the_tolerance_are_one():
+    near = np.full((4, 8), 1.0)
+    near[:, ::2] += 0.9 * SAME_SURFACE_PX / 2
+    found = find_candidates(ray_set(near), ViewOffset(0, 2), (0, 4))
+    assert (found.count[:, :5] == 1).all()
+    two_surfaces_1e_minus_4_apart = np.full((4, 8), 1.0)
+    two_surfaces_1e_minus_4_apart[:, 4:] += 1e-4
+    found = find_candidates(ray_set(two_surfaces_1e_minus_4_apart), ViewOffset(0, 2), (0, 4))
+    assert (found.count[:, :5] == 1).all()
+
+
+def test_the_rearmost_gives_way_where_slots_run_out():
+    layers = [np.full((3, 12), d) for d in (0.0, 1.0, 2.0, 3.0)]
+    found = find_candidates(ray_set(*layers), ViewOffset(0, 1), (0, 3), most=2)
+    assert sorted(found.disparity[:, 1, 4]) == [2.0, 3.0]
+
+
+@pytest.mark.parametrize("roughness", [0.01, 1.0])
+def test_bands_do_not_change_what_is_found(roughness):
+    noise = np.random.default_rng(1).uniform(-2, 2, (20, 15))
+    disparity = (np.arange(20)[:, None] * -0.4 + roughness * noise).astype(np.float32)
+    rays, offset = ray_set(disparity), ViewOffset(1.7, -0.4)
+    whole = find_candidates(rays, offset, (0, 20))
+    for first, last in ((0, 7), (7, 20), *((row, row + 1) for row in range(20))):
+        band = find_candidates(rays, offset, (first, last))
+        assert (band.count == whole.count[first:last]).all()
+        assert (used(band, band.coverage) == used(whole, whole.coverage)[:, first:last]).all()
+        assert (used(band, band.disparity) == used(whole, whole.disparity)[:, first:last]).all()
+
+
+@pytest.mark.parametrize("wild", [1e6, -1e30, 3e38])
+def test_wild_disparity_lands_nowhere_and_harms_nothing(wild):
+    disparity = np.zeros((6, 7), np.float32)
+    disparity[2, 3] = wild
+    found = find_candidates(ray_set(disparity), ViewOffset(2.0, -1.0), (0, 6))
+    coverage = used(found, found.coverage).sum(axis=0)
+    assert np.isfinite(coverage).all()
+    assert coverage[2, 3] < 1e-3
+    assert coverage[0, 0] == pytest.approx(1)
+
+
+def test_rays_without_coverage_do_not_land():
+    coverage = np.zeros((5, 5), np.float32)
+    coverage[2, 2] = 0.25
+    found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage), ViewOffset(0, 1), (0, 5))
+    assert found.count.sum() == 1
+    assert found.coverage[0, 2, 2] == pytest.approx(0.25)

@@ -1,0 +1,123 @@
+import numpy as np
+import pytest
+
+from iibr_core.rendering import candidates as candidates_module
+from iibr_core.rendering.candidates import find_candidates
+from iibr_core.rendering.coherent_cells import SETTLED_PX, find_smooth_cells
+from iibr_core.rendering.ray_set import CELL_PX, RaySet
+from iibr_core.rendering.resampling import look_up_colors
+from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.types import ViewOffset
+from tests.iibr_core.scenes import smooth_texture
+
+SIZE = 48, 64
+Y, X = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
+SLOPE = 0.5 + 0.02 * X - 0.01 * Y
+BUMPS = 0.6 * np.sin(X / 9) * np.cos(Y / 7)
+STEP = np.where(X < 30, 0.0, 2.0).astype(np.float32) + 0.01 * Y
+OFFSETS = [ViewOffset(0, 1), ViewOffset(-1.3, 0.4), ViewOffset(2, -2)]
+
+
+def ray_set(disparity, farthest=2.0):
+    rays = RaySet(2, disparity.shape, 0.5 / farthest, farthest)
+    rays.add(ViewOffset(0, 0), smooth_texture(*disparity.shape), disparity.astype(np.float32), np.ones_like(disparity))
+    return rays
+
+
+def by_pixel(cells, rows):
+    """(N, W) from cells, of target rows [first, last)."""
+    grown = cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
+    first = rows[0] % CELL_PX
+    return grown[first : first + rows[1] - rows[0], : SIZE[1]]
+
+
+def nowhere_smooth(rays, offset, rows):
+    smooth, about = find_smooth_cells(rays, offset, rows)
+    return np.zeros_like(smooth), about
+
+
+def both_ways(monkeypatch, rays, offset):
+    """(candidates, colours) as they are, and with everything left to landing."""
+    found = []
+    for patch in (False, True):
+        if patch:
+            monkeypatch.setattr(candidates_module, "find_smooth_cells", nowhere_smooth)
+        candidates = find_candidates(rays, offset, (0, SIZE[0]))
+        found.append((candidates, look_up_colors(rays, candidates, closed_form_weights(candidates))[0]))
+    return found
+
+
+@pytest.mark.parametrize("offset", OFFSETS)
+def test_on_a_plane_every_ray_is_followed_to_its_exact_disparity(offset):
+    rays = ray_set(SLOPE)
+    candidates = find_candidates(rays, offset, (0, SIZE[0]))
+    smooth = by_pixel(candidates.smooth, (0, SIZE[0]))
+    # d = a + b x + c y on the surface, seen at (x + d s, y + d t): d (1 - b s - c t) = a + b x + c y
+    exact = SLOPE / (1 - 0.02 * offset.s + 0.01 * offset.t)
+    assert smooth.mean() > 0.4  # the border takes the rest of so small a picture
+    assert candidates.disparity[0][smooth] == pytest.approx(exact[smooth], abs=2 * SETTLED_PX)
+    assert (candidates.count[smooth] == 1).all()
+    assert (candidates.coverage[0][smooth] == 1).all()
+
+
+@pytest.mark.parametrize("disparity", [SLOPE, BUMPS, STEP], ids=["slope", "bumps", "step"])
+@pytest.mark.parametrize("offset", OFFSETS)
+def test_following_back_gives_what_landing_gives(disparity, offset, monkeypatch):
+    (own, colors), (landed, expected) = both_ways(monkeypatch, ray_set(disparity), offset)
+    smooth = by_pixel(own.smooth, (0, SIZE[0]))
+    assert smooth.any()
+    assert not landed.smooth.any()
+    assert (landed.count[smooth] == 1).all()
+    assert landed.coverage[0][smooth] == pytest.approx(np.ones(smooth.sum()), abs=0.1)
+    # Landing takes the mean over a pixel's area, following back the value at its centre.
+    assert own.disparity[0][smooth] == pytest.approx(landed.disparity[0][smooth], abs=0.02)
+    assert (own.count[~smooth] == landed.count[~smooth]).all()
+    assert np.abs(colors - expected).max() < 2 / 255
+
+
+@pytest.mark.parametrize("offset", OFFSETS)
+def test_no_cell_is_smooth_where_two_surfaces_or_none_show(offset):
+    candidates = find_candidates(ray_set(STEP), offset, (0, SIZE[0]))
+    smooth = by_pixel(candidates.smooth, (0, SIZE[0]))
+    left, right = 30 - 2.5 * max(offset.s, 0), 30 - 2.5 * min(offset.s, 0)
+    assert not smooth[:, int(left) - 2 : int(right) + 3].any()
+    assert not smooth[candidates.count != 1].any()
+
+
+@pytest.mark.parametrize(("disparity", "is_smooth"), [(3.0, False), (-3.0, True)], ids=["in front", "behind"])
+def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
+    rays, at = ray_set(np.zeros(SIZE, np.float32)), ViewOffset(0, 1)
+    filled = np.zeros(SIZE, np.float32)
+    filled[20:24, 20:24] = 1
+    rays.add(at, np.zeros((*SIZE, 3), np.float32), np.full(SIZE, disparity, np.float32), filled)
+    smooth, _ = find_smooth_cells(rays, at, (0, SIZE[0]))
+    assert by_pixel(smooth, (0, SIZE[0]))[20:24, 20:24].all() == is_smooth
+    assert by_pixel(smooth, (0, SIZE[0]))[8:12, 40:44].all()
+
+
+@pytest.mark.parametrize("rows", [(0, 5), (3, 4), (17, 48)])
+def test_bands_do_not_change_what_is_followed(rows):
+    rays, offset = ray_set(BUMPS), ViewOffset(-1.3, 0.4)
+    whole, band = find_candidates(rays, offset, (0, SIZE[0])), find_candidates(rays, offset, rows)
+    inner = slice(*rows)
+    assert (by_pixel(band.smooth, rows) == by_pixel(whole.smooth, (0, SIZE[0]))[inner]).all()
+    assert (band.disparity[0] == whole.disparity[0][inner])[band.count > 0].all()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1), (5, 7), (9, 9)])
+def test_pictures_of_any_size(size):
+    rays = ray_set(np.full(size, 0.3, np.float32))
+    candidates = find_candidates(rays, ViewOffset(1, 1), (0, size[0]))
+    assert candidates.smooth.shape == (-(-size[0] // CELL_PX), -(-size[1] // CELL_PX))
+    assert candidates.disparity[0][candidates.count > 0] == pytest.approx(0.3)
+
+
+def test_unknown_disparity_is_never_smooth():
+    disparity = SLOPE.copy()
+    disparity[10, 12] = np.nan
+    rays = ray_set(disparity)
+    assert rays.cells.rough[2, 3]
+    assert not rays.cells.rough[4, 8]
+    smooth, _ = find_smooth_cells(rays, ViewOffset(0, 0.01), (0, SIZE[0]))
+    assert not smooth[2, 3]
+    assert smooth[4, 8]

@@ -1,0 +1,54 @@
+"""What a ray set keeps beside its rays, against slow twins."""
+
+import numpy as np
+import pytest
+
+from iibr_core.rendering.ray_set import CELL_PX, SMOOTH_SHARE, RaySet
+from iibr_core.types import ViewOffset
+
+SURFACE_STEP = 0.6
+
+
+def slow_near_edge(disparity):
+    """Near where a pixel differs from the one to its right or below, or is unknown: two pixels each way."""
+    padded = np.pad(disparity, ((0, 1), (0, 1)), mode="edge")
+    with np.errstate(invalid="ignore"):
+        right, below = np.abs(padded[:-1, 1:] - disparity), np.abs(padded[1:, :-1] - disparity)
+    is_step = ~((right <= SURFACE_STEP) & (below <= SURFACE_STEP))
+    near = np.zeros_like(is_step)
+    for y, x in np.argwhere(is_step):
+        near[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3] = True
+    return near
+
+
+def slow_cells(values, of_cell):
+    height, width = values.shape
+    return np.array(
+        [
+            [of_cell(values[y : y + CELL_PX, x : x + CELL_PX]) for x in range(0, width, CELL_PX)]
+            for y in range(0, height, CELL_PX)
+        ]
+    )
+
+
+def slow_rough(disparity):
+    """A pixel is rough if it differs from one beside it, or is unknown, or at the border; a cell if any of its is."""
+    around = np.pad(disparity, 1, constant_values=np.nan)
+    steps = [np.abs(np.roll(around, shift, axis)[1:-1, 1:-1] - disparity) for shift in (1, -1) for axis in (0, 1)]
+    return slow_cells(~(np.stack(steps) <= SMOOTH_SHARE * SURFACE_STEP).all(axis=0), np.any)
+
+
+@pytest.mark.parametrize("size", [(19, 31), (1, 8), (8, 1), (1, 1)])
+@pytest.mark.parametrize("unknown", [0.0, 0.05, 1.0])
+def test_edges_and_cells(size, unknown):
+    random = np.random.default_rng(1)
+    disparity = np.cumsum(random.normal(0, 0.2, size), axis=1).astype(np.float32)
+    disparity[random.random(size) < unknown] = np.nan
+    coverage = np.where(np.isnan(disparity), 0, random.random(size) > 0.8).astype(np.float32)
+    rays = RaySet(1, size, SURFACE_STEP)
+    rays.add(ViewOffset(0.0, 0.0), np.zeros((*size, 3), np.float32), disparity, coverage)
+    _, _, _, _, near_edge = rays.arrays
+    assert (near_edge[0] == slow_near_edge(disparity)).all()
+    assert (rays.cells.low[0] == slow_cells(np.where(coverage > 0, disparity, np.inf), np.min)).all()
+    assert (rays.cells.high[0] == slow_cells(np.where(coverage > 0, disparity, -np.inf), np.max)).all()
+    assert (rays.cells.rough == slow_rough(disparity)).all()

@@ -1,0 +1,197 @@
+"""Work in bands: everything is done once, in any number of bands alike, and it ends soon after it is told to."""
+
+import math
+import threading
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from iibr_core.depth.pictorial_cues import estimate_offline
+from iibr_core.depth.refine import edge_blur_px, refine
+from iibr_core.generation.light_field import generate
+from iibr_core.inpainting import background
+from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.disparity_holes import fill_from_background
+from iibr_core.rendering.disparity_statistics import edge_softness, surroundings_of
+from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.runtime import tiling
+from iibr_core.runtime.tiling import Cancelled, in_bands, in_pieces
+from iibr_core.types import Photo, ViewOffset
+from tests.iibr_core.scenes import literal_plan, square_before_wall
+
+RANDOM = np.random.default_rng(5)
+SIZE = (83, 67)
+COLORS = np.repeat(np.repeat(RANDOM.uniform(0, 1, (21, 17, 3)), 4, axis=0), 4, axis=1)[: SIZE[0], : SIZE[1]]
+COLORS = np.ascontiguousarray(COLORS, np.float32)
+LAYERS = np.repeat(np.repeat(RANDOM.integers(-3, 4, (6, 5)), 14, axis=0), 14, axis=1)[: SIZE[0], : SIZE[1]]
+LAYERS = np.ascontiguousarray(LAYERS, np.float32)
+SOFT = sum(np.roll(LAYERS, k, axis=1) for k in range(-4, 5)).astype(np.float32) / 9
+HOLES = RANDOM.random(SIZE) < 0.3
+FULL = np.ones(SIZE, np.float32)
+
+
+def filled(should_stop):
+    colors, disparity = COLORS.copy(), LAYERS.copy()
+    fill_background(colors, disparity, HOLES, LAYERS, ViewOffset(1.0, -2.0), should_stop, threads=2)
+    return colors, disparity
+
+
+def added(should_stop):
+    rays = RaySet(2, SIZE, 0.1)
+    rays.add(ViewOffset(0.0, 1.0), COLORS, np.where(HOLES, np.nan, LAYERS), FULL - HOLES, should_stop)
+    return rays.arrays
+
+
+def rendered(should_stop):
+    with ViewSynthesis(should_stop, keeps_entropy=True) as synthesis:
+        view = synthesis.render(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5))
+    return view.colors, view.disparity, view.occluded, view.inpainted, view.entropy
+
+
+def surveyed(should_stop):
+    around = surroundings_of(np.stack([LAYERS, np.where(HOLES, np.nan, SOFT)]), 2.0, should_stop)
+    return around.low, around.high, around.step, around.softness
+
+
+STAGES = {
+    "rays of a photo": lambda stop: rays_of_photo(COLORS, LAYERS, 2.0, 1, stop).arrays,
+    "split": lambda stop: split_mixed_pixels(COLORS, LAYERS, 0.5, stop),
+    "add": added,
+    "render": rendered,
+    "fill": filled,
+    "survey": surveyed,
+    "softness": lambda stop: [edge_softness(SOFT, 0.5, stop)],
+    "refine": lambda stop: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, stop)],
+    "blur": lambda stop: [edge_blur_px(SOFT, stop)],
+    "offline": lambda stop: [estimate_offline(Photo(COLORS, 100.0, "test"), stop).values],
+    "unknown depth": lambda stop: [fill_from_background(np.where(HOLES, np.nan, LAYERS), stop)],
+}
+
+
+@pytest.fixture
+def narrow(monkeypatch):
+    """A few rows a band, more threads than usual."""
+    monkeypatch.setattr(tiling, "MOST_BAND_PIXELS", 7 * SIZE[1])
+    monkeypatch.setattr(tiling, "THREADS", 3)
+    monkeypatch.setattr(background, "MOST_PIECE_PIXELS", 100)
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_the_number_of_bands_changes_no_bit(name, request):
+    whole = [np.array(part) for part in STAGES[name](tiling.never)]
+    request.getfixturevalue("narrow")
+    for part, expected in zip(STAGES[name](tiling.never), whole, strict=True):
+        np.testing.assert_array_equal(part, expected)
+
+
+class Telling:
+    """A should_stop that is true from the n-th question on; counts them."""
+
+    def __init__(self, n=math.inf):
+        self.n, self.asked = n, 0
+
+    def __call__(self):
+        self.asked += 1
+        return self.asked >= self.n
+
+
+@pytest.mark.usefixtures("narrow")
+@pytest.mark.parametrize("name", STAGES)
+def test_a_stage_asks_for_every_band_and_ends_wherever_it_is_told_to(name):
+    watch = Telling()
+    STAGES[name](watch)
+    assert watch.asked >= (3 if name == "unknown depth" else SIZE[0] // 7)
+    for n in (1, watch.asked // 2, watch.asked):
+        with pytest.raises(Cancelled):
+            STAGES[name](Telling(n))
+
+
+@pytest.mark.usefixtures("narrow")
+@pytest.mark.parametrize("quality", ["fast", "balanced", "exact"])
+def test_a_field_ends_wherever_it_is_told_to(quality):
+    photo, disparity = square_before_wall()
+    plan, watch = literal_plan(photo, disparity, 3), Telling()
+    assert len(list(generate(photo, disparity, plan, watch, quality=quality))) == 9
+    counts = [
+        len(list(generate(photo, disparity, plan, Telling(n), quality=quality)))
+        for n in np.linspace(1, watch.asked, 7).astype(int)
+    ]
+    assert counts[0] == 0
+    assert counts[-1] < 9
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_nothing_is_begun_after_the_word(threads):
+    stop, began = threading.Event(), []
+
+    def work(n):
+        began.append(n)
+        if n == 5:
+            stop.set()
+        assert n <= 5 or stop.wait(60)
+
+    with pytest.raises(Cancelled):
+        in_pieces(work, range(1000), stop.is_set, threads)
+    assert sorted(began)[:6] == list(range(6))
+    assert len(began) < 6 + threads
+
+
+def test_a_ray_set_that_was_told_to_stop_is_as_before():
+    rays = rays_of_photo(COLORS, LAYERS, 2.0, 1)
+    count = len(rays)
+    with pytest.raises(Cancelled):
+        rays.add(ViewOffset(0.0, 1.0), COLORS, LAYERS, FULL, lambda: True)
+    with pytest.raises(Cancelled):
+        rays.survey(lambda: True)
+    assert len(rays) == count
+    assert rays.surroundings is rays.survey(lambda: True)  # made by now
+
+
+def test_threads_that_ask_at_once_get_the_same_surroundings():
+    rays = rays_of_photo(COLORS, LAYERS, 2.0, 0)
+    found = in_pieces(lambda _: rays.survey(), range(8), threads=8)
+    assert all(around is found[0] for around in found)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (5, 1), (1, 5), (17, 4), (100, 3), (0, 4), (4, 0), (0, 0)])
+@pytest.mark.parametrize("most", [1, 8, 1000])
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_every_row_is_in_one_band(size, most, threads):
+    found = in_bands(lambda first, last: (first, last), size, threads=threads, most_pixels=most)
+    assert all(before[1] == after[0] for before, after in pairwise(found))
+    assert [found[0][0], found[-1][1]] == [0, size[0]] if found else size[0] == 0
+    assert all(first < last and ((last - first) * size[1] <= most or last - first == 1) for first, last in found)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_results_come_in_order_and_errors_come_through(threads):
+    assert in_pieces(lambda n: n * n, range(20), threads=threads) == [n * n for n in range(20)]
+    with pytest.raises(ZeroDivisionError):
+        in_pieces(lambda n: 1 // (n - 7), range(20), threads=threads)
+
+
+def test_views_under_way_end_with_their_synthesis():
+    """Ctrl-C, say: nobody's should_stop is true, and yet nothing goes on."""
+    began, ended = threading.Event(), []
+
+    def view(synthesis):
+        began.set()
+        while True:
+            try:
+                synthesis.render_alone(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5))
+            except Cancelled:
+                ended.append(True)
+                return
+
+    def interrupted():
+        with ViewSynthesis() as synthesis:
+            synthesis._threads.submit(view, synthesis)
+            assert began.wait(60)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert ended == [True]

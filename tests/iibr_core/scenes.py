@@ -1,0 +1,46 @@
+"""Small scenes with known answers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from iibr_core.generation.plan import ScenePlan, plan_literal
+from iibr_core.types import Disparity, GridShape, Photo, ViewUpdate
+
+
+def smooth_texture(height: int, width: int, seed: int = 0) -> np.ndarray:
+    """(H, W, 3) in 0.2 .. 0.8 without detail finer than some ten pixels, so that resampling it is nearly exact."""
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (3, 4))
+    y, x = np.mgrid[0:height, 0:width]
+    waves = [
+        sum(np.sin(x * 0.11 * k + p) + np.cos(y * 0.13 * k + 2 * p) for k, p in enumerate(phase, 1)) for phase in phases
+    ]
+    return (0.5 + 0.3 * np.stack(waves, axis=-1) / 8).astype(np.float32)
+
+
+def photo_of(pixels: np.ndarray, is_hdr: bool = False) -> Photo:
+    return Photo(np.asarray(pixels, np.float32), focal_px=100.0, name="test", is_hdr=is_hdr)
+
+
+def disparity_of(values: np.ndarray) -> Disparity:
+    return Disparity(np.asarray(values, np.float32), "test")
+
+
+def square_before_wall(
+    height: int = 60, width: int = 80, front: float = 2.0, back: float = 0.0
+) -> tuple[Photo, Disparity]:
+    """A reddish square in front of a bluish, smoothly textured wall; no mixed pixels."""
+    pixels = smooth_texture(height, width) * np.float32([0.3, 0.5, 1.0])
+    disparity = np.full((height, width), back, np.float32)
+    square = np.s_[height // 3 : 2 * height // 3, width // 3 : 2 * width // 3]
+    pixels[square] = (smooth_texture(height, width, 1) * np.float32([1.0, 0.4, 0.2]))[square]
+    disparity[square] = front
+    return photo_of(pixels), disparity_of(disparity)
+
+
+def literal_plan(photo: Photo, disparity: Disparity, rows: int, columns: int | None = None) -> ScenePlan:
+    return plan_literal(photo, disparity, GridShape(rows, columns or rows))
+
+
+def by_index(updates: list[ViewUpdate]) -> dict[tuple[int, int], ViewUpdate]:
+    return {(update.row, update.column): update for update in updates}

@@ -1,0 +1,372 @@
+"""NaN, infinity, denormal and huge numbers at the inputs of every public function of the core: finite values or one
+clear error. A public function that no table here names fails a test, so that a new one gets its case.
+"""
+
+import dataclasses
+import importlib
+import math
+import pkgutil
+import warnings
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+import pytest
+
+import iibr_core
+from benchmarks import plucker
+from iibr_core import color
+from iibr_core.depth import pictorial_cues, refine, scaling, search
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.embedded import apple, google
+from iibr_core.depth.embedded.xmp import Xmp, parsed
+from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
+from iibr_core.formats.images import photo
+from iibr_core.formats.light_fields import hci
+from iibr_core.formats.maps import disparity_file, resample
+from iibr_core.generation import cost_model, plan
+from iibr_core.generation import light_field as generating
+from iibr_core.inpainting import disparity_holes
+from iibr_core.rendering import (
+    ambiguous_rays,
+    candidates,
+    coherent_cells,
+    disparity_statistics,
+    mixed_pixels,
+    occlusion,
+    resampling,
+)
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.types import Disparity, GridShape, Photo, ViewOffset, ViewUpdate
+from tests.iibr_core import embedded_files as embedded
+from tests.iibr_core.scenes import smooth_texture, square_before_wall
+
+WILD = (math.nan, math.inf, -math.inf, 3e38, -3e38, 1e30, 1e-42, -1e-300, 0.0)
+SIZE = 12, 14
+GRID = GridShape(3, 3)
+
+
+def image(value):
+    """Colours with a wild value in one channel of one pixel, and in a block."""
+    pixels = smooth_texture(*SIZE)
+    pixels[3, 4, 0] = pixels[7:9, 5:8] = np.float32(value)
+    return pixels
+
+
+def depths(value):
+    """A map of two surfaces with wild values at one place and in a row."""
+    values = np.where(np.arange(SIZE[1]) < 6, 0.5, 2.0).astype(np.float32) * np.ones((SIZE[0], 1), np.float32)
+    values[3, 4] = values[9] = np.float32(value)
+    return values
+
+
+def known(value):
+    """The same for those who take NaN as "nothing here" and no infinity."""
+    return np.where(np.isfinite(depths(value)), depths(value), np.float32(np.nan))
+
+
+@cache
+def scene():
+    return square_before_wall(*SIZE)
+
+
+def rays(value=0.5):
+    return rays_of_photo(scene()[0].pixels, known(value), 1.0, 0)
+
+
+def found(value):
+    return candidates.find_candidates(rays(value), ViewOffset(0.5, -1.0), (0, SIZE[0]))
+
+
+def shown(value):
+    """Weights, and what they show, of rays with a wild disparity."""
+    weights = closed_form_weights(found(value))
+    return weights, resampling.look_up_colors(rays(value), found(value), weights)
+
+
+def contest(value):
+    weights, (_, disparity, origin) = shown(value)
+    return ambiguous_rays.find_contested(
+        rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]), every=True
+    )
+
+
+def in_use(asked):
+    """Features, and what of the hypotheses is no leftover memory."""
+    return asked.features, asked.disparity[asked.mask]
+
+
+def decided(value):
+    return ambiguous_rays.decide(rays(value), contest(value), generating.transformer_for("exact")(contest(value)))
+
+
+def field(photo_given, values):
+    """Plan and views, by the transformer too."""
+    disparity = Disparity(values, "wild")
+    made = plan.plan_literal(photo_given, disparity, GRID)
+    return [made, *generating.generate(photo_given, made.field_disparity(disparity), made, quality="exact")]
+
+
+def completed(values):
+    disparity = Disparity(values, "wild")
+    return list(generating.ray_set(scene()[0], disparity, plan.plan_literal(scene()[0], disparity, GRID))[1])
+
+
+def rendered(offset, value=0.5):
+    with ViewSynthesis(keeps_entropy=True) as synthesis:
+        return synthesis.render(rays(value), offset)
+
+
+def shares(value):
+    weights = np.full((5, *SIZE), 0.1, np.float32)
+    weights[2, 3, 4] = np.clip(np.float32(value), 0, 0.6)  # to NaN nothing is done
+    return weights
+
+
+def known_of(estimate):
+    """What an estimate knows; NaN is what it does not."""
+    (values,) = (array for array in plain(estimate) if array.ndim)
+    return values[~np.isnan(values)]
+
+
+def gdepth_xmp(value):
+    depth = embedded.picture(np.full(SIZE, 90, np.uint8), "PNG")
+    return Xmp((parsed(embedded.gdepth_segments(depth, near=value, far=5)[0][len(embedded.STANDARD) :]),))
+
+
+def map_file(folder, value, name="map"):
+    np.save(folder / f"{name}.npy", depths(value))
+    return folder / f"{name}.npy"
+
+
+def photo_file(folder, value, kind=".exr"):
+    photo.write_image(folder / f"a{kind}", image(value))
+    return folder / f"a{kind}"
+
+
+def field_on_disk(folder, value):
+    with hci.HciWriter(folder / "field", GridShape(1, 1), 10.0, "wild", True) as writer:
+        writer.add(ViewUpdate(0, 0, np.zeros((*SIZE, 3), np.uint8), depths(value)))
+    header, views = hci.read_light_field(folder / "field")
+    return header, list(views)
+
+
+FINITE = {
+    "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
+    "rendering.ambiguous_rays.decide": lambda v, _: decided(v),
+    "rendering.ambiguous_rays.find_contested": lambda v, _: in_use(contest(v)),
+    "rendering.ambiguous_rays.votes": lambda v, _: ambiguous_rays.votes(rays(v), contest(v)),
+    "generation.cost_model.needs_of": lambda v, _: [
+        cost_model.needs_of(cost_model.relief_of(depths(values), 4.0), GRID) for values in (1.0, v)
+    ],
+    "generation.cost_model.relief_of": lambda v, _: [
+        cost_model.relief_of(depths(v), 4.0),
+        cost_model.relief_of(depths(1.0), v),
+    ],
+    "generation.cost_model.work_of": lambda v, _: cost_model.work_of(
+        cost_model.relief_of(depths(v), 4.0), GRID, "exact"
+    ),
+    "depth.scaling.disparity_from": lambda v, _: [
+        known_of(DisparityMap(scaling.disparity_from(kind(depths(v)), GRID)))
+        for kind in (RelativeInverseDepth, MetricDepth, DisparityMap)
+    ],
+    "depth.embedded.apple.heic_estimate": lambda v, _: apple.heic_estimate(
+        np.ones(SIZE, np.float32), {"d_min": v, "d_max": 2.0}
+    ),
+    "inpainting.disparity_holes.fill_from_background": lambda v, _: disparity_holes.fill_from_background(known(v)),
+    "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
+    "depth.pictorial_cues.estimate_offline": lambda v, _: pictorial_cues.estimate_offline(
+        Photo(image(v), 20.0, "wild")
+    ),
+    "depth.refine.edge_blur_px": lambda v, _: refine.edge_blur_px(np.nan_to_num(depths(v))),
+    "depth.refine.refine": lambda v, _: [
+        refine.refine(image(0.5), depths(v)),
+        refine.refine(image(0.5), depths(1.0), strength=v),
+    ],
+    "formats.maps.resample.resample_surfaces": lambda v, _: known_of(
+        DisparityMap(resample.resample_surfaces(known(v), (7, 9)))
+    ),
+    "formats.maps.disparity_file.read_disparity": lambda v, to: [
+        disparity_file.read_disparity(map_file(to, v), SIZE),
+        disparity_file.read_disparity(map_file(to, v, "map_depth"), (7, 8)),
+    ],
+    "depth.search.open_with_depth": lambda v, to: [
+        search.open_with_depth(photo_file(to, v)),
+        search.open_with_depth(photo_file(to, 1.0), DepthChoice(file=str(map_file(to, v)))),
+    ],
+    "depth.search.resized": lambda v, _: known_of(search.resized(DisparityMap(known(v)), (7, 9))),
+    "formats.light_fields.hci.read_light_field": lambda v, to: field_on_disk(to, v),
+    "formats.images.photo.read_photo": lambda v, to: photo.read_photo(photo_file(to, v), max_pixels=90),
+    "formats.images.photo.write_image": lambda v, to: [
+        photo.read_photo(photo_file(to, v, kind)) for kind in (".png", ".exr")
+    ],
+    "generation.light_field.generate": lambda v, _: [
+        field(scene()[0], depths(v)),
+        field(Photo(image(v), 9.0, "wild"), depths(1.0)),
+    ],
+    "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
+    "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0, 1)),
+    "rendering.resampling.heaviest": lambda v, _: resampling.heaviest(found(v), shown(v)[0]),
+    "rendering.resampling.look_up_colors": lambda v, _: shown(v)[1],
+    "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
+        image(0.5), known(v), 0.5
+    )[:2],
+    "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),
+    "rendering.occlusion.occlusion_mask": lambda v, _: occlusion.occlusion_mask(shares(v)),
+    "generation.plan.plan_for_viewing": lambda v, _: [
+        plan.plan_for_viewing(scene()[0], Disparity(depths(v), "wild")),
+        plan.plan_for_viewing(*scene(), plan.PlanOverrides(depth_strength=v)),
+        plan.plan_for_viewing(*scene(), plan.PlanOverrides(focus_disparity=v)).field_disparity(scene()[1]),
+    ],
+    "generation.plan.plan_literal": lambda v, _: plan.plan_literal(scene()[0], Disparity(depths(v), "wild"), GRID),
+    "rendering.coherent_cells.find_smooth_cells": lambda v, _: [
+        coherent_cells.find_smooth_cells(rays(v), ViewOffset(0.5, -1.0), (0, SIZE[0])),
+        coherent_cells.find_smooth_cells(rays(1.0), ViewOffset(v, 0.5), (0, SIZE[0])),
+    ],
+    "rendering.coherent_cells.land_on_rough": lambda v, _: [
+        coherent_cells.land_on_rough(rays(v).cells, 0, t, 0.5, (0, 4), np.eye(1, 4, dtype=np.bool_)) for t in (0.5, v)
+    ],
+    "rendering.disparity_statistics.edge_softness": lambda v, _: disparity_statistics.edge_softness(depths(v), 0.5),
+    "rendering.disparity_statistics.surroundings_of": lambda v, _: (
+        disparity_statistics.surroundings_of(depths(v)[None], 1.0).softness
+    ),
+    "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
+    "rendering.view_synthesis.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
+    "types.Disparity": lambda v, _: Disparity(depths(v), "wild"),
+    "types.Photo": lambda v, _: Photo(image(v), 20.0, "wild"),
+    "rendering.visibility_weights.closed_form_weights": lambda v, _: closed_form_weights(found(v)),
+}
+"""What comes back is finite, or InputError or another ValueError says why not."""
+
+ELEMENTWISE = {
+    "color.encoded_from_stored": lambda x: color.encoded_from_stored(x.astype(np.float16)),
+    "color.linear_from_srgb": color.linear_from_srgb,
+    "color.srgb_from_linear": color.srgb_from_linear,
+    "geometry.depth_of": plucker.depth_of,
+    "geometry.line_of": lambda x: plucker.line_of(np.stack([x, x, x], -1), np.ones((len(x), 3))),
+    "formats.images.photo.upright": lambda x: photo.upright(x[None], 2)[0, ::-1],
+}
+"""One wild element changes no other."""
+
+FINITE_BY_CONTRACT = {
+    "color.stored_from_encoded": "made for every view; Photo and the synthesis see to it",
+    "geometry.distance_between": "of lines that `line_of` made",
+    "geometry.offset_of_line": "lines along the plane give infinity or NaN, as it says",
+    "geometry.pixel_of_line": "lines along the plane give infinity or NaN, as it says",
+    "inpainting.background.fill_background": "of rendered views only",
+    "depth.models.transformers_models.estimate_with": "of a Photo; what a model gives is cleaned by `disparity_from`",
+    "depth.models.transformers_models.input_size": "sizes only",
+    "formats.images.photo.focal_px_from_fov": "of angles that options check",
+    "formats.images.photo.size_within": "sizes only",
+    "formats.maps.pfm.write_pfm": "keeps every bit pattern, tests/core/test_pfm.py",
+    "formats.maps.writer.write_map": "keeps what it gets; maps of the viewer are finite",
+    "formats.light_fields.scene.middle": "of viewpoints that the readers of layouts checked",
+    "formats.light_fields.scene.nearest_view": "of viewpoints that the readers of layouts checked",
+    "formats.light_fields.scene.seen_from": "of viewpoints that the readers of layouts checked",
+    "formats.weights.write_tensors": "training stops before, tests/iibr_core/training",
+    "formats.weights.save_weights": "training stops before, tests/iibr_core/training",
+    "ray_transformer.inference.TrainedWeights": "huge features: rendering/test_ambiguous_rays.py, test_hard_cases.py",
+    "ray_transformer.model.RayTransformer": "huge features: rendering/test_ambiguous_rays.py",
+    "rendering.ray_set.RaySet": "NaN is no surface; infinity is refused by Disparity",
+    "depth.models.estimate_cache.store": "an Estimate, in which NaN is unknown",
+}
+"""Who promises the numbers, or where the case is tested."""
+
+READS_OR_TELLS = {
+    "depth.embedded.apple": "appended_estimate",
+    "depth.embedded.reader": "read_embedded embedded_in_jpeg",
+    "depth.models.estimate_cache": "cache_folder key_of load",
+    "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
+    "depth.models.config": "read_config package_for read_preparation",
+    "depth.models.catalog": "known_model model_to_use is_installed cached_folder weight_files bytes_of fetch",
+    "depth.models.package_models": "run_package",
+    "depth.embedded.images": "picture_file decoded_map",
+    "depth.embedded.samsung": "samsung_estimate",
+    "depth.sidecar": "find_sidecar flat_disparity",
+    "depth.embedded.xmp": "is_jpeg jpeg_layout value_in xmp_of parsed",
+    "formats.files": "temporary_sibling written_whole require_file opened_file refuse_bomb",
+    "formats.light_fields.numbered_grid": "read_grid_folder",
+    "formats.light_fields.hci": "is_light_field_folder read_view HciWriter",
+    "formats.images.heic": "is_heic read_heic read_heic_depth",
+    "formats.light_fields.llff": "read_llff",
+    "formats.light_fields.middlebury": "read_middlebury",
+    "formats.light_fields.scene": "pictures_in with_equal_sizes first_existing numbers_in scene_folders",
+    "formats.maps.npy": "read_array",
+    "formats.maps.pfm": "read_pfm",
+    "formats.images.oiio_writer": "write_picture",
+    "formats.images.oiio_reader": "read_size read_orientation read_raster read_map require_whole_png text_attribute "
+    "complaint_of",
+    "formats.light_fields.stanford": "read_stanford",
+    "formats.weights": "load_weights read_weights read_tensors require_shapes",
+    "generation.light_field": "transformer_for",
+    "generation.view_maker": "ViewMaker as_stored outer_views",
+    "runtime.resources": "resource_folder",
+    "generation.cost_model": "Need Needs Work outermost_of",
+    "runtime.tiling": "Cancelled never go_on in_pieces in_bands",
+    "rendering.view_synthesis": "ViewSynthesis",
+    "types": "ViewOffset GridShape InputError",
+}
+"""Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
+
+ELSEWHERE = ("training.", "evaluation.", "runtime.jit.", "depth.editing.")
+"""Packages whose own tests feed them such values: scenes of our own making, figures, pieces of kernels, edits."""
+
+
+def plain(result):
+    """Every array and number in a result, whatever it is packed in."""
+    if isinstance(result, np.ndarray | np.generic | float | int):
+        yield np.asarray(result)
+    elif dataclasses.is_dataclass(result):
+        yield from plain([getattr(result, item.name) for item in dataclasses.fields(result)])
+    elif isinstance(result, list | tuple | Iterator):
+        for item in result:
+            yield from plain(item)
+
+
+@pytest.mark.parametrize("value", WILD, ids=str)
+@pytest.mark.parametrize("name", sorted(FINITE))
+def test_finite_or_a_clear_error(name, value, tmp_path):
+    complaint, result = None, None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            result = FINITE[name](value, tmp_path)
+    except ValueError as error:
+        complaint = str(error)
+    assert complaint is None or (complaint and "\n" not in complaint)
+    assert all(np.isfinite(array).all() for array in plain(result) if array.dtype.kind == "f")
+
+
+@pytest.mark.parametrize("value", WILD, ids=str)
+@pytest.mark.parametrize("name", sorted(ELEMENTWISE))
+def test_one_wild_element_changes_no_other(name, value):
+    elements = np.linspace(0.1, 0.9, 9)
+    clean = ELEMENTWISE[name](elements)
+    elements[4] = value
+    with np.errstate(all="ignore"):
+        result = ELEMENTWISE[name](elements)
+    others = np.arange(9) != 4
+    assert np.array_equal(result[others], clean[others])
+
+
+def public_names():
+    """module.name of every function and of every class that does more than hold values."""
+    for found_module in pkgutil.walk_packages(iibr_core.__path__, "iibr_core."):
+        module = importlib.import_module(found_module.name)
+        for name, value in vars(module).items():
+            is_own = getattr(value, "__module__", None) == module.__name__ and not name.startswith("_")
+            if is_own and callable(value) and not dataclasses.is_dataclass(value):
+                yield f"{found_module.name.removeprefix('iibr_core.')}.{name}", value
+
+
+def test_every_public_function_has_its_case():
+    told = {f"{module}.{name}" for module, names in READS_OR_TELLS.items() for name in names.split()}
+    tabled = {*FINITE, *ELEMENTWISE, *FINITE_BY_CONTRACT, *told}
+    kernels = type(candidates._land)  # pieces of hot loops, called by kernels only
+    missing = {
+        name
+        for name, value in public_names()
+        if name not in tabled and not name.startswith(ELSEWHERE) and not isinstance(value, kernels)
+    }
+    assert not missing, "give it a case in one of the tables"

@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+
+from iibr_core.training.degradation import blurred, coarse, degrade, misaligned, noisy, quantised, rescaled
+
+SHAPES = [(1, 1), (1, 13), (7, 1), (2, 3), (31, 37)]
+
+
+def rough(shape=(31, 37), seed=0):
+    return np.random.default_rng(seed).normal(0, 2, shape).astype(np.float32)
+
+
+def step_edge():
+    return np.where(np.arange(41) < 20, -1.0, 3.0).astype(np.float32) * np.ones((9, 1), np.float32)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 1.3, 4.0])
+def test_blur_against_the_sum_over_all_pixels(sigma):
+    d = rough((6, 9))
+    far = np.pad(d, 40, mode="edge").astype(np.float64)
+    y, x = np.indices(far.shape)
+    for i, j in [(0, 0), (3, 4), (5, 8)]:
+        weights = np.exp(-0.5 * ((y - i - 40) ** 2 + (x - j - 40) ** 2) / sigma**2)
+        assert blurred(d, sigma)[i, j] == pytest.approx((weights * far).sum() / weights.sum(), abs=5e-3)
+
+
+def test_a_blurred_edge_stays_where_it_is_and_within_its_range():
+    soft = blurred(step_edge(), 2.0)[4]
+    assert (soft[19] + soft[20]) / 2 == pytest.approx(1.0, abs=1e-5)
+    assert (np.diff(soft) >= -1e-6).all()
+    assert soft[0] == pytest.approx(-1)
+    assert soft[-1] == pytest.approx(3)
+
+
+@pytest.mark.parametrize("grain", [0.0, 0.6, 3.0])
+def test_noise_has_the_strength_asked_for(grain):
+    zero = np.zeros((80, 90), np.float32)
+    noise = noisy(zero, np.random.default_rng(1), 0.3, grain)
+    assert noise.std() == pytest.approx(0.3, rel=0.03)
+    neighbours = np.corrcoef(noise[:, 1:].ravel(), noise[:, :-1].ravel())[0, 1]
+    assert (neighbours > 0.9) if grain == 3.0 else (neighbours < 0.7)
+
+
+def test_quantised_values_are_multiples_within_half_a_step():
+    d = rough()
+    q = quantised(d, 0.25)
+    assert np.abs(q - d).max() <= 0.125 + 1e-6
+    assert (q / 0.25) == pytest.approx(np.rint(q / 0.25), abs=1e-5)
+
+
+def test_coarse_averages_squares_and_keeps_slopes():
+    y, x = np.mgrid[0:24, 0:30].astype(np.float32)
+    slope = 0.3 * x - 0.2 * y
+    assert coarse(slope, 4)[2:-2, 2:-2] == pytest.approx(slope[2:-2, 2:-2], abs=1e-4)
+    d = rough((9, 12))
+    assert coarse(d, 3)[4, 7] == pytest.approx(d[3:6, 6:9].mean(), abs=1e-5)
+
+
+def test_misalignment_moves_down_and_right():
+    d = rough()
+    assert (misaligned(d, 2.0, 3.0)[2:, 3:] == d[:-2, :-3]).all()
+    assert misaligned(d, 0.0, -0.25)[:, :-1] == pytest.approx(0.75 * d[:, :-1] + 0.25 * d[:, 1:], abs=1e-5)
+
+
+def test_rescaled():
+    assert rescaled(step_edge(), 1.1, -0.2) == pytest.approx(1.1 * step_edge() - 0.2)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(
+    "fault",
+    [
+        lambda d: blurred(d, 0.0),
+        lambda d: quantised(d, 0.0),
+        lambda d: coarse(d, 1),
+        lambda d: misaligned(d, 0.0, 0.0),
+        lambda d: rescaled(d, 1.0, 0.0),
+        lambda d: noisy(d, np.random.default_rng(0), 0.0),
+    ],
+)
+def test_a_fault_of_no_strength_changes_nothing_and_gives_a_copy(fault, shape):
+    d = rough(shape)
+    out = fault(d)
+    assert out.dtype == np.float32
+    assert out == pytest.approx(d, abs=1e-6)
+    assert not np.shares_memory(out, d)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_an_even_map_stays_even_where_only_its_shape_is_touched(shape):
+    flat = np.full(shape, 1.5, np.float32)
+    for out in (blurred(flat, 4.0), coarse(flat, 3), misaligned(flat, 5.3, -40.2)):
+        assert out.shape == shape
+        assert out == pytest.approx(flat, abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_degrade_repeats_by_seed_and_leaves_its_input_alone(shape):
+    d = rough(shape)
+    before = d.copy()
+    for seed in range(30):
+        out, again = (degrade(d, np.random.default_rng(seed), 4.0) for _ in range(2))
+        assert out.shape == shape
+        assert out.dtype == np.float32
+        assert np.isfinite(out).all()
+        assert (out == again).all()
+    assert (d == before).all()
+
+
+def test_degrade_leaves_some_maps_exact_and_changes_the_others_differently():
+    d = step_edge()
+    outs = [degrade(d, np.random.default_rng(seed), 4.0) for seed in range(60)]
+    exact = sum(bool((out == d).all()) for out in outs)
+    assert 3 <= exact <= 25
+    assert len({out.tobytes() for out in outs}) >= 60 - exact

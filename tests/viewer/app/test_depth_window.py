@@ -1,0 +1,268 @@
+"""Depth edited in a real window: the brush, the sliders and handles, undo, saving and opening maps, what is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from imgui_bundle import imgui
+
+from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import FAR, NEAR, Driver
+from viewer.app.main_loop import App
+from viewer.model.actions import (
+    AskForPath,
+    AskToSave,
+    DoTask,
+    EndGesture,
+    MoveEye,
+    Notify,
+    SetDepthStrength,
+    SetFontScale,
+    ShowPrompt,
+    ToggleSection,
+)
+from viewer.model.state.app_state import Notice, PalettePrompt, PathPrompt, SavePrompt, SaveTask
+from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
+from viewer.model.state.inspection import SetOpacity, SetOverlay, ShowEpis
+
+Opener = Callable[..., Driver]
+GRID = GridShape(3, 3)
+
+
+@pytest.fixture(autouse=True)
+def _no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a system without zenity and its like: a dialog would wait for a person."""
+    monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
+
+
+@pytest.fixture
+def viewer(open_window: Opener, photo_path: Path) -> Iterator[Driver]:
+    driver = open_window(photo_path, grid=GRID)
+    driver.until_idle()
+    preferences = replace(driver.app.state.preferences, open_sections=("depth",))
+    driver.app.state = replace(driver.app.state, preferences=preferences)
+    driver.send("mousemove", *driver.position(0.1, 0.1))
+    driver.until_idle()
+    yield driver
+    driver.send("mouseup", 1)
+
+
+def disparity_of(app: App) -> np.ndarray:
+    """What the views on the stage were made from, as given."""
+    assert app.stage.loaded is not None
+    return app.stage.loaded.disparity.values
+
+
+def is_made(app: App) -> bool:
+    """Whether the stage shows what was asked for last."""
+    return app.stage.generation == app.state.generation
+
+
+def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
+    """Put the pointer there and hold it down."""
+    x, y = viewer.position(x_share, y_share)
+    viewer.send("mousemove", x, y)
+    viewer.until(lambda app: (imgui.get_io().mouse_pos.x, imgui.get_io().mouse_pos.y) == (x, y))
+    viewer.send("mousedown", 1)
+    viewer.until(lambda app: app.state.stroke is not None)
+
+
+def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver) -> None:
+    viewer.app.do(MoveEye(ViewOffset(0.0, 1.0)), SetBrush(Brush(radius=0.1, strength=1.0, is_on=True)))
+    viewer.until_idle()
+    before, given = viewer.image(), disparity_of(viewer.app).copy()
+    press_at(viewer, 0.5, 0.5)
+    viewer.until(lambda app: not np.array_equal(app.stage.renderer.read_image(), before))
+    previews = viewer.app.stage.previews
+    viewer.send("mousemove", *viewer.position(0.5, 0.6))
+    viewer.until(lambda app: app.stage.previews > previews)
+    assert viewer.app.state.generation == 1
+    np.testing.assert_array_equal(disparity_of(viewer.app), given)
+    viewer.send("mouseup", 1)
+    viewer.until(lambda app: app.state.stroke is None and is_made(app))
+    viewer.until_idle()
+    assert viewer.app.state.generation == 2
+    assert viewer.app.stage.views_present == 9
+    made = disparity_of(viewer.app)
+    assert made.max() == pytest.approx(NEAR + (NEAR - FAR), abs=0.2)
+    far = given == FAR
+    np.testing.assert_array_equal(made[far], given[far], "the red square's contour holds the stroke")
+    viewer.send("key", "ctrl+z")
+    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
+    viewer.until_idle()
+    np.testing.assert_array_equal(disparity_of(viewer.app), given)
+    viewer.send("key", "ctrl+shift+z")
+    viewer.until(lambda app: app.state.generation == 4 and is_made(app))
+    np.testing.assert_array_equal(disparity_of(viewer.app), made)
+
+
+def test_the_disparity_as_colours_follows_the_brush(viewer: Driver) -> None:
+    viewer.app.do(SetOverlay("disparity"), SetOpacity(1.0), SetBrush(Brush("farther", 0.1, 1.0, is_on=True)))
+    viewer.until_idle()
+    shown = viewer.app.table._drawn["overlay"][0]
+    press_at(viewer, 0.5, 0.5)
+    viewer.until(lambda app: app.table._drawn["overlay"][0] != shown)
+    viewer.send("mouseup", 1)
+    viewer.until(lambda app: is_made(app) and app.state.stroke is None)
+    viewer.until_idle()
+
+
+def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
+    viewer.app.do(SetBrush(Brush(is_on=True)))
+    viewer.until_idle()
+    given = disparity_of(viewer.app).copy()
+    press_at(viewer, 0.5, 0.5)
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.stroke is None)
+    viewer.send("mouseup", 1)
+    viewer.until(lambda app: is_made(app))
+    viewer.until_idle()
+    np.testing.assert_array_equal(disparity_of(viewer.app), given)
+    assert not viewer.app.state.history.past
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: not app.state.brush.is_on)
+    assert not viewer.app.state.should_quit
+
+
+def test_the_brush_is_taken_from_the_panel_and_by_key(viewer: Driver) -> None:
+    viewer.press("Smooth")
+    viewer.until(lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
+    viewer.until_idle()
+    viewer.slide("##Size", 0.9)
+    assert viewer.app.state.brush.radius > 0.1
+    viewer.send("key", "b")
+    viewer.until(lambda app: not app.state.brush.is_on)
+    viewer.send("mousemove", *viewer.position(0.5, 0.5), "mousedown", 1)
+    viewer.app.step()
+    viewer.send("mousemove", *viewer.position(0.6, 0.5))
+    viewer.until(lambda app: app.state.optics.eye.s != 0)
+    viewer.send("mouseup", 1)
+    assert viewer.app.state.depth.edits.strokes == ()
+
+
+def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver) -> None:
+    viewer.slide("##Far clip", 0.2)
+    viewer.until(is_made)
+    viewer.until_idle()
+    assert 0 < viewer.app.state.depth.edits.far_clip < 0.5
+    assert viewer.app.state.generation == 2
+    # where `find` looks
+    viewer.app.do(SetTone(replace(viewer.app.state.depth.edits, near_clip=0.73), is_finished=True), EndGesture())
+    viewer.until(is_made)
+    viewer.until_idle()
+    x, y = viewer.find("handle near_clip")
+    viewer.send("mousedown", 1)
+    viewer.app.step()
+    previews = viewer.app.stage.previews
+    viewer.send("mousemove", x - 60, y)
+    viewer.until(lambda app: app.state.depth.edits.near_clip < 0.7 and app.stage.previews > previews)
+    assert viewer.app.state.generation == 3
+    viewer.send("mouseup", 1)
+    viewer.until(lambda app: app.state.generation == 4 and is_made(app))
+    viewer.until_idle()
+    assert disparity_of(viewer.app).max() < NEAR
+    assert len(viewer.app.state.history.past) == 3
+
+
+def test_refine_is_worked_out_anew_without_reading_the_photo(viewer: Driver, photo_path: Path) -> None:
+    photo_path.unlink()
+    viewer.slide("##Refine", 0.3)
+    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
+    viewer.until_idle()
+    assert 0 < viewer.app.state.depth.refine < 1
+    assert viewer.app.stage.loaded is not None
+    assert viewer.app.stage.loaded.work == viewer.app.state.depth
+    viewer.app.do(SetDepthStrength(2.0, is_finished=True))
+    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
+    viewer.until_idle()
+    assert not viewer.app.state.notices
+
+
+def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:
+    viewer.press("Invert")
+    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
+    viewer.until_idle()
+    wanted = disparity_of(viewer.app).copy()
+    viewer.app.do(AskToSave("map"))
+    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
+    viewer.until_idle()
+    out = tmp_path / "turned.npy"
+    viewer.type(str(out))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: out.exists())
+    viewer.until_idle()
+    np.testing.assert_array_equal(np.load(out), wanted)
+    assert str(out) in viewer.app.state.notices[-1].text
+    viewer.app.do(AskForPath("map"))
+    viewer.until_idle()
+    viewer.type(str(out))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.source is not None and app.state.source.disparity_path == str(out))
+    viewer.until(is_made)
+    viewer.until_idle()
+    assert viewer.app.state.depth.edits == DepthEdits()
+    np.testing.assert_array_equal(disparity_of(viewer.app), wanted)
+    assert viewer.app.state.scene is not None
+    assert viewer.app.state.scene.depth_origin is not None
+    assert "turned.npy" in viewer.app.state.scene.depth_origin.line
+
+
+def test_a_bad_map_leaves_the_scene_and_its_edits_with_a_notice(viewer: Driver, tmp_path: Path) -> None:
+    viewer.press("Invert")
+    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
+    bad = tmp_path / "bad.pfm"
+    bad.write_bytes(b"no map")
+    viewer.app.window.on_drop(None, [str(bad)])
+    viewer.until(lambda app: any("bad.pfm" in notice.text for notice in app.state.notices))
+    viewer.until(is_made)
+    viewer.until_idle()
+    assert viewer.app.state.depth.edits.is_inverted
+    assert disparity_of(viewer.app)[0, 0] == NEAR
+
+
+def test_one_escape_closes_the_palette(viewer: Driver) -> None:
+    viewer.send("key", "ctrl+p")
+    viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
+    viewer.until_idle()
+    viewer.type("depth")
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.prompt is None)
+    viewer.until_idle()
+    assert not viewer.app.state.should_quit
+
+
+def test_a_large_picture_is_announced_before_the_window_stands_still(
+    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("viewer.app.side_effects.LARGE_PIXELS", 2000)
+    out = tmp_path / "out.png"
+    frames = viewer.app.frames_shown
+    viewer.app.do(DoTask(SaveTask(str(out), (96, 64))))
+    viewer.until(lambda app: any("stands still" in notice.text for notice in app.state.notices))
+    assert not out.exists()
+    viewer.until(lambda app: out.exists())
+    assert viewer.app.frames_shown > frames
+    assert [notice.text for notice in viewer.app.state.notices] == [f"Saved {out}"]
+
+
+def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None:
+    viewer.app.do(ShowEpis(True), *(Notify(Notice(f"{i}: " + "many words " * 20)) for i in range(5)))
+    viewer.until_idle()
+    frame, layout = imgui.internal.find_window_by_name("notices"), viewer.app.layout()
+    assert layout.strip_across is not None
+    assert layout.strip_down is not None
+    assert frame.pos.y >= 0
+    assert frame.pos.y + frame.size.y <= layout.strip_across.y
+    assert frame.pos.x + frame.size.x <= layout.strip_down.x
+
+
+def test_no_dialog_means_a_prompt(viewer: Driver) -> None:
+    viewer.press("Open map…")
+    viewer.until(lambda app: app.state.prompt == PathPrompt("map"))
+    viewer.app.do(ShowPrompt(None), SetFontScale(1.0), ToggleSection("depth"))
+    viewer.until_idle()

@@ -1,0 +1,108 @@
+"""Pictures on disk: larger than the graphics card draws at once, with more than 8 bits where the file holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from iibr_core.color import srgb_from_linear
+from iibr_core.types import GridShape, InputError, ViewOffset
+from tests.viewer.conftest import HEIGHT, WIDTH
+from viewer.app.headless import HeadlessViewer
+from viewer.app.image_export import AlreadyThereError, drawn_pixels, save_picture
+from viewer.model.actions import MoveEye, SetAperture, SetFocus
+from viewer.model.saved_settings import read_settings
+from viewer.model.state.app_state import SaveTask, Source
+
+
+@pytest.fixture(scope="module")
+def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from iibr_core.formats.images.photo import write_image
+
+    folder = tmp_path_factory.mktemp("saving")
+    y, x = np.indices((HEIGHT, WIDTH))
+    pixels = np.stack([x * 255 / WIDTH, y * 255 / HEIGHT, (x + y) % 256], axis=-1)
+    write_image(folder / "photo.png", pixels.astype(np.uint8))
+    np.save(folder / "photo_disparity.npy", np.hypot(x - WIDTH / 2, y - HEIGHT / 2).astype(np.float32) < 25)
+    return folder / "photo.png"
+
+
+@pytest.fixture(scope="module")
+def opened(photo: Path) -> Iterator[HeadlessViewer]:
+    try:
+        viewer = HeadlessViewer("egl")
+    except InputError as error:
+        pytest.skip(str(error))
+    with viewer:
+        viewer.open(Source(str(photo), grid=GridShape(3, 3)), 1.0, lambda progress: None)
+        viewer.do(MoveEye(ViewOffset(0.3, -0.4)), SetAperture(2.0), SetFocus(0.2))
+        yield viewer
+
+
+def saved(viewer: HeadlessViewer, path: Path, size_px: tuple[int, int]) -> np.ndarray:
+    save_picture(viewer._stage, viewer.state, SaveTask(str(path), size_px))
+    return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))[..., :3]
+
+
+def test_exr_holds_light_finer_than_png(opened: HeadlessViewer, tmp_path: Path) -> None:
+    png = saved(opened, tmp_path / "a.png", (WIDTH, HEIGHT)) * 255
+    light = saved(opened, tmp_path / "a.exr", (WIDTH, HEIGHT))
+    assert oiio.ImageBuf(str(tmp_path / "a.exr")).spec().format == oiio.FLOAT
+    encoded = srgb_from_linear(light) * 255
+    assert np.abs(encoded - png).max() <= 0.51, "the same picture"
+    assert np.mean(np.abs(encoded - np.rint(encoded)) > 0.05) > 0.5, "not rounded to 8 bits on the way"
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+def test_settings_are_inside(opened: HeadlessViewer, tmp_path: Path, name: str) -> None:
+    saved(opened, tmp_path / name, (70, 50))
+    settings = read_settings(tmp_path / name)
+    assert settings.optics == opened.state.optics
+    assert settings.size_px == (70, 50)
+
+
+def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
+    opened: HeadlessViewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    large = 4 * WIDTH, 4 * HEIGHT
+    at_once = saved(opened, tmp_path / "once.png", large) * 255
+    monkeypatch.setattr(opened._gl, "max_texture_size", 192)
+    in_parts = saved(opened, tmp_path / "parts.png", large) * 255
+    assert in_parts.shape == (4 * HEIGHT, 4 * WIDTH, 3)
+    assert np.mean(np.abs(in_parts - at_once).max(-1) > 3) < 0.005
+
+
+def test_the_window_draws_its_own_picture_again(opened: HeadlessViewer) -> None:
+    stage, size_px = opened._stage, (WIDTH, HEIGHT)
+    stage.converge(opened.state, size_px)
+    shown, drawn = stage.renderer.read_image(), stage.pictures_drawn
+    stage.picture(opened.state, (40, 30))
+    stage.converge(opened.state, size_px)
+    assert stage.pictures_drawn == drawn + 1
+    assert np.array_equal(stage.renderer.read_image(), shown)
+
+
+@pytest.mark.parametrize("size_px", [(0, 5), (5, -1), (20_000, 20_000)])
+def test_absurd_sizes_are_refused(opened: HeadlessViewer, size_px: tuple[int, int]) -> None:
+    with pytest.raises(InputError, match=rf"{size_px[0]}x{size_px[1]} px: .* million"):
+        drawn_pixels(opened._stage, opened.state, size_px)
+
+
+def test_files_are_not_replaced_unasked(opened: HeadlessViewer, tmp_path: Path) -> None:
+    path = tmp_path / "taken.png"
+    path.write_bytes(b"mine")
+    with pytest.raises(AlreadyThereError, match=r"taken\.png"):
+        saved(opened, path, (8, 8))
+    assert path.read_bytes() == b"mine"
+    save_picture(opened._stage, opened.state, SaveTask(str(path), (8, 8), may_replace=True))
+    assert path.read_bytes() != b"mine"
+
+
+@pytest.mark.parametrize("name", ["", "a.jpg", "missing-folder/a.png"])
+def test_places_that_cannot_be_written(opened: HeadlessViewer, tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError):
+        save_picture(opened._stage, opened.state, SaveTask(str(tmp_path / name) if name else "", (8, 8)))

@@ -1,0 +1,252 @@
+"""Mouse and keys as pure functions: what they ask for, and which way things move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from iibr_core.types import GridShape, ViewOffset
+from viewer.app.input import (
+    DRAG_ACROSS_GRID,
+    Keys,
+    Pointer,
+    actions_from_drop,
+    actions_from_hover,
+    actions_from_keys,
+    actions_from_pointer,
+    gesture_end,
+    gesture_start,
+    units_per_view,
+)
+from viewer.model.actions import (
+    EndGesture,
+    FocusOn,
+    MoveEye,
+    MoveTiltHandle,
+    OpenPath,
+    Quit,
+    ResetOptics,
+    ReturnHome,
+    SetFocus,
+    SetHover,
+    ShowPrompt,
+    Undo,
+)
+from viewer.model.commands import BY_NAME
+from viewer.model.layout import Layout, layout_of, letterboxed, pixel_at
+from viewer.model.layout import Rect as R
+from viewer.model.lens.focal_plane import handle_points
+from viewer.model.state.app_state import AppState, History, Hover, Optics, Scene, Source, TiltHandles
+
+SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
+STATE = AppState(source=SCENE.source, scene=SCENE)
+LAYOUT = layout_of((1280, 800), (600, 400))
+PICTURE = LAYOUT.picture
+assert PICTURE is not None
+MIDDLE = PICTURE.x + PICTURE.width / 2, PICTURE.y + PICTURE.height / 2
+OVER_PICTURE = Pointer(x=MIDDLE[0], y=MIDDLE[1], pressed_x=MIDDLE[0], pressed_y=MIDDLE[1])
+
+
+def asked(
+    pointer: Pointer, state: AppState = STATE, layout: Layout = LAYOUT, picked: float | None = 1.5
+) -> list[object]:
+    return list(actions_from_pointer(pointer, layout, state, lambda x, y: picked))
+
+
+@pytest.mark.parametrize(("step_x", "step_y"), [(10, 0), (-7, 0), (0, 5), (3, -4)])
+def test_near_things_follow_the_hand(step_x: float, step_y: float) -> None:
+    """A point of disparity d is seen at x - d * s: for d > 0 it must move the way the pointer moved."""
+    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=step_x, step_y=step_y))
+    assert isinstance(move, MoveEye)
+    d = SCENE.disparity_range_px[1]
+    for moved, hand in ((-d * move.eye.s, step_x), (-d * move.eye.t, step_y)):
+        assert moved * hand >= 0
+        assert abs(moved) <= abs(hand)
+        assert (moved == 0) == (hand == 0)
+
+
+def test_the_nearest_surface_sticks_to_the_pointer_where_parallax_is_large() -> None:
+    scene = replace(SCENE, disparity_range_px=(0.0, 200.0))
+    state = replace(STATE, scene=scene)
+    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=10), state)
+    on_screen = PICTURE.width / scene.width  # window units per picture pixel
+    assert isinstance(move, MoveEye)
+    assert -200 * move.eye.s * on_screen == pytest.approx(10)
+
+
+def test_a_drag_over_part_of_the_picture_crosses_the_grid() -> None:
+    assert units_per_view(LAYOUT, SCENE) * (SCENE.grid.columns - 1) == pytest.approx(DRAG_ACROSS_GRID * PICTURE.width)
+
+
+def test_a_drag_adds_to_the_eye() -> None:
+    state = replace(STATE, optics=Optics(eye=ViewOffset(1.0, 2.0)))
+    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=0, step_y=1), state)
+    assert isinstance(move, MoveEye)
+    assert move.eye.s == 2.0
+    assert move.eye.t < 1.0
+
+
+def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
+    seen = []
+
+    def pick(x: float, y: float) -> float:
+        seen.append((x, y))
+        return 0.75
+
+    pointer = replace(OVER_PICTURE, is_released=True, clicks=1)
+    assert actions_from_pointer(pointer, LAYOUT, STATE, pick) == [FocusOn(pytest.approx((0, 0)), 0.75)]
+    assert seen == [pytest.approx((299.5, 199.5))]
+
+
+@pytest.mark.parametrize(
+    ("pointer", "expected"),
+    [
+        (replace(OVER_PICTURE), []),
+        (replace(OVER_PICTURE, is_down=True, drag_distance=2, step_x=2), []),
+        (replace(OVER_PICTURE, is_released=True, clicks=1, drag_distance=40), []),
+        (replace(OVER_PICTURE, is_released=True, clicks=2), [ReturnHome()]),
+        (replace(OVER_PICTURE, is_released=True, clicks=1, is_over_panel=True), []),
+        (replace(OVER_PICTURE, is_down=True, drag_distance=40, step_x=9, is_over_panel=True), []),
+        (replace(OVER_PICTURE, wheel=1.0, is_over_panel=True), []),
+        (replace(OVER_PICTURE, wheel=1.0, x=1.0, y=1.0), []),
+        (replace(OVER_PICTURE, is_released=True, clicks=1, pressed_x=1.0, pressed_y=1.0), []),
+    ],
+)
+def test_what_does_nothing_or_resets(pointer: Pointer, expected: list[object]) -> None:
+    assert asked(pointer) == expected
+
+
+def test_a_click_without_disparity_does_nothing() -> None:
+    assert asked(replace(OVER_PICTURE, is_released=True, clicks=1), picked=None) == []
+
+
+def test_the_wheel_moves_the_focus_nearer_and_farther() -> None:
+    (up,), (down,) = (asked(replace(OVER_PICTURE, wheel=wheel)) for wheel in (1.0, -1.0))
+    assert isinstance(up, SetFocus)
+    assert isinstance(down, SetFocus)
+    assert up.disparity == -down.disparity > 0
+
+
+def test_nothing_is_asked_for_without_a_scene_or_room() -> None:
+    pointer = replace(OVER_PICTURE, is_released=True, clicks=1)
+    assert asked(pointer, AppState()) == []
+    assert asked(pointer, layout=layout_of((200, 100), (600, 400))) == []
+
+
+def test_keys() -> None:
+    assert actions_from_keys(Keys(), STATE) == []
+    reset = "Reset viewpoint, focus and aperture"
+    assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [Quit(), ResetOptics(), Undo()]
+    assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [ShowPrompt(None)]
+    assert reset in BY_NAME
+    (move,) = actions_from_keys(Keys(arrows=ViewOffset(1, -1)), STATE)
+    assert isinstance(move, MoveEye)
+    assert move.eye.t > 0 > move.eye.s
+
+
+WITH_HANDLES = replace(STATE, tilt_handles=TiltHandles())
+HANDLES = handle_points(TiltHandles(), PICTURE)
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_drag_that_begins_on_a_handle_moves_it_onto_what_is_there(index: int) -> None:
+    x, y = HANDLES[index]
+    pointer = replace(OVER_PICTURE, pressed_x=x + 5, pressed_y=y - 5, is_down=True, drag_distance=30, step_x=3)
+    assert asked(pointer, WITH_HANDLES) == [MoveTiltHandle(index, pytest.approx((0, 0)), 1.5)]
+    assert asked(pointer, WITH_HANDLES, picked=None) == [MoveTiltHandle(index, pytest.approx((0, 0)), None)]
+    (move,) = asked(pointer)
+    assert isinstance(move, MoveEye), "no handles shown"
+
+
+def test_a_handle_that_was_taken_is_kept_wherever_the_drag_leads() -> None:
+    held = replace(STATE, tilt_handles=TiltHandles(taken=1))
+    pointer = replace(OVER_PICTURE, is_down=True, drag_distance=300, step_x=3)
+    (move,) = asked(pointer, held)
+    assert isinstance(move, MoveTiltHandle)
+    assert move.index == 1
+
+
+def test_a_drag_beside_the_handles_moves_the_viewpoint() -> None:
+    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=3), WITH_HANDLES)
+    assert isinstance(move, MoveEye)
+
+
+def hovered(pointer: Pointer, state: AppState = STATE) -> list[object]:
+    return list(actions_from_hover(pointer, LAYOUT, state, lambda x, y: x / 100))
+
+
+def test_the_pointer_says_once_where_it_is_and_once_that_it_left() -> None:
+    (found,) = hovered(OVER_PICTURE)
+    assert found == SetHover(Hover(pytest.approx(299.5), pytest.approx(199.5), pytest.approx(2.995)))
+    assert isinstance(found, SetHover)
+    there = replace(STATE, hover=found.hover)
+    assert hovered(OVER_PICTURE, there) == []
+    outside = (
+        replace(OVER_PICTURE, x=1.0),
+        replace(OVER_PICTURE, is_over_panel=True),
+        replace(OVER_PICTURE, is_down=True, drag_distance=50),
+    )
+    for pointer in outside:
+        assert hovered(pointer, there) == [SetHover(None)]
+        assert hovered(pointer) == []
+
+
+def test_presses_and_releases_part_the_edits() -> None:
+    under_way = replace(STATE, history=History(gesture="SetFocus"))
+    pressed, released = replace(OVER_PICTURE, is_pressed=True), replace(OVER_PICTURE, is_released=True)
+    assert gesture_start(pressed, under_way) == [EndGesture()]
+    assert gesture_start(pressed, STATE) == gesture_start(released, under_way) == []
+    assert gesture_end(released) == [EndGesture()]
+    assert gesture_end(pressed) == []
+
+
+@pytest.mark.parametrize(
+    ("paths", "opened", "disparity"),
+    [
+        (["a.jpg"], "a.jpg", None),
+        (["a.jpg", "b.jpg"], "a.jpg", None),
+        (["a.PFM", "b.jpg"], "b.jpg", "a.PFM"),
+        (["better.npy"], "photo.png", "better.npy"),
+    ],
+)
+def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:
+    (action,) = actions_from_drop(paths, STATE)
+    assert action == OpenPath(Source(opened, disparity, max_pixels=7))
+
+
+def test_a_map_dropped_on_nothing_is_tried_as_a_photo() -> None:
+    assert actions_from_drop(["a.pfm"], AppState()) == [OpenPath(Source("a.pfm"))]
+    assert actions_from_drop([], AppState()) == []
+
+
+@pytest.mark.parametrize("window", [(1280, 800), (500, 900), (2000, 400)])
+@pytest.mark.parametrize("size", [(600, 400), (1, 1), (37, 1000)])
+def test_the_picture_keeps_its_shape_and_stays_beside_the_panel(window: tuple[int, int], size: tuple[int, int]) -> None:
+    layout = layout_of(window, size)
+    picture = layout.picture
+    assert picture is not None
+    assert picture.width / picture.height == pytest.approx(size[0] / size[1])
+    assert picture.x >= 0
+    assert picture.y >= 0
+    assert picture.x + picture.width <= layout.panel.x
+    assert picture.y + picture.height <= window[1]
+    assert layout.panel.x + layout.panel.width == window[0]
+
+
+def test_pixels_of_a_dense_display() -> None:
+    plain, dense = layout_of((1280, 800), (600, 400)), layout_of((1280, 800), (600, 400), pixel_ratio=2.0)
+    assert plain.picture == dense.picture
+    assert plain.picture_px is not None
+    assert dense.picture_px == pytest.approx([2 * value for value in plain.picture_px], abs=1)
+
+
+def test_no_room_for_the_picture() -> None:
+    assert letterboxed(R(0, 0, -5, 10), (4, 3)) is None
+    assert layout_of((0, 0), (4, 3)).picture_px is None
+
+
+def test_picture_corners_are_half_a_pixel_outside_the_first_and_last_pixel() -> None:
+    rect = R(10, 20, 300, 200)
+    assert pixel_at(rect, (600, 400), 10, 20) == (-0.5, -0.5)
+    assert pixel_at(rect, (600, 400), 310, 220) == (599.5, 399.5)

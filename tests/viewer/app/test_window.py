@@ -1,0 +1,174 @@
+"""A real window on a private X server, moved by real mouse and key events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import glfw
+import numpy as np
+import pytest
+
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
+from viewer.display.scene_view import WAITING_VIEWS
+from viewer.model.state.app_state import Optics, Source
+
+Opener = Callable[..., Driver]
+
+
+@pytest.fixture
+def viewer(open_window: Opener, photo_path: Path) -> Driver:
+    """The scene open with all its views; the pointer rests in the picture, off the near square."""
+    driver = open_window(photo_path, grid=GridShape(5, 5))
+    driver.until_idle()
+    driver.send("mousemove", *driver.position(0.1, 0.1))
+    driver.until_idle()
+    return driver
+
+
+def shown_focus(viewer: Driver, given: float) -> float:
+    """The field disparity of a given one."""
+    scene = viewer.app.state.scene
+    assert scene is not None
+    assert scene.plan is not None
+    return (given - scene.plan.disparity_zero) * scene.plan.disparity_scale
+
+
+def test_the_first_picture_comes_before_the_views(open_window: Opener, photo_path: Path) -> None:
+    driver = open_window(photo_path)
+    driver.until(lambda app: app.stage.pictures_drawn > 0)
+    assert driver.app.stage.views_present <= WAITING_VIEWS
+    assert driver.image().std() > 10
+
+
+def test_a_drag_moves_the_viewpoint_and_the_picture(viewer: Driver) -> None:
+    before = viewer.image()
+    x, y = viewer.position(0.5, 0.5)
+    viewer.send("mousemove", x, y, "mousedown", 1)
+    viewer.send("mousemove", x + 100, y)
+    viewer.send("mousemove", x + 200, y + 40)
+    viewer.until(lambda app: app.state.optics.eye.s < -0.5 and app.state.optics.eye.t < 0)
+    viewer.send("mouseup", 1)
+    viewer.until_idle()
+    assert viewer.app.state.optics.focus_disparity == 0, "a drag is no click"
+    near_before, near_after = near_centre(before), near_centre(viewer.image())
+    assert near_after > near_before, "near things follow the hand"
+
+
+def near_centre(image: np.ndarray) -> float:
+    """Where the near square is, across: nothing else is red."""
+    red = image[..., 0].astype(int) - image[..., 1] > 60
+    return float(np.nonzero(red)[1].mean())
+
+
+def test_a_click_focuses_on_the_surface_under_it(viewer: Driver) -> None:
+    for place, given in (((0.5, 0.5), NEAR), ((0.1, 0.1), FAR)):
+        viewer.send("mousemove", *viewer.position(*place), "click", 1)
+        wanted = pytest.approx(shown_focus(viewer, given), abs=1e-3)
+        viewer.until(lambda app, wanted=wanted: app.state.optics.focus_disparity == wanted)  # type: ignore[misc]
+        viewer.until_idle()
+
+
+def test_a_double_click_resets(viewer: Driver) -> None:
+    viewer.send("key", "Right")
+    viewer.until(lambda app: app.state.optics.eye == ViewOffset(0, 0.5))
+    viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", "--repeat", 2, "--delay", 40, 1)
+    viewer.until(lambda app: app.state.optics == Optics())
+
+
+def test_the_wheel_changes_the_focus_and_keys_the_viewpoint(viewer: Driver) -> None:
+    viewer.send("click", 4)
+    viewer.until(lambda app: app.state.optics.focus_disparity > 0)
+    viewer.send("key", "Down")
+    viewer.until(lambda app: app.state.optics.eye.t > 0)
+    viewer.send("key", "r")
+    viewer.until(lambda app: app.state.optics == Optics())
+
+
+def test_a_slider_changes_the_aperture_and_not_the_viewpoint(viewer: Driver) -> None:
+    before = viewer.image()
+    viewer.slide("##Diameter", 0.8)
+    assert viewer.app.state.optics.aperture_diameter > 1
+    assert viewer.app.state.optics.eye == ViewOffset(0, 0)
+    assert np.abs(viewer.image().astype(int) - before).max() > 8
+    assert len(viewer.app.state.history.past) == 1, "a drag is one edit"
+
+
+def test_an_idle_window_draws_nothing_however_often_it_is_woken(viewer: Driver) -> None:
+    app = viewer.app
+    shown, drawn = app.frames_shown, app.stage.pictures_drawn
+    for _ in range(50):
+        glfw.post_empty_event()
+        app.step()
+        assert app.wait_s > 0
+    assert (app.frames_shown, app.stage.pictures_drawn) == (shown, drawn)
+
+
+def test_moving_the_pointer_over_the_panel_does_not_draw_the_picture_again(viewer: Driver) -> None:
+    app = viewer.app
+    shown, drawn = app.frames_shown, app.stage.pictures_drawn
+    panel = app.layout().panel
+    for y in range(60, 260, 20):
+        viewer.send("mousemove", int(panel.x + 0.8 * panel.width), y)
+        viewer.until_idle()
+    assert app.frames_shown > shown, "sliders light up"
+    assert app.stage.pictures_drawn == drawn
+
+
+def test_a_dropped_photo_replaces_the_scene(viewer: Driver, tmp_path: Path) -> None:
+    other = write_scene(tmp_path, "other", seed=1)
+    viewer.app.window.on_drop(None, [str(other)])
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
+    viewer.until_idle()
+    assert viewer.app.state.optics == Optics()
+
+
+def test_a_broken_file_gives_a_notice_and_the_scene_stays(viewer: Driver, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.png"
+    broken.write_bytes(b"this is no picture")
+    before = viewer.image()
+    viewer.app.window.on_drop(None, [str(broken)])
+    viewer.until(lambda app: bool(app.state.notices))
+    assert viewer.app.state.notices[0].is_error
+    assert "broken.png" in viewer.app.state.notices[0].text
+    viewer.until_idle()
+    assert viewer.app.state.scene is not None
+    assert viewer.app.state.scene.name == "scene"
+    np.testing.assert_array_equal(viewer.image(), before)
+
+
+def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
+    viewer: Driver, photo_path: Path
+) -> None:
+    photo_path.unlink()
+    scene = viewer.app.state.scene
+    assert scene is not None
+    viewer.press("section Depth")
+    viewer.slide("##Parallax", 0.9)
+    assert viewer.app.state.generation == 2
+    assert viewer.app.state.depth_strength > 1
+    viewer.until(lambda app: app.stage.generation == 2)
+    viewer.until_idle()
+    again = viewer.app.state.scene
+    assert again is not None
+    assert again.disparity_range_px != scene.disparity_range_px or again.grid != scene.grid
+    assert not viewer.app.state.notices
+
+
+def test_escape_quits(viewer: Driver) -> None:
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.should_quit)
+
+
+def test_a_window_without_a_scene_says_what_to_do(open_window: Opener) -> None:
+    driver = open_window(None)
+    driver.until(lambda app: app.frames_shown > 0)
+    assert driver.app.state.scene is None
+
+
+def test_a_missing_file_leaves_an_empty_window_with_a_notice(open_window: Opener, tmp_path: Path) -> None:
+    driver = open_window(tmp_path / "gone.png")
+    driver.until(lambda app: bool(app.state.notices))
+    assert "gone.png" in driver.app.state.notices[0].text
+    assert driver.app.state.source == Source(str(tmp_path / "gone.png"))

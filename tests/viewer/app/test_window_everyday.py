@@ -1,0 +1,264 @@
+"""Opening, saving, prompts, keys, preferences and what goes wrong, in a real window."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from imgui_bundle import imgui
+
+from iibr_core.formats.images.photo import read_photo, write_image
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import Driver, write_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import AskForPath, DoTask, MoveEye, OpenPath, SetAperture, ShowPrompt, StopWork
+from viewer.model.saved_settings import ATTRIBUTE, read_settings
+from viewer.model.state.app_state import AppState, Optics, PalettePrompt, ReadMaskTask, SavePrompt, SaveTask, Source
+
+Opener = Callable[..., Driver]
+
+
+@pytest.fixture(autouse=True)
+def _no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a system without zenity and its like: a dialog would wait for a person."""
+    monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
+
+
+@pytest.fixture
+def viewer(open_window: Opener, photo_path: Path) -> Driver:
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    driver.send("mousemove", *driver.position(0.1, 0.1))
+    driver.until_idle()
+    return driver
+
+
+def test_a_saved_picture_can_be_taken_again_without_the_window(
+    viewer: Driver, photo_path: Path, tmp_path: Path
+) -> None:
+    viewer.app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0))
+    viewer.send("key", "ctrl+s")
+    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
+    viewer.until_idle()
+    out = tmp_path / "out.png"
+    viewer.type(str(out))
+    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and app.state.prompt.path == str(out))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: bool(app.state.notices) and "out.png" in app.state.notices[-1].text)
+    assert viewer.app.state.prompt is None
+    settings = read_settings(out)
+    assert settings.optics == viewer.app.state.optics
+    assert settings.size_px == (96, 64)
+    viewer.until_idle()
+    with HeadlessViewer("egl") as again:
+        again.open(dataclasses.replace(settings.source, path=str(photo_path)), settings.depth_strength, lambda _: None)
+        again.do(MoveEye(settings.optics.eye), SetAperture(settings.optics.aperture_diameter))
+        difference = np.abs(again.picture(settings.size_px) / 255 - read_photo(out).pixels)
+    assert difference.max() <= 1 / 255, "another GL context may round differently"
+
+
+def test_a_file_that_is_there_is_replaced_only_when_that_is_said(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / "out.png"
+    out.write_text("mine")
+    viewer.app.do(DoTask(SaveTask(str(out), (48, 32))))
+    viewer.until(lambda app: app.state.prompt == SavePrompt(str(out), (48, 32), already_there=True))
+    assert out.read_text() == "mine"
+    viewer.until_idle()
+    viewer.press("Replace", "prompt SavePrompt")
+    viewer.until(lambda app: app.state.prompt is None and bool(app.state.notices))
+    assert read_photo(out).pixels.shape == (32, 48, 3)
+
+
+@pytest.mark.parametrize("name", ["a.jpeg2", "gone/a.png", "a/b/"])
+def test_a_picture_that_cannot_be_written_gives_a_notice(viewer: Driver, tmp_path: Path, name: str) -> None:
+    before = viewer.app.state.optics
+    viewer.app.do(DoTask(SaveTask(f"{tmp_path}/{name}", (48, 32))))
+    viewer.until(lambda app: bool(app.state.notices))
+    assert viewer.app.state.notices[-1].is_error
+    assert viewer.app.state.optics == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.png", "scene_disparity.npy"]
+
+
+def test_a_picture_too_large_for_the_driver_gives_a_notice(viewer: Driver, tmp_path: Path) -> None:
+    viewer.app.do(DoTask(SaveTask(str(tmp_path / "a.png"), (10**6, 6 * 10**5))))
+    viewer.until(lambda app: bool(app.state.notices))
+    assert "1000000x600000" in viewer.app.state.notices[-1].text
+    assert not (tmp_path / "a.png").exists()
+    viewer.until_idle()
+
+
+def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / "saved.png"
+    viewer.app.do(MoveEye(ViewOffset(1, 1)), SetAperture(1.5), DoTask(SaveTask(str(out), (96, 64))))
+    viewer.until(lambda app: out.exists())
+    wanted = viewer.app.state.optics
+    np.save(tmp_path / "saved_disparity.npy", np.load(tmp_path / "scene_disparity.npy"))
+    viewer.app.window.on_drop(None, [str(out)])
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "saved")
+    viewer.until_idle()
+    assert viewer.app.state.optics == Optics()
+    place = [notice.offer is not None for notice in viewer.app.state.notices].index(True)
+    viewer.press(f"Use its settings##{place}", "notices")
+    viewer.until(lambda app: app.state.optics == wanted)
+    assert not any(notice.offer for notice in viewer.app.state.notices)
+
+
+def test_a_picture_with_damaged_settings_opens_as_a_photo_with_a_notice(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / "damaged.png"
+    write_image(out, np.full((64, 96, 3), 100, np.uint8), {ATTRIBUTE: '{"format": 1, "optics": {}}'})
+    viewer.app.window.on_drop(None, [str(out)])
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "damaged")
+    assert viewer.app.state.optics == Optics()
+    assert [notice.is_error for notice in viewer.app.state.notices if "settings" in notice.text] == [True]
+
+
+@pytest.mark.parametrize("contents", [b"", b"no picture", None])
+def test_a_mask_that_lets_no_light_through_changes_nothing(
+    viewer: Driver, tmp_path: Path, contents: bytes | None
+) -> None:
+    mask = tmp_path / "mask.png"
+    if contents is None:
+        write_image(mask, np.zeros((8, 8), np.uint8))
+    else:
+        mask.write_bytes(contents)
+    before = viewer.app.state.optics
+    viewer.app.do(DoTask(ReadMaskTask(str(mask))))
+    viewer.until(lambda app: bool(app.state.notices))
+    assert "mask.png" in viewer.app.state.notices[-1].text
+    assert viewer.app.state.optics == before
+
+
+def test_a_mask_is_asked_for_read_and_shapes_the_aperture(viewer: Driver, tmp_path: Path) -> None:
+    mask = tmp_path / "star.png"
+    write_image(mask, np.eye(9, dtype=np.uint8) * 200)
+    viewer.press("##mask")
+    viewer.until(lambda app: app.state.prompt is not None)
+    viewer.until_idle()
+    viewer.type(str(mask))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.optics.aperture_shape.mask is not None)
+    shape = viewer.app.state.optics.aperture_shape
+    assert shape.kind == "mask"
+    assert shape.mask is not None
+    assert (shape.mask.name, shape.mask.rows, shape.mask.columns) == ("star.png", 9, 9)
+
+
+def test_a_path_can_be_typed_where_there_is_no_dialog(viewer: Driver, tmp_path: Path) -> None:
+    other = write_scene(tmp_path, "other", seed=1)
+    viewer.send("key", "ctrl+o")
+    viewer.until(lambda app: app.state.prompt is not None)
+    viewer.until_idle()
+    viewer.type(str(other))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
+    assert viewer.app.state.recent == (str(other), str(tmp_path / "scene.png"))
+
+
+def test_f1_shows_the_map_and_escape_closes_it_before_it_quits(viewer: Driver) -> None:
+    viewer.send("key", "F1")
+    viewer.until(lambda app: app.state.prompt == "help")
+    viewer.until_idle()
+    assert imgui.internal.find_window_by_name("prompt str").size.y > 300
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.prompt is None)
+    assert not viewer.app.state.should_quit
+
+
+def test_a_prompt_comes_up_at_once_not_at_the_next_move(viewer: Driver) -> None:
+    """An ImGui window is laid out for a frame before it shows: the loop must not fall asleep in between."""
+    shown = viewer.app.frames_shown
+    viewer.app.do(ShowPrompt("help"))
+    while viewer.app.wait_s == 0:
+        viewer.app.step()
+    assert viewer.app.frames_shown > shown
+
+
+def test_the_palette_runs_what_was_typed(viewer: Driver) -> None:
+    viewer.send("key", "ctrl+p")
+    viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
+    viewer.until_idle()
+    viewer.send("type", "--delay", 20, "light or")
+    viewer.until(lambda app: app.state.prompt == PalettePrompt("light or"))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.preferences.theme == "light")
+    assert viewer.app.state.prompt is None
+
+
+def test_text_grows_and_shrinks_with_the_whole_panel(viewer: Driver) -> None:
+    before = viewer.app.layout().panel.width
+    viewer.send("key", "ctrl+equal", "key", "ctrl+equal")
+    viewer.until(lambda app: app.layout().panel.width > 1.2 * before)
+    viewer.send("key", "ctrl+minus", "key", "ctrl+0")
+    viewer.until(lambda app: app.layout().panel.width == before)
+
+
+def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1))
+    first.until_idle()
+    first.press("section Scene")
+    first.until(lambda app: "scene" in app.state.preferences.open_sections)
+    first.until_idle()
+    preferences = first.app.state.preferences
+    first.close()
+    second = open_window(None, kept_in=kept)
+    second.until(lambda app: app.frames_shown > 0)
+    assert second.app.state.preferences == preferences
+    assert second.app.state.recent == (str(photo_path),)
+
+
+def test_damaged_preferences_are_told_and_do_not_keep_the_window_from_opening(
+    open_window: Opener, tmp_path: Path
+) -> None:
+    (tmp_path / "preferences.json").write_text("{")
+    (tmp_path / "recent.json").write_text("[3]")
+    driver = open_window(None, kept_in=tmp_path)
+    driver.until(lambda app: app.frames_shown > 0)
+    assert len(driver.app.state.notices) == 2
+
+
+def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path: Path) -> None:
+    driver = open_window(photo_path, grid=GridShape(41, 41))
+    driver.until(lambda app: app.state.progress.done > 3)
+    driver.app.do(StopWork())
+    driver.until(lambda app: app.wait_s == 1.0)
+    made = driver.app.stage.views_present
+    assert 3 < made < 41 * 41
+    assert driver.app.stage.views_present == made == len(driver.app.state.views_there)
+    assert "stopped at" in driver.app.state.progress.doing
+    driver.press("Resume")
+    driver.until(lambda app: app.stage.generation == 2)
+
+
+def test_a_lost_worker_is_told_and_replaced(
+    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from viewer.background import scene_worker
+
+    real = scene_worker.results_of
+
+    def dying(
+        request: scene_worker.Request, *others: object
+    ) -> Iterator[scene_worker.SceneReady | scene_worker.ViewReady]:
+        if request.generation == 1:
+            raise SystemExit
+        yield from real(request, *others)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(scene_worker, "results_of", dying)
+    driver = open_window(photo_path)
+    driver.until(lambda app: bool(app.state.notices))
+    assert "worker stopped" in driver.app.state.notices[0].text
+    driver.app.do(OpenPath(Source(str(write_scene(tmp_path, "other", seed=1)), grid=GridShape(1, 1))))
+    driver.until_idle()
+    assert driver.app.state.scene is not None
+    assert driver.app.state.scene.name == "other"
+
+
+def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
+    from viewer.model.reducers.root import apply
+    from viewer.model.state.app_state import PathPrompt
+
+    assert apply(AppState(), AskForPath("mask")).prompt == PathPrompt("mask")

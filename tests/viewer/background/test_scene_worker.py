@@ -1,0 +1,322 @@
+"""The worker thread: newest request wins, late results are dropped, the queue is bounded, errors do not end it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import GridShape, InputError, ViewUpdate
+from viewer.background.scene_worker import (
+    QUEUED_RESULTS,
+    Failed,
+    Request,
+    Result,
+    SceneReady,
+    ViewReady,
+    Work,
+    Worker,
+    results_of,
+)
+from viewer.model.state.app_state import CENTRE, Progress, Source
+
+DEADLINE_S = 120.0
+VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)
+
+
+class Desk:
+    """A worker, and the window's end of it: waits for wake-ups instead of polling."""
+
+    def __init__(self, work: Work | None = None) -> None:
+        self._woken = threading.Semaphore(0)
+        self.worker = Worker(self._woken.release, work)
+
+    def woken(self) -> bool:
+        """Wait to be woken."""
+        return self._woken.acquire(timeout=DEADLINE_S)
+
+    def next(self) -> Result:
+        """The next result that is not late, waiting for it."""
+        while True:
+            if (result := self.worker.next_result()) is not None:
+                return result
+            assert self._woken.acquire(timeout=DEADLINE_S), "the worker went silent"
+
+
+@pytest.fixture
+def desk_for() -> Iterator[Callable[..., Desk]]:
+    desks: list[Desk] = []
+
+    def make(work: Work | None = None) -> Desk:
+        desks.append(Desk(work))
+        return desks[-1]
+
+    yield make
+    for desk in desks:
+        desk.worker.close()
+
+
+def request(generation: int, path: str = "p") -> Request:
+    return Request(generation, Source(path))
+
+
+def view(generation: int, done: int = 1) -> ViewReady:
+    return ViewReady(generation, VIEW, Progress(done, 99, 0.0))
+
+
+def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_path: Path) -> None:
+    desk = Desk()
+    desk.worker.submit(Request(7, Source(str(photo_path), grid=GridShape(3, 3))))
+    ready = desk.next()
+    assert isinstance(ready, SceneReady)
+    assert (ready.generation, ready.scene.grid, ready.scene.name) == (7, (3, 3), "scene")
+    assert ready.loaded is not None
+    np.testing.assert_array_equal(ready.centre.colors, np.round(ready.loaded.photo.pixels * 255))
+    views = [desk.next() for _ in range(9)]
+    desk.worker.close()
+    indices = {(v.view.row, v.view.column) for v in views if isinstance(v, ViewReady)}
+    assert indices == {(row, column) for row in range(3) for column in range(3)}
+    assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
+
+
+def test_a_lost_worker_says_so_and_the_next_request_starts_another(
+    desk_for: Callable[..., Desk], capfd: pytest.CaptureFixture[str]
+) -> None:
+    def work(asked: Request, *_: object) -> Iterator[ViewReady]:
+        if asked.generation == 1:
+            raise SystemExit("a library tried to end the program")
+        yield view(asked.generation)
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert desk.woken()
+    assert desk.worker.is_lost
+    desk.worker.submit(request(2))
+    result = desk.next()
+    assert result.generation == 2
+    assert not desk.worker.is_lost
+    assert "a library tried" in capfd.readouterr().err
+
+
+def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path, tmp_path: Path) -> None:
+    from iibr_core.formats.images.photo import read_photo, write_image
+
+    known = tmp_path / "known.png"
+    write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
+    for path, expected in ((photo_path, None), (known, read_photo(known).focal_px)):
+        ready = next(results_of(Request(1, Source(str(path))), lambda: False, lambda: CENTRE))
+        assert isinstance(ready, SceneReady)
+        assert ready.scene.focal_px == expected
+    assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
+
+
+def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
+    ready = next(results_of(Request(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
+    assert isinstance(ready, SceneReady)
+    assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
+
+
+def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
+    source = Source(str(photo_path), grid=GridShape(1, 1))
+    first = next(results_of(Request(1, source), lambda: False, lambda: CENTRE))
+    assert isinstance(first, SceneReady)
+    photo_path.unlink()
+    again = next(results_of(Request(2, source, 2.0, first.loaded), lambda: False, lambda: CENTRE))
+    assert isinstance(again, SceneReady)
+    assert again.loaded is first.loaded
+    assert again.scene.plan is not None
+    assert first.scene.plan is not None
+    assert again.scene.plan.disparity_scale == pytest.approx(2 * first.scene.plan.disparity_scale)
+
+
+@pytest.mark.parametrize("with_disparity", [True, False])
+def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
+    from iibr_core.formats.light_fields.hci import HciWriter
+
+    made = list(results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), lambda: False, lambda: CENTRE))
+    folder = tmp_path / "field"
+    with HciWriter(folder, GridShape(3, 3), 100.0, "field", with_disparity) as writer:
+        for result in made:
+            if isinstance(result, ViewReady):
+                writer.add(result.view)
+    ready, *views = results_of(Request(2, Source(str(folder))), lambda: False, lambda: CENTRE)
+    assert isinstance(ready, SceneReady)
+    assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
+    assert ready.scene.has_view_disparity == with_disparity
+    assert ready.scene.disparity_range_px[0] < ready.scene.disparity_range_px[1]
+    assert len(views) == 9
+
+
+def test_generating_stops_between_row_bands(photo_path: Path) -> None:
+    """Asked to stop once the scene is there, it ends without another view."""
+    kinds: list[type] = []
+    asked = []
+
+    def should_stop() -> bool:
+        asked.append(len(kinds))
+        return bool(kinds)
+
+    for result in results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE):
+        kinds.append(type(result))
+    assert asked[-1] > 0
+    assert kinds[0] is SceneReady
+    assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
+
+
+def test_reading_stops_too(photo_path: Path) -> None:
+    """Asked to stop while it refines depth."""
+    request = Request(1, Source(str(photo_path), grid=GridShape(3, 3)))
+    with pytest.raises(Cancelled):
+        next(results_of(request, lambda: True, lambda: CENTRE))
+
+
+def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> None:
+    cancelled = threading.Event()
+    started = threading.Event()
+
+    def work(job: Request, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+        if job.generation == 1:
+            started.set()
+            while not should_stop():
+                threading.Event().wait(0.001)
+            cancelled.set()
+        yield view(job.generation)
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert started.wait(DEADLINE_S)
+    desk.worker.submit(request(2))
+    assert desk.next().generation == 2
+    assert cancelled.is_set()
+    assert desk.worker.next_result() is None
+
+
+def test_results_already_queued_for_an_earlier_request_are_dropped(desk_for: Callable[..., Desk]) -> None:
+    posted = threading.Event()
+
+    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+        yield view(job.generation)
+        yield view(job.generation)
+        if job.generation == 1:
+            posted.set()
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert posted.wait(DEADLINE_S)
+    desk.worker.submit(request(2))
+    assert [desk.next().generation for _ in range(2)] == [2, 2]
+    assert desk.worker.next_result() is None
+
+
+def test_the_queue_is_bounded_and_a_full_one_can_be_cancelled(desk_for: Callable[..., Desk]) -> None:
+    made: list[int] = []
+    is_full = threading.Event()
+
+    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+        if job.generation == 2:
+            yield view(2)
+            return
+        for done in range(1000):
+            made.append(done)
+            if done == QUEUED_RESULTS:
+                is_full.set()
+            yield view(1, done)
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert is_full.wait(DEADLINE_S)
+    desk.worker.submit(request(2))
+    assert desk.next().generation == 2
+    assert len(made) <= QUEUED_RESULTS + 2  # one at the queue's door, and one that took the place just read
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (InputError("x.png: no such file"), "x.png: no such file"),
+        (ZeroDivisionError("division\nby zero"), "ZeroDivisionError: division by zero"),
+        (RuntimeError(), "RuntimeError: no message"),
+    ],
+)
+def test_an_exception_is_posted_and_the_worker_lives_on(
+    desk_for: Callable[..., Desk], error: Exception, message: str
+) -> None:
+    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+        yield view(job.generation)
+        if job.generation == 1:
+            raise error
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    assert isinstance(desk.next(), ViewReady)
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    assert failure.message == message
+    desk.worker.submit(request(2))
+    assert isinstance(desk.next(), ViewReady)
+
+
+def test_after_cancel_nothing_is_heard_and_the_next_request_works(desk_for: Callable[..., Desk]) -> None:
+    ended = threading.Event()
+
+    def work(job: Request, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+        yield view(job.generation)
+        if job.generation == 1:
+            while not should_stop():
+                threading.Event().wait(0.001)
+            ended.set()
+
+    desk = desk_for(work)
+    desk.worker.submit(request(1))
+    desk.next()
+    desk.worker.cancel()
+    assert ended.wait(DEADLINE_S)
+    assert desk.worker.next_result() is None
+    desk.worker.submit(request(2))
+    assert desk.next().generation == 2
+
+
+def test_a_missing_file_is_a_failure_with_its_name(desk_for: Callable[..., Desk]) -> None:
+    desk = desk_for()
+    desk.worker.submit(request(1, "gone.png"))
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    assert "gone.png" in failure.message
+
+
+def test_weights_that_are_missing_are_a_failure_and_fast_still_works(
+    monkeypatch: pytest.MonkeyPatch, desk_for: Callable[..., Desk], photo_path: Path, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("iibr_core.generation.light_field.resource_folder", lambda name: tmp_path / name)
+    desk = desk_for()
+    source = Source(str(photo_path), grid=GridShape(3, 3), quality="balanced")
+    desk.worker.submit(Request(1, source))
+    assert [type(desk.next()) for _ in range(2)] == [SceneReady, ViewReady]
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    assert failure.message.startswith(
+        f"{tmp_path / 'assets' / 'weights' / 'ray_transformer.safetensors'}: no such file"
+    )
+    desk.worker.submit(Request(2, replace(source, quality="fast")))
+    assert [type(desk.next()) for _ in range(10)] == [SceneReady, *[ViewReady] * 9]
+
+
+def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> None:
+    from iibr_core.types import ViewOffset
+
+    seen = []
+
+    def work(job: Request, should_stop: object, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+        seen.append(nearest_to())
+        yield view(job.generation)
+
+    desk = desk_for(work)
+    desk.worker.eye = ViewOffset(1, 2)
+    desk.worker.submit(request(1))
+    desk.next()
+    assert seen == [ViewOffset(1, 2)]

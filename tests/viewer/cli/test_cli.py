@@ -1,0 +1,295 @@
+"""The command line: what it writes, and one line with exit code 2 for bad input."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.viewer.conftest import HEIGHT, WIDTH
+from viewer.cli.main import main
+
+ROOT = Path(__file__).parents[3]
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
+    """Exit code of `iibr` with these arguments, run in this process."""
+    monkeypatch.setattr(sys, "argv", ["iibr", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+def run_apart(code_or_module: str, *words: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Python in a process of its own, without a display."""
+    clean = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    flag = "-m" if code_or_module == "viewer" else "-c"
+    command = [sys.executable, flag, code_or_module, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env={**clean, **environment}, timeout=120)
+
+
+@pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "plan", "train", "demo"])
+def test_help_has_an_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str) -> None:
+    assert run(monkeypatch, *[command] if command else [], "--help") == 0
+    text = capsys.readouterr().out
+    assert ("Example: iibr " + command in text) or not command
+    for line in re.findall(r"(?m)^│\s+(?:\*\s+)?(--\S+.*)│$", text):
+        assert len(line.split()) > 2, f"no help: {line}"
+
+
+def test_generate_writes_a_light_field_that_opens(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    disparity = photo_path.with_name("scene_disparity.npy")
+    out = tmp_path / "field"
+    words = ("generate", photo_path, "--disparity", disparity, "--grid", 3, "--out", out, "--format", "hci")
+    assert run(monkeypatch, *words, "--with-disparity") == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(rf"9 views of 96x64 in [\d.]+ s \([\d.]+ ms per view\): {re.escape(str(out))}", line)
+    assert len(list(out.glob("input_Cam*.png"))) == len(list(out.glob("disp_Cam*.pfm"))) == 9
+    assert run(monkeypatch, "screenshot", out, "-o", tmp_path / "field.png", "--view", "-1,1") == 0
+
+
+@pytest.fixture
+def trained(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Weights far from the closed form, in a resource folder of their own."""
+    import torch
+
+    from iibr_core.formats.weights import save_weights
+    from iibr_core.ray_transformer.model import RayTransformer
+
+    torch.manual_seed(1)
+    model = RayTransformer()
+    with torch.no_grad():
+        for parameter in model.parameters():
+            parameter.normal_()
+    path = tmp_path / "assets" / "weights" / "ray_transformer.safetensors"
+    path.parent.mkdir(parents=True)
+    save_weights(model, path)
+    monkeypatch.setattr("iibr_core.generation.light_field.resource_folder", lambda name: tmp_path / name)
+    return path
+
+
+def test_quality_says_where_the_transformer_runs(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, trained: Path
+) -> None:
+    """Made with generate and seen in a screenshot alike: the more rays it weighs, the more pixels it changes."""
+    from iibr_core.formats.images.photo import read_photo
+
+    disparity = photo_path.with_name("scene_disparity.npy")
+    slope = 0.5 * np.abs(np.arange(WIDTH) % 24 - 12)
+    np.save(disparity, np.load(disparity) + slope)  # enough for hypotheses to differ, too little to be contested
+    made, shown = {}, {}
+    for quality in ("fast", "balanced", "exact"):
+        out, image = tmp_path / quality, tmp_path / f"{quality}.png"
+        assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", out, "--quality", quality) == 0
+        made[quality] = read_photo(out / "input_Cam000.png").pixels
+        words = ("--grid", 3, "--view", "-1,-1", "-o", image, "--quality", quality)
+        assert run(monkeypatch, "screenshot", photo_path, *words) == 0
+        shown[quality] = read_photo(image).pixels
+    for pictures in (made, shown):
+        balanced, exact = ((pictures[name] != pictures["fast"]).any(axis=2).mean() for name in ("balanced", "exact"))
+        assert 0 < balanced < exact
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-9])])
+def test_weights_missing_or_damaged_are_one_line_and_fast_still_works(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    photo_path: Path,
+    tmp_path: Path,
+    trained: Path,
+    damage: Callable[[Path], object],
+) -> None:
+    damage(trained)
+    before = sorted(tmp_path.rglob("*"))
+    for words in (("generate", "--out", tmp_path / "field"), ("screenshot", "-o", tmp_path / "o.png")):
+        command, *options = words
+        assert run(monkeypatch, command, photo_path, "--grid", 3, *options, "--quality", "balanced") == 2
+        (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+        assert line.startswith(f"iibr: {trained}: ")
+        assert sorted(tmp_path.rglob("*")) == before
+    words = ("--grid", 3, "--out", tmp_path / "field", "--quality", "fast")
+    assert run(monkeypatch, "generate", photo_path, *words) == 0
+
+
+def test_screenshot_writes_an_image_of_the_size_asked_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    from iibr_core.formats.images.photo import read_photo
+
+    out = tmp_path / "out.png"
+    options = ("--grid", 3, "--view", "-1,0.5", "--focus", "-0.5", "--aperture", 2)
+    assert run(monkeypatch, "screenshot", photo_path, *options, "-o", out) == 0
+    assert capsys.readouterr().out.strip() == str(out)
+    assert read_photo(out).size == (HEIGHT, WIDTH)
+    assert run(monkeypatch, "screenshot", photo_path, *options, "--ui", "--size", "700x500", "-o", out) == 0
+    assert read_photo(out).size == (500, 700)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_like_repeats_a_saved_picture_exactly_but_for_what_is_given(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, suffix: str
+) -> None:
+    from iibr_core.formats.images.photo import read_photo
+
+    first, again, other = (tmp_path / f"{name}{suffix}" for name in ("first", "again", "other"))
+    options = ("--grid", 3, "--view", "-1,0.5", "--focus", "-0.5", "--aperture", 2, "--depth-strength", 1.5)
+    assert run(monkeypatch, "screenshot", photo_path, *options, "--size", "150x100", "-o", first) == 0
+    assert run(monkeypatch, "screenshot", photo_path, "--like", first, "-o", again) == 0
+    np.testing.assert_array_equal(read_photo(again).pixels, read_photo(first).pixels)
+    assert run(monkeypatch, "screenshot", photo_path, "--like", first, "--aperture", 0, "-o", other) == 0
+    assert read_photo(other).size == (100, 150)
+    assert (read_photo(other).pixels != read_photo(first).pixels).any()
+
+
+def test_like_a_picture_without_settings_is_one_line_and_writes_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    for like in (photo_path, tmp_path / "gone.png"):
+        assert run(monkeypatch, "screenshot", photo_path, "--like", like, "-o", tmp_path / "out.png") == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"iibr: {like}: ")
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_plan_says_what_and_why(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path
+) -> None:
+    assert run(monkeypatch, "plan", photo_path) == 0
+    first, *reasons = capsys.readouterr().out.splitlines()
+    assert first == "scene: 96x64 px, disparity from scene_disparity.npy"
+    assert reasons
+
+
+def make_bad_files(folder: Path, photo: Path) -> None:
+    """Everything a user may point at by mistake."""
+    (folder / "text.png").write_text("this is no picture")
+    (folder / "empty.png").touch()
+    (folder / "cut.png").write_bytes(photo.read_bytes()[:200])
+    (folder / "folder").mkdir()
+    np.save(folder / "nan.npy", np.full((HEIGHT, WIDTH), np.nan, np.float32))
+    np.save(folder / "shape.npy", np.zeros((HEIGHT, 3 * WIDTH), np.float32))
+    (folder / "file").write_text("in the way")
+
+
+GENERATE = ("--out", "{dir}/o", "--grid", "3")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("generate", "{dir}/gone.png", *GENERATE), "gone.png"),
+        (("generate", "{dir}/text.png", *GENERATE), "text.png"),
+        (("generate", "{dir}/empty.png", *GENERATE), "empty.png"),
+        (("generate", "{dir}/cut.png", *GENERATE), "cut.png"),
+        (("generate", "{dir}/folder", *GENERATE), "folder"),
+        (("generate", "{photo}", "--disparity", "{dir}/gone.pfm", *GENERATE), "gone.pfm"),
+        (("generate", "{photo}", "--disparity", "{dir}/nan.npy", *GENERATE), "nan.npy"),
+        (("generate", "{photo}", "--disparity", "{dir}/shape.npy", *GENERATE), "shape.npy"),
+        (("generate", "{photo}", "--grid", "0", "--out", "{dir}/o"), "--grid"),
+        (("generate", "{photo}", "--grid", "x", "--out", "{dir}/o"), "--grid"),
+        (("generate", "{photo}", "--grid", "3", "--out", "{dir}/file"), "file"),
+        (("generate", "{photo}", "--grid", "3", "--out", "{dir}/file/o"), "file"),
+        (("generate", "{photo}", "--grid", "3", "--out", "{dir}/o", "--format", "mp4"), "--format"),
+        (("generate", "{photo}", "--grid", "3"), "--out"),
+        (("generate", "{photo}", *GENERATE, "--memory", "lots"), "--memory"),
+        (("generate", "{photo}", *GENERATE, "--disparity-scale", "nan"), "--disparity-scale"),
+        (("generate", "{photo}", *GENERATE, "--max-pixels", "0"), "--max-pixels"),
+        (("generate", "{photo}", *GENERATE, "--quality", "best"), "--quality"),
+        (("screenshot", "{photo}", "--quality", "Exact", "-o", "{dir}/o.png"), "--quality"),
+        (("view", "{photo}", "--quality", ""), "--quality"),
+        (("screenshot", "{dir}/gone.png", "-o", "{dir}/o.png"), "gone.png"),
+        (("screenshot", "{photo}", "--view", "1", "-o", "{dir}/o.png"), "--view"),
+        (("screenshot", "{photo}", "--view", "1,inf", "-o", "{dir}/o.png"), "--view"),
+        (("screenshot", "{photo}", "--size", "12", "-o", "{dir}/o.png"), "--size"),
+        (("screenshot", "{photo}", "--grid", "1", "-o", "{dir}/none/o.png"), "none"),
+        (("screenshot", "{photo}", "--grid", "1", "-o", "{dir}/o.bmp"), "o.bmp"),
+        (("screenshot", "{dir}/folder", "-o", "{dir}/o.png"), "folder"),
+        (("view", "{dir}/gone.png"), "gone.png"),
+        (("view", "{photo}", "--disparity", "{dir}/gone.pfm"), "gone.pfm"),
+        (("plan", "{dir}/cut.png"), "cut.png"),
+        (("fly",), "fly"),
+        (("plan", "{photo}", "--fly"), "--fly"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    photo_path: Path,
+    words: tuple[str, ...],
+    named: str,
+) -> None:
+    folder = photo_path.parent
+    make_bad_files(folder, photo_path)
+    before = sorted(folder.rglob("*"))
+    assert run(monkeypatch, *(word.format(dir=folder, photo=photo_path) for word in words)) == 2
+    captured = capsys.readouterr()
+    errors = [line for line in captured.err.splitlines() if line.strip() and not line.startswith("note:")]
+    assert len(errors) == 1, captured.err
+    assert errors[0].startswith("iibr: ")
+    assert named in errors[0]
+    assert captured.out == ""
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_a_bug_is_shown_as_one(monkeypatch: pytest.MonkeyPatch, photo_path: Path) -> None:
+    monkeypatch.setattr("viewer.background.scene_worker.load", lambda source: 1 / 0)
+    monkeypatch.setattr(sys, "argv", ["iibr", "plan", str(photo_path)])
+    with pytest.raises(ZeroDivisionError):
+        main()
+
+
+def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, photo_path: Path) -> None:
+    def interrupted(source: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("viewer.background.scene_worker.load", interrupted)
+    assert run(monkeypatch, "plan", photo_path) == 130
+
+
+def test_without_a_display_view_names_the_headless_way(photo_path: Path) -> None:
+    done = run_apart("viewer", "view", photo_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "iibr screenshot" in done.stderr
+
+
+def test_panels_through_osmesa_are_refused_in_one_line(photo_path: Path, tmp_path: Path) -> None:
+    done = run_apart("viewer", "screenshot", photo_path, "--ui", "--backend", "osmesa", "-o", tmp_path / "o.png")
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "o.png").exists()
+
+
+WINDOW_FIRST = """
+import sys
+from viewer.app.main_loop import App
+app = App()
+while not app.frames_shown:
+    app.step()
+print([name for name in ("torch", "numba", "OpenImageIO") if name in sys.modules])
+copies = {line.split()[-1] for line in open("/proc/self/maps") if "libglfw" in line}
+print(len(copies))
+app.close()
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_the_window_comes_before_heavy_imports_and_with_one_glfw(display: str) -> None:
+    done = run_apart(WINDOW_FIRST, DISPLAY=display)
+    assert done.stdout.splitlines() == ["[]", "1"], done.stderr
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, viewer.cli.main;"
+        "print([m for m in ('torch', 'numba', 'moderngl', 'imgui_bundle') if m in sys.modules])"
+    )
+    assert run_apart(code).stdout.strip() == "[]"

@@ -1,0 +1,158 @@
+"""`iibr models`, the options about depth, and what commands and worker say about where depth comes from."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+from iibr_core.depth.models.catalog import KNOWN_MODELS
+from iibr_core.types import GridShape
+from tests.viewer.conftest import write_scene
+from viewer.background.scene_worker import Doing, Request, SceneReady, Worker, results_of
+from viewer.cli.options import depth_start_from_text, refine_from_text
+from viewer.model.state.app_state import CENTRE, Progress, Source
+
+
+def run_models(home: Path, *words: str, typed: str = "") -> subprocess.CompletedProcess[str]:
+    """In a process of its own: the hub library reads its address once. Nobody listens at this one."""
+    environment = {**os.environ, "HF_ENDPOINT": "http://127.0.0.1:9", "HF_HOME": str(home)}
+    return subprocess.run(
+        [sys.executable, "-m", "viewer", "models", *words],
+        env=environment,
+        input=typed,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_list_names_every_model_with_size_and_licence(tmp_path: Path) -> None:
+    done = run_models(tmp_path)
+    assert done.returncode == 0
+    lines = done.stdout.splitlines()
+    for model, line in zip(KNOWN_MODELS, lines):
+        assert line.startswith(model.name + " ")
+        assert f"{model.megabytes:,} MB" in line
+        assert model.licence in line
+        assert "not here" in line
+    assert "iibr models get" in lines[-1]
+
+
+def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
+    done = run_models(tmp_path, "get", "depth-anything-v2-small", "--yes")
+    assert done.returncode == 2
+    about, error = done.stderr.splitlines()
+    assert "99 MB" in about
+    assert "Apache-2.0" in about
+    assert error.startswith("iibr: depth-anything-v2-small cannot be downloaded")
+    assert "network" in error
+    assert not list(tmp_path.rglob("*.safetensors"))
+
+
+@pytest.mark.parametrize("typed", ["n\n", "\n"])
+def test_nothing_is_fetched_unless_the_user_says_yes(tmp_path: Path, typed: str) -> None:
+    done = run_models(tmp_path, "get", "depth-pro", typed=typed)
+    assert done.returncode == 1
+    assert "Nothing was downloaded" in done.stderr
+    assert "cannot be downloaded" not in done.stderr
+
+
+def test_an_unknown_model_is_one_line_with_those_known(tmp_path: Path) -> None:
+    done = run_models(tmp_path, "get", "depth-nothing")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert all(model.name in line for model in KNOWN_MODELS)
+
+
+@pytest.mark.parametrize(("text", "value"), [("on", 1.0), ("off", 0.0), ("0.25", 0.25), ("0", 0.0), ("1", 1.0)])
+def test_refine(text: str, value: float) -> None:
+    assert refine_from_text(text) == value
+
+
+@pytest.mark.parametrize("text", ["", "maybe", "-0.1", "1.1", "nan"])
+def test_refine_that_is_none(text: str) -> None:
+    with pytest.raises(typer.BadParameter):
+        refine_from_text(text)
+
+
+def test_where_the_search_begins() -> None:
+    assert depth_start_from_text("embedded") == "embedded"
+    with pytest.raises(typer.BadParameter, match="auto, embedded, model, rough or flat"):
+        depth_start_from_text("file")
+
+
+def without_sidecar(folder: Path) -> Path:
+    path = write_scene(folder)
+    path.with_name("scene_disparity.npy").unlink()
+    return path
+
+
+def test_the_scene_tells_where_its_depth_came_from(tmp_path: Path) -> None:
+    told: list[Progress] = []
+    source = Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))
+    ready = next(results_of(Request(1, source), lambda: False, lambda: CENTRE, told.append))
+    assert isinstance(ready, SceneReady)
+    origin = ready.scene.depth_origin
+    assert origin is not None
+    assert (origin.kind, origin.words) == ("rough", ready.scene.depth_source)
+    assert any("--depth-model" in note for note in ready.scene.notes)
+    assert any("guessing" in progress.doing for progress in told)
+
+
+def test_the_worker_tells_what_it_is_busy_with_before_the_scene(tmp_path: Path) -> None:
+    import threading
+
+    woken = threading.Semaphore(0)
+    worker = Worker(woken.release)
+    worker.submit(Request(1, Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))))
+    results = []
+    while not any(isinstance(result, SceneReady) for result in results):
+        assert woken.acquire(timeout=120)
+        while (result := worker.next_result()) is not None:
+            results.append(result)
+    worker.close()
+    assert isinstance(results[0], Doing)
+    assert results[0].progress.doing
+    assert results[0].generation == 1
+
+
+def run_command(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
+    from viewer.cli import main
+
+    monkeypatch.setattr(sys, "argv", ["iibr", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        main.main()
+    return int(ended.value.code or 0)
+
+
+def test_generate_says_where_depth_came_from(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    photo = write_scene(tmp_path)
+    words = ("generate", photo, "--grid", 1, "--out")
+    assert run_command(monkeypatch, *words, tmp_path / "a") == 0
+    assert "note: Depth: scene_disparity.npy." in capsys.readouterr().err
+    assert run_command(monkeypatch, *words, tmp_path / "b", "--depth", "rough", "--refine", "off") == 0
+    said = capsys.readouterr().err
+    assert said.count("Depth: rough") == 1
+    assert "iibr models" in said
+    # A bad model is told in a line, and the next source is taken.
+    assert run_command(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", tmp_path) == 0
+    notes = [line for line in capsys.readouterr().err.splitlines() if line.startswith("note: ")]
+    assert any("The depth model was not used" in note and "config.json" in note for note in notes)
+    assert any("Depth: rough" in note for note in notes)
+
+
+def test_a_bad_map_beside_the_photo_is_told_and_done_without(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    photo = write_scene(tmp_path)
+    np.save(tmp_path / "scene_disparity.npy", np.full((5, 5), np.nan))
+    assert run_command(monkeypatch, "generate", photo, "--grid", 1, "--out", tmp_path / "a") == 0
+    assert "The map beside the photo was not used" in capsys.readouterr().err

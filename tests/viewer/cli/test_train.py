@@ -1,0 +1,147 @@
+"""`iibr train`: real short runs on real batches; how they end, go on, and what they say."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.viewer.cli.test_cli import run, run_apart
+from viewer.cli.main import main
+
+WORDS = ("train", "--device", "cpu", "--seed", 3)
+WRITTEN = ["w.checkpoint.safetensors", "w.csv", "w.safetensors"]
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def interrupt_at(monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    """Ctrl-C while the batch of this step is made."""
+    from iibr_core.training.batches import training_batch
+
+    def batch(now: int, seed: int) -> object:
+        if now == step:
+            signal.raise_signal(signal.SIGINT)
+        return training_batch(now, seed)
+
+    monkeypatch.setattr("viewer.cli.train.training_batch", batch)
+
+
+def test_three_steps_write_weights_that_say_where_they_come_from(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    from iibr_core.formats.weights import load_weights
+    from iibr_core.ray_transformer.model import RayTransformer
+
+    out = tmp_path / "w.safetensors"
+    assert run(monkeypatch, *WORDS, "--steps", 3, "--out", out) == 0
+    assert capsys.readouterr().out == f"{out}: {out.stat().st_size / 1000:.1f} kB after 3 steps\n"
+    assert names(tmp_path) == WRITTEN
+    expected = f"iibr train --device cpu --seed 3 --steps 3 --out {out.name}"
+    assert load_weights(out, RayTransformer())["command"] == expected
+    assert len((tmp_path / "w.csv").read_text().splitlines()) == 4
+
+
+def test_ctrl_c_says_how_to_go_on_and_going_on_gives_the_same_weights(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    from iibr_core.formats.weights import read_weights
+
+    monkeypatch.chdir(tmp_path)
+    words = (*WORDS, "--steps", 3)
+    assert run(monkeypatch, *words, "--out", "whole.safetensors") == 0
+    with monkeypatch.context() as patch:
+        interrupt_at(patch, 3)
+        assert run(patch, *words, "--out", "w.safetensors") == 130
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+    assert line.startswith("iibr: interrupted; what was learned is saved, go on with: iibr train ")
+    again = line.split("go on with: iibr ")[1].split()
+    assert names(tmp_path)[:2] == WRITTEN[:2]
+    assert not Path("w.safetensors").exists()
+
+    made = []
+    from iibr_core.training.batches import training_batch
+
+    monkeypatch.setattr(
+        "viewer.cli.train.training_batch", lambda now, seed: made.append(now) or training_batch(now, seed)
+    )
+    assert run(monkeypatch, *again) == 0
+    assert made == [3]
+    whole, resumed = (read_weights(Path(name))[0] for name in ("whole.safetensors", "w.safetensors"))
+    assert all((whole[name] == resumed[name]).all() for name in whole)
+
+
+def test_ctrl_c_before_the_first_step_promises_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    interrupt_at(monkeypatch, 1)
+    assert run(monkeypatch, *WORDS, "--steps", 3, "--out", tmp_path / "w.safetensors") == 130
+    assert capsys.readouterr().err.split("iibr: ")[1] == "interrupted before the first step was done\n"
+
+
+def test_training_that_diverges_is_one_line_that_names_the_step(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    from iibr_core.training.batches import training_batch
+
+    def batch(now: int, seed: int) -> object:
+        good = training_batch(now, seed)
+        return replace(good, truth=good.truth * math.nan) if now == 2 else good
+
+    monkeypatch.setattr("viewer.cli.train.training_batch", batch)
+    out = tmp_path / "w.safetensors"
+    assert run(monkeypatch, *WORDS, "--steps", 3, "--checkpoint-every", 1, "--out", out) == 1
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+    assert line.startswith("iibr: ")
+    assert "is not finite at step 2" in line
+    assert names(tmp_path) == WRITTEN[:2]
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("--steps", "0"), "--steps"),
+        (("--steps", "x"), "--steps"),
+        (("--seed", "-1"), "--seed"),
+        (("--learning-rate", "0"), "--learning-rate"),
+        (("--learning-rate", "nan"), "--learning-rate"),
+        (("--learning-rate", "1e39"), "--learning-rate"),
+        (("--checkpoint-every", "0"), "--checkpoint-every"),
+        (("--device", "abacus"), "abacus"),
+        (("--out", "w.pt"), "w.pt"),
+        (("--out", "nowhere/w.safetensors"), "nowhere"),
+        (("--resume",), "w.checkpoint.safetensors"),
+    ],
+)
+def test_bad_values_are_one_line_and_leave_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    words: tuple[str, ...],
+    named: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(monkeypatch, "train", "--steps", 2, "--out", "w.safetensors", *words) == 2
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+    assert line.startswith("iibr: ")
+    assert named in line
+    assert names(tmp_path) == []
+
+
+def test_a_bug_in_a_batch_is_shown_as_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("viewer.cli.train.training_batch", lambda step, seed: 1 / 0)
+    monkeypatch.setattr(sys, "argv", ["iibr", "train", "--steps", "2", "--out", str(tmp_path / "w.safetensors")])
+    with pytest.raises(ZeroDivisionError):
+        main()
+
+
+def test_help_does_not_wait_for_torch() -> None:
+    code = "import sys; from viewer.cli.main import app; app(['train', '--help'], standalone_mode=False)"
+    code += "; print('torch' in sys.modules)"
+    assert run_apart(code).stdout.splitlines()[-1] == "False"

@@ -1,0 +1,78 @@
+"""How much a hurried picture leaves out follows from what drawing was seen to take; no clock is read here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewer.gpu.refocus.frame_budget import HASTES, OVERHEAD_S, Haste, Pace, Work, least_haste, stretched
+
+PIXELS = 400_000
+OF_LENS = Work(samples=80, sources=0, has_detours=False, keeps_layers=True, pixels=PIXELS)
+
+
+def work_in(haste: Haste) -> Work:
+    pixels = round(PIXELS * haste.scale**2)
+    return replace(OF_LENS, samples=max(80 // haste.stride**2, 1), pixels=pixels)
+
+
+def test_more_time_means_less_haste() -> None:
+    pace = Pace(5e-9)
+    chosen = [least_haste(work_in, pace, budget_s, 0) for budget_s in (1.0, 0.1, 0.05, 0.02, 0.001)]
+    assert chosen == sorted(chosen)
+    assert chosen[0] == 0
+    assert chosen[-1] == len(HASTES) - 1, "at the least, something is drawn"
+
+
+def test_what_is_chosen_fits_the_time() -> None:
+    pace = Pace(5e-9)
+    for budget_s in np.geomspace(0.01, 1, 20):
+        chosen = least_haste(work_in, pace, budget_s, 0)
+        if chosen < len(HASTES) - 1:
+            assert pace.seconds(work_in(HASTES[chosen])) <= budget_s
+        assert all(pace.seconds(work_in(better)) > budget_s for better in HASTES[:chosen])
+
+
+def test_the_pace_is_learnt_for_each_sort_of_work() -> None:
+    pace = Pace(5e-9)
+    pinhole = Work(0, 4, False, False, PIXELS)
+    guess = pace.seconds(pinhole)
+    for _ in range(12):
+        pace.learn(OF_LENS, 0.3)
+    assert pace.seconds(OF_LENS) == pytest.approx(0.3, rel=0.01)
+    assert pace.seconds(replace(OF_LENS, pixels=PIXELS // 4)) == pytest.approx(
+        (0.3 - OVERHEAD_S) / 4 + OVERHEAD_S, 0.02
+    )
+    assert pace.seconds(pinhole) == guess
+
+
+def test_a_picture_near_the_limit_does_not_change_back_and_forth() -> None:
+    pace = Pace(5e-9)
+    budget_s = pace.seconds(work_in(HASTES[3])) * 1.02
+    worse = least_haste(work_in, pace, budget_s / 1.05, 0)
+    assert worse > 3
+    assert least_haste(work_in, pace, budget_s, worse) == worse, "barely enough time: it stays"
+    assert least_haste(work_in, pace, 1.3 * budget_s, worse) <= 3, "time to spare: it becomes better"
+
+
+@given(
+    width=st.integers(1, 9),
+    height=st.integers(1, 9),
+    to=st.tuples(st.integers(1, 30), st.integers(1, 30)),
+    seed=st.integers(0, 99),
+)
+def test_stretched_against_plain_interpolation(width: int, height: int, to: tuple[int, int], seed: int) -> None:
+    image = np.random.default_rng(seed).integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+    def along(values: np.ndarray, length: int) -> np.ndarray:
+        at = (np.arange(length) + 0.5) * len(values) / length - 0.5
+        columns = [np.interp(at, np.arange(len(values)), column) for column in values.reshape(len(values), -1).T]
+        return np.stack(columns, -1).reshape(length, *values.shape[1:])
+
+    expected = along(along(image.astype(float), to[1]).swapaxes(0, 1), to[0]).swapaxes(0, 1)
+    assert stretched(image, to).shape == (to[1], to[0], 3)
+    assert np.abs(stretched(image, to) - expected).max() <= 0.51

@@ -1,0 +1,101 @@
+"""Pictures drawn in parts: nothing twice, nothing left out, no seams, and light beyond 8 bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iibr_core.color import srgb_from_linear
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.gpu.scenes import TwoPlanes
+from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.tiling import MARGIN_PX, PART_PX, parts_of
+from viewer.model.state.app_state import ApertureShape, Optics
+
+GRID = GridShape(5, 5)
+SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=1.0, radius_px=25.0)
+LARGE = 384, 256
+"""Whole tiles: those of the parts are then the same."""
+
+
+@given(width=st.integers(1, 9000), height=st.integers(1, 700), largest=st.integers(64, 4096))
+def test_every_pixel_is_kept_once_and_no_part_is_too_large(width: int, height: int, largest: int) -> None:
+    kept = np.zeros((height, width), np.uint8)
+    for part in parts_of((width, height), largest):
+        assert max(part.size_px) <= min(largest, PART_PX)
+        rows, columns = part.kept_of_drawn
+        assert 0 <= rows.start <= rows.stop <= part.size_px[1]
+        assert 0 <= columns.start <= columns.stop <= part.size_px[0]
+        kept[part.kept] += 1
+        assert kept[part.kept].shape == (rows.stop - rows.start, columns.stop - columns.start)
+        left, top, across, down = part.window
+        assert (left * width, top * height) == pytest.approx(part.first_px)
+        assert (across * width, down * height) == pytest.approx(part.size_px)
+    assert (kept == 1).all()
+
+
+def test_parts_overlap_as_far_as_light_is_spread() -> None:
+    for part in parts_of((6000, 3000), 16384):
+        for axis, length in ((0, 6000), (1, 3000)):
+            first, last = part.first_px[axis], part.first_px[axis] + part.size_px[axis]
+            assert part.kept_from_px[axis] - first == (0 if first == 0 else MARGIN_PX)
+            assert last - part.kept_to_px[axis] >= MARGIN_PX or last >= length
+
+
+OPTICS = [
+    Optics(ViewOffset(0.3, -0.7)),
+    Optics(ViewOffset(0.3, 0.2), focus_disparity=1.0, aperture_diameter=4.0),
+    Optics(
+        ViewOffset(0.0, 0.4),
+        dolly=1.5,
+        focus_disparity=-2.0,
+        focus_tilt=(2.0, 1.0),
+        aperture_diameter=1.6,
+        aperture_shape=ApertureShape("cat_eye", cat_eye=1.0),
+    ),
+]
+
+
+@pytest.mark.parametrize("optics", OPTICS)
+def test_parts_have_no_seams(
+    renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch, optics: Optics
+) -> None:
+    SCENE.fill(renderer, GRID)
+    whole = renderer.converged_picture(optics, LARGE, is_linear=False).astype(int)
+    monkeypatch.setattr(gl, "max_texture_size", 160)
+    assert len(parts_of(LARGE, gl.max_texture_size)) == 12
+    in_parts = renderer.converged_picture(optics, LARGE, is_linear=False)
+    difference = np.abs(in_parts - whole).max(-1)
+    assert np.mean(difference > 2) < 0.001, "rounding may decide a depth edge otherwise here and there"
+    assert np.mean(difference) < 0.05
+
+
+def test_the_converged_picture_is_what_refining_ends_at(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    for optics in OPTICS:
+        renderer.render(optics, (160, 120))
+        renderer.refine()
+        assert np.array_equal(renderer.read_image(), renderer.converged_picture(optics, (160, 120), is_linear=False))
+
+
+def test_light_is_finer_than_eight_bits_and_not_cut_off(renderer: Renderer) -> None:
+    ramp = np.linspace(0.2, 3.0, 64).astype(np.float16)
+    renderer.open_field(GridShape(1, 1), 64, 4, hdr=True, with_disparity=False)
+    renderer.upload_view(0, 0, np.repeat(np.tile(ramp[None, :, None], (4, 1, 1)), 3, axis=2), None)
+    light = renderer.converged_picture(Optics(exposure_stops=1.0), (64, 4), is_linear=True)
+    assert light.dtype == np.float32
+    assert srgb_from_linear(light[1, :, 0] / 2) == pytest.approx(ramp.astype(float), rel=2e-3)
+    assert light.max() > 5
+    encoded = renderer.converged_picture(Optics(exposure_stops=1.0), (64, 4), is_linear=False)
+    assert np.abs(np.clip(srgb_from_linear(light), 0, 1) * 255 - encoded).max() <= 0.51
+
+
+def test_light_between_the_steps_of_eight_bits(renderer: Renderer) -> None:
+    """A sum of many samples takes more values than 256."""
+    SCENE.fill(renderer, GRID)
+    light = renderer.converged_picture(OPTICS[1], (160, 120), is_linear=True)
+    steps = srgb_from_linear(light) * 255
+    assert np.mean(np.abs(steps - np.rint(steps)) > 0.1) > 0.5

@@ -1,0 +1,51 @@
+"""The commands: each name and chord once, each with an action that the state accepts."""
+
+from __future__ import annotations
+
+import pytest
+from imgui_bundle import imgui
+
+from tests.viewer.model.test_reducers import scene_of, state_with
+from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching
+from viewer.model.lens.presets import PRESETS
+from viewer.model.reducers.root import apply
+from viewer.model.state.app_state import AppState, ChooseTask, PalettePrompt, SavePrompt
+
+
+def test_names_and_chords_are_unique_and_known_to_imgui() -> None:
+    chords = [chord for command in COMMANDS for chord in command.chords]
+    assert len(BY_NAME) == len(COMMANDS)
+    assert len(set(chords)) == len(chords)
+    assert all(hasattr(imgui.Key, chord.key) for chord in chords)
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+@pytest.mark.parametrize("state", [AppState(), state_with(scene_of())], ids=["empty", "open"])
+def test_every_command_can_be_given_at_any_time(command: Command, state: AppState) -> None:
+    assert isinstance(apply(state, command.action(state)), AppState)
+
+
+def test_chords_in_words() -> None:
+    assert Chord("z", ctrl=True, shift=True).words == "Ctrl+Shift+Z"
+    assert [c.chords[0].words for c in COMMANDS if "text" in c.name.lower()] == ["Ctrl++", "Ctrl+−", "Ctrl+0"]
+    assert BY_NAME["Mouse and keys"].chords[0].words == "F1"
+
+
+def test_the_palette_finds_by_parts_of_words() -> None:
+    assert [c.name for c in commands_matching("preset")] == [f"Preset: {name}" for name in PRESETS]
+    assert [c.name for c in commands_matching("AGAIN larger")] == []
+    assert [c.name for c in commands_matching("TEXT lar")] == ["Larger text"]
+    assert commands_matching("") == COMMANDS
+
+
+def test_what_the_commands_bring_up() -> None:
+    state = state_with(scene_of())
+    assert apply(state, BY_NAME["Open a photo…"].action(state)).tasks == (ChooseTask("photo"),)
+    asked = apply(state, BY_NAME["Save the picture…"].action(state))
+    assert asked.prompt == SavePrompt("photo-iibr.png", (60, 40))
+    helped = apply(state, BY_NAME["Mouse and keys"].action(state))
+    assert helped.prompt == "help"
+    assert apply(helped, BY_NAME["Mouse and keys"].action(helped)).prompt is None
+    listed = apply(state, BY_NAME["All commands"].action(state))
+    assert listed.prompt == PalettePrompt()
+    assert apply(AppState(), BY_NAME["Save the picture…"].action(AppState())).prompt is None

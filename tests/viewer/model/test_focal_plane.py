@@ -1,0 +1,93 @@
+"""The tilted plane of focus: through both handles, level across them, and clicked things sharp on it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from iibr_core.types import GridShape
+from tests.viewer.model.test_reducers import scene_of, state_with
+from viewer.model.actions import EndGesture, FocusOn, MoveTiltHandle, ShowTiltHandles
+from viewer.model.layout import Rect
+from viewer.model.lens.focal_plane import (
+    CLOSEST_HANDLES,
+    focused_on,
+    handle_points,
+    place_of,
+    sharp_disparity,
+    tilted_through,
+)
+from viewer.model.reducers.root import apply
+from viewer.model.state.app_state import Optics, TiltHandles
+
+shares = st.floats(-1, 1)
+places = st.tuples(shares, shares)
+disparities = st.floats(-5, 5)
+
+
+@given(places, places, disparities, disparities, st.tuples(disparities, disparities), st.floats(0.1, 3))
+def test_the_plane_runs_through_both_handles_and_is_level_across_them(
+    moved: tuple[float, float],
+    kept: tuple[float, float],
+    there: float,
+    focus: float,
+    tilt: tuple[float, float],
+    aspect: float,
+) -> None:
+    line = moved[0] - kept[0], (moved[1] - kept[1]) * aspect
+    assume(math.hypot(*line) >= CLOSEST_HANDLES)
+    before = Optics(focus_disparity=focus, focus_tilt=tilt)
+    after = tilted_through(before, moved, there, kept, aspect)
+    assert sharp_disparity(after, moved) == pytest.approx(there, abs=1e-6)
+    assert sharp_disparity(after, kept) == pytest.approx(sharp_disparity(before, kept), abs=1e-6)
+    across = kept[0] - line[1], kept[1] + line[0] / aspect  # a right angle to the line, as the eye sees it
+    assert sharp_disparity(after, across) == pytest.approx(sharp_disparity(after, kept), abs=1e-6)
+
+
+def test_handles_on_one_spot_move_the_plane_without_tipping_it() -> None:
+    before = Optics(focus_tilt=(0.5, -0.5))
+    after = tilted_through(before, (0.2, 0.2), 2.0, (0.2, 0.21), 1.0)
+    assert after.focus_tilt == before.focus_tilt
+    assert sharp_disparity(after, (0.2, 0.2)) == pytest.approx(2.0)
+
+
+@given(places, disparities)
+def test_what_is_clicked_is_sharp_whatever_the_tilt(place: tuple[float, float], disparity: float) -> None:
+    after = focused_on(Optics(focus_tilt=(0.7, -0.3), focus_disparity=1), place, disparity)
+    assert sharp_disparity(after, place) == pytest.approx(disparity)
+    assert after.focus_tilt == (0.7, -0.3)
+
+
+def test_dragging_a_handle_is_one_action_a_step_and_lets_go_at_the_end() -> None:
+    state = apply(state_with(scene_of()), ShowTiltHandles(True))
+    kept = TiltHandles().second
+    state = apply(state, MoveTiltHandle(0, (-0.8, 0.6), 2.5))
+    assert state.tilt_handles == TiltHandles((-0.8, 0.6), kept, taken=0)
+    assert sharp_disparity(state.optics, (-0.8, 0.6)) == pytest.approx(2.5)
+    state = apply(state, MoveTiltHandle(0, (-0.9, 5.0), None))
+    assert state.tilt_handles is not None
+    assert state.tilt_handles.first == (-0.9, 1.0), "held within the picture"
+    state = apply(state, EndGesture())
+    assert state.tilt_handles is not None
+    assert state.tilt_handles.taken is None
+    assert len(state.history.past) == 1
+    assert apply(state, MoveTiltHandle(1, (math.nan, 0.0), 1.0)).optics == state.optics
+
+
+def test_a_click_on_a_tilted_plane_focuses_there() -> None:
+    state = apply(state_with(scene_of()), ShowTiltHandles(True))
+    state = apply(state, MoveTiltHandle(1, (0.5, -0.5), 1.0))
+    state = apply(state, FocusOn((0.9, 0.9), 0.3))
+    assert sharp_disparity(state.optics, (0.9, 0.9)) == pytest.approx(0.3)
+
+
+def test_places_of_pixels_and_handles() -> None:
+    scene = scene_of(GridShape(3, 3), width=100, height=50)
+    assert place_of(-0.5, -0.5, scene) == (-1, -1)
+    assert place_of(99.5, 49.5, scene) == (1, 1)
+    assert place_of(49.5, 24.5, scene) == (0, 0)
+    handles = TiltHandles((-1, -1), (0, 0.5))
+    assert handle_points(handles, Rect(10, 20, 200, 100)) == ((10, 20), (110, 95))

@@ -1,0 +1,156 @@
+"""Settings in a saved picture: round trips, and texts that are damaged, foreign or hostile."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iibr_core.formats.images.photo import write_image
+from iibr_core.types import GridShape, InputError, ViewOffset
+from tests.viewer.model.test_reducers import scene_of, state_with
+from viewer.model.actions import SceneOpened
+from viewer.model.reducers.root import apply
+from viewer.model.saved_settings import (
+    ATTRIBUTE,
+    decided_like,
+    read_settings,
+    settings_from_text,
+    settings_text,
+    settings_text_in,
+)
+from viewer.model.state.app_state import APERTURE_KINDS, ApertureMask, ApertureShape, Optics, SavedSettings, Source
+
+numbers = st.floats(-1e3, 1e3)
+masks = st.builds(lambda n: ApertureMask("ünïcode “mask”.png", 2, n, bytes([255] * 2 * n)), st.integers(1, 64))
+shapes = st.builds(
+    ApertureShape, st.sampled_from(APERTURE_KINDS), st.integers(3, 11), numbers, numbers, numbers, st.none() | masks
+)
+optics = st.builds(
+    Optics,
+    st.builds(ViewOffset, numbers, numbers),
+    numbers,
+    numbers,
+    numbers,
+    st.tuples(numbers, numbers),
+    numbers,
+    shapes,
+    numbers,
+    numbers,
+)
+sources = st.builds(
+    Source,
+    st.just(""),
+    st.none(),
+    numbers,
+    st.none() | st.builds(GridShape, st.integers(1, 99), st.integers(1, 99)),
+    st.none() | numbers,
+    st.none() | st.integers(1, 10**9),
+    st.none() | st.integers(1, 10**12),
+    st.sampled_from(("fast", "balanced", "exact")),
+)
+settings = st.builds(SavedSettings, optics, numbers, sources, st.tuples(st.integers(1, 9999), st.integers(1, 9999)))
+ONE = SavedSettings(Optics(eye=ViewOffset(1, 2)), 1.5, Source("", grid=GridShape(3, 5)), (60, 40))
+
+
+@given(settings)
+def test_text_and_back_is_exact(saved: SavedSettings) -> None:
+    assert settings_from_text(settings_text(saved), "a.png") == saved
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_a_picture_carries_its_settings(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    mask = ApertureMask("stär.png", 64, 64, bytes(range(256)) * 16)
+    saved = SavedSettings(Optics(aperture_shape=ApertureShape("mask", mask=mask)), 1.0, Source(""), (8, 6))
+    write_image(path, np.zeros((6, 8, 3), np.uint8), {ATTRIBUTE: settings_text(saved)})
+    assert read_settings(path) == saved
+
+
+def test_no_path_of_the_users_goes_into_a_picture() -> None:
+    text = settings_text(SavedSettings(Optics(), 1.0, Source("/home/somebody/a.png", "/home/somebody/a.pfm"), (1, 1)))
+    assert "somebody" not in text
+
+
+def changed(**changes: Any) -> str:
+    """The text of ONE with some values replaced: keys are dotted paths with underscores doubled to dots."""
+    whole = json.loads(settings_text(ONE))
+    for name, value in changes.items():
+        *path, last = name.split("__")
+        target = whole
+        for key in path:
+            target = target[key]
+        target[last] = value
+    return json.dumps(whole)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "no json",
+        "[]",
+        "null",
+        "{}",
+        '{"format": 1}',
+        settings_text(ONE)[:-20],
+        "[" * 100_000,
+        " " * 2_000_000,
+        changed(format=2),
+        changed(depth_strength=float("nan")),
+        changed(depth_strength=True),
+        changed(depth_strength=10**400),
+        changed(optics__eye=[1]),
+        changed(optics__eye=["1", 2]),
+        changed(optics__dolly=None),
+        changed(optics__focus_disparity=float("inf")),
+        changed(optics__aperture_shape__kind="star"),
+        changed(optics__aperture_shape__blades=2),
+        changed(optics__aperture_shape__mask={"name": "a", "rows": 2, "columns": 2, "values": "AAAA"}),
+        changed(optics__aperture_shape__mask={"name": "a", "rows": 1, "columns": 3, "values": "AAAA"}),
+        changed(optics__aperture_shape__mask={"name": "a", "rows": 10**9, "columns": 1, "values": ""}),
+        changed(source__grid=[0, 3]),
+        changed(source__quality="best"),
+        changed(source__max_pixels=-1),
+        changed(size_px=[0, 10]),
+    ],
+    ids=range(26),
+)
+def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
+    with pytest.raises(InputError, match=r"a\.png") as error:
+        settings_from_text(text, "a.png")
+    assert "\n" not in str(error.value)
+    before = state_with(None)
+    state = apply(before, SceneOpened(1, scene_of(settings=text or "x")))
+    assert state.optics == Optics()
+    assert [notice.is_error for notice in state.notices] == [True]
+
+
+def test_a_saved_picture_opens_as_a_photo_and_offers_its_settings() -> None:
+    state = apply(state_with(None), SceneOpened(1, scene_of(settings=settings_text(ONE))))
+    (notice,) = state.notices
+    assert notice.offer == ONE
+    assert state.optics == Optics()
+
+
+def test_pictures_without_settings_and_other_files(tmp_path: Path) -> None:
+    write_image(tmp_path / "plain.png", np.zeros((4, 4, 3), np.uint8))
+    (tmp_path / "text.png").write_text("this is no picture")
+    assert settings_text_in(tmp_path / "plain.png") == ""
+    for name, reason in (("plain.png", "no settings"), ("text.png", "no picture"), ("gone.png", "no such file")):
+        with pytest.raises(InputError, match=reason) as error:
+            read_settings(tmp_path / name)
+        assert "\n" not in str(error.value)
+        assert name in str(error.value)
+
+
+def test_options_given_beat_the_saved_ones() -> None:
+    source = Source("photo.png", "map.pfm", 2.0, GridShape(9, 9))
+    merged = decided_like(source, ONE, given={"grid"})
+    assert merged == Source("photo.png", "map.pfm", 1.0, GridShape(9, 9))
+    assert decided_like(source, ONE, ()).grid == GridShape(3, 5)

@@ -1,0 +1,106 @@
+"""The depth section, drawn without a window: what is told, what edits change in it, whole at any size of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iibr_core.depth.choice import BETTER_WAYS, DepthOrigin
+from iibr_core.depth.editing.edits import DepthEdits, Stroke
+from tests.viewer.conftest import headless_with_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.display.depth_preview import DepthPreview
+from viewer.model.actions import AskToSave, SetFontScale, SetHover, SetTheme
+from viewer.model.layout import PANEL_WIDTH
+from viewer.model.state.app_state import AppState, Hover, Theme
+from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
+from viewer.model.state.inspection import SetOpacity, SetOverlay
+
+SIZE = 640, 800
+PANEL = np.s_[:, -int(PANEL_WIDTH) :]
+PICTURE = np.s_[:, : -int(PANEL_WIDTH)]
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+    with headless_with_scene(tmp_path_factory.mktemp("depth"), "depth") as viewer:
+        yield viewer
+
+
+def differs(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(H, W) bool."""
+    return np.abs(before.astype(int) - after).max(axis=2) > 24
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_clips_show_in_the_histogram_and_sliders_only(viewer: HeadlessViewer, theme: Theme) -> None:
+    viewer.do(SetTheme(theme))
+    before = viewer.screen(SIZE)
+    viewer.do(SetTone(DepthEdits(far_clip=0.3, near_clip=0.6), is_finished=False))
+    changed = differs(before, viewer.screen(SIZE))
+    assert changed[PANEL].sum() > 500
+    assert not changed[PICTURE].any()
+
+
+def test_poor_depth_is_told_with_advice_and_what_failed(viewer: HeadlessViewer) -> None:
+    before = viewer.screen(SIZE)
+    scene = viewer.state.scene
+    assert scene is not None
+    poor = DepthOrigin("rough", "rough, guessed without a model", ("The photo's own depth was not used.",), BETTER_WAYS)
+    viewer.state = replace(viewer.state, scene=replace(scene, depth_origin=poor))
+    assert differs(before, viewer.screen(SIZE))[PANEL].sum() > 2000
+
+
+def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: HeadlessViewer) -> None:
+    viewer.do(SetHover(Hover(48.0, 32.0, 1.5)))
+    before = viewer.screen(SIZE)
+    viewer.do(SetBrush(Brush(radius=0.1, is_on=True)))
+    changed = differs(before, viewer.screen(SIZE))
+    assert changed[PANEL].sum() > 500
+    assert changed[PICTURE].sum() > 100
+
+
+@pytest.mark.parametrize("scale", [0.8, 1.5, 2.0])
+def test_the_panel_ends_at_its_border_at_any_size_of_text(viewer: HeadlessViewer, scale: float) -> None:
+    viewer.do(SetFontScale(scale), SetBrush(Brush(is_on=True)))
+    panel = viewer.screen((900, 1800))[:, -int(PANEL_WIDTH * scale) :]
+    ground = panel[2:-2, 3]
+    assert (ground == ground[0]).all(), "nothing reaches over the left border"
+    margin = panel[40:-40, -8:-4]
+    assert (margin == margin[0, 0]).all(axis=2).mean() > 0.95, "nor over the right one"
+
+
+def test_the_prompt_for_a_map_has_no_size(viewer: HeadlessViewer) -> None:
+    viewer.do(AskToSave("picture"))
+    picture = viewer.screen(SIZE)
+    viewer.do(AskToSave("map"))
+    assert differs(picture, viewer.screen(SIZE))[PICTURE].sum() > 500
+
+
+def test_a_stroke_under_way_is_seen_in_colours(viewer: HeadlessViewer) -> None:
+    viewer.do(SetOverlay("disparity"), SetOpacity(1.0))
+    stage, before = viewer._stage, viewer.screen(SIZE)
+    preview = DepthPreview(stage)
+    preview.update(viewer.state)
+    assert stage.previews == 0, "nothing is edited yet"
+    stroke = Stroke("farther", ((0.5, 0.5),), 0.1, 1.0)
+    viewer.state = replace(viewer.state, stroke=stroke)
+    preview.update(viewer.state)
+    preview.update(viewer.state)
+    assert stage.previews == 1
+    changed = differs(before, viewer.screen(SIZE))
+    assert changed[PICTURE].sum() > 200
+    viewer.state = replace(viewer.state, stroke=None)
+    preview.update(viewer.state)
+    assert stage.previews == 2
+    assert not differs(before, viewer.screen(SIZE))[PICTURE].any()
+
+
+def test_an_empty_window_has_no_depth(viewer: HeadlessViewer) -> None:
+    preview = DepthPreview(viewer._stage)
+    previews = viewer._stage.previews
+    preview.update(AppState())
+    assert viewer._stage.previews == previews

@@ -1,0 +1,182 @@
+"""What inspection draws, without a window: seen where it belongs, in both themes, at every size of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import Action, MoveEye, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
+from viewer.model.inspection_request import beside_of, sheet_cells
+from viewer.model.layout import PANEL_WIDTH, Layout, Rect, layout_of
+from viewer.model.state.app_state import Hover, Notice, Theme
+from viewer.model.state.inspection import (
+    OVERLAYS,
+    Compare,
+    MoveDivider,
+    OverlayKind,
+    SetOpacity,
+    SetOverlay,
+    ShowEpis,
+    ShowGrid,
+    ShowValues,
+)
+
+SIZE = 640, 760
+GRID = GridShape(3, 3)
+ENOUGH_PIXELS = 60
+HOVER = Hover(48.0, 32.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+    with headless_with_scene(tmp_path_factory.mktemp("screens"), "inspect") as viewer:
+        yield viewer
+
+
+def layout_now(viewer: HeadlessViewer, size: tuple[int, int] = SIZE) -> Layout:
+    scale = viewer.state.preferences.font_scale
+    return layout_of(size, (WIDTH, HEIGHT), ui_scale=scale, beside=beside_of(viewer.state))
+
+
+def changed_after(viewer: HeadlessViewer, *actions: Action) -> np.ndarray:
+    before = viewer.screen(SIZE).astype(int)
+    viewer.do(*actions)
+    return np.abs(viewer.screen(SIZE) - before).max(axis=2) > 8
+
+
+def part(screen: np.ndarray, rect: Rect | None) -> np.ndarray:
+    assert rect is not None
+    top, left = round(rect.y), round(rect.x)
+    return screen[top : top + round(rect.height), left : left + round(rect.width)]
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_the_whole_section_is_seen_at_any_size_of_text(viewer: HeadlessViewer, theme: Theme, scale: float) -> None:
+    size = round(SIZE[0] * scale), round(SIZE[1] * scale)
+    viewer.do(SetTheme(theme), SetFontScale(scale), SetOverlay("disparity"))
+    opened = viewer.screen(size).astype(int)
+    viewer.do(ToggleSection("inspect"))
+    changed = np.abs(viewer.screen(size) - opened).max(axis=2) > 24
+    panel = changed[:, -round(PANEL_WIDTH * scale) :]
+    assert panel.sum() > 20 * ENOUGH_PIXELS
+    assert not changed[:, : -round(PANEL_WIDTH * scale)].any()
+    assert not panel[:, -round(8 * scale) :].any(), "clipped at the right"
+    assert not panel[-round(8 * scale) :].any(), "clipped below"
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: HeadlessViewer, theme: Theme) -> None:
+    viewer.do(SetTheme(theme), SetHover(replace(HOVER, disparity=None)), ShowEpis(True))
+    screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
+    across, down = part(screen, layout.strip_across), part(screen, layout.strip_down)
+    row, column = part(screen, layout.picture)[:, 100], part(screen, layout.picture)[100]
+    assert across.std() > 5 < down.std()
+    assert row.shape[0] == down.shape[0]
+    assert column.shape[0] == across.shape[1]
+    # a third of the way into the strip of three views is the middle view, which is the picture's own line; marks lie
+    # at the pointer only
+    picture = part(screen, layout.picture)
+    y = round((HOVER.y_px + 0.5) / HEIGHT * picture.shape[0])
+    own = across[across.shape[0] // 3 + 3]
+    is_marked = np.abs(np.arange(own.shape[0]) - (HOVER.x_px + 0.5) / WIDTH * own.shape[0]) < 4
+    near = np.abs(own - picture[y]).max(axis=1)[~is_marked]
+    assert np.median(near) <= 6
+
+
+def test_the_middle_of_the_epi_moves_with_the_eye(viewer: HeadlessViewer) -> None:
+    viewer.do(ShowEpis(True))
+    changed = changed_after(viewer, MoveEye(ViewOffset(0, 1)))
+    assert part(changed, layout_now(viewer).strip_across).sum() > ENOUGH_PIXELS
+
+
+@pytest.mark.parametrize("kind", OVERLAYS)
+def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: HeadlessViewer, kind: OverlayKind) -> None:
+    viewer.do(MoveEye(ViewOffset(0, 1)))
+    picture = layout_now(viewer).picture
+    plain = part(viewer.screen(SIZE), picture).astype(int)
+    viewer.do(SetOverlay(kind), SetOpacity(0.0))
+    clear = part(viewer.screen(SIZE), picture).astype(int)
+    below_legend = np.s_[60:]
+    assert np.abs(clear - plain)[below_legend].max() <= 2
+    viewer.do(SetOpacity(1.0))
+    covered = part(viewer.screen(SIZE), picture).astype(int)
+    differs = (np.abs(covered - plain).max(axis=2) > 24)[below_legend]
+    assert differs.sum() > 3 * ENOUGH_PIXELS
+    if kind == "inpainted":
+        assert differs.mean() < 0.3, "only what the photo does not show"
+
+
+def test_the_legend_marks_the_value_under_the_pointer(viewer: HeadlessViewer) -> None:
+    viewer.do(SetOverlay("disparity"), SetHover(HOVER))
+    changed = changed_after(viewer, SetHover(replace(HOVER, disparity=-0.5)))
+    legend = part(changed, layout_now(viewer).picture)[:40, :180]
+    assert 10 < legend.sum() < 800
+
+
+def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: HeadlessViewer) -> None:
+    viewer.do(MoveEye(ViewOffset(0, 1)))
+    result = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
+    viewer.do(Compare("photo"), MoveDivider(0.5))
+    compared = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
+    viewer.do(Compare(None), MoveEye(ViewOffset(0, 0)))
+    photo = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
+    half = compared.shape[1] // 2
+    left, right = np.s_[60:, : half - 20], np.s_[60:, half + 20 :]
+    assert np.abs(compared[right] - result[right]).max() <= 2
+    assert np.median(np.abs(compared[left] - photo[left])) <= 2
+    assert np.abs(compared[left] - result[left]).mean() > 2 * np.abs(compared[left] - photo[left]).mean()
+
+
+def test_fast_and_exact_are_compared_with_their_scores(viewer: HeadlessViewer) -> None:
+    viewer.do(MoveEye(ViewOffset(1, 1)))
+    changed = changed_after(viewer, Compare("quality"))
+    pair = viewer.state.inspection.pair
+    assert pair is not None
+    assert pair.view == (2, 2)
+    assert pair.psnr_db is not None
+    assert pair.psnr_db > 20
+    assert changed[:, -int(PANEL_WIDTH) :].sum() > ENOUGH_PIXELS
+
+
+def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: HeadlessViewer) -> None:
+    viewer.do(ShowGrid(True))
+    screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
+    assert layout.picture is not None
+    for cell in sheet_cells(layout.picture, GRID):
+        assert part(screen, cell).std() > 5
+    changed = changed_after(viewer, MoveEye(ViewOffset(-1, -1)))
+    frames = [part(changed, cell).sum() for cell in sheet_cells(layout.picture, GRID)]
+    assert sorted(np.flatnonzero(frames)) == [0, 4]
+
+
+def test_the_status_line_is_not_covered_by_notices(viewer: HeadlessViewer) -> None:
+    viewer.do(ShowValues(True), SetHover(HOVER))
+    line = part(viewer.screen(SIZE), layout_now(viewer).status)
+    assert line.std() > 5
+    probe = viewer.state.inspection.probe
+    assert probe is not None
+    assert (probe.of, probe.origin) == (9, "photo")
+    assert probe.rgb[0] > probe.rgb[1] == probe.rgb[2], "the red square"
+    assert probe.seen_in is not None
+    viewer.do(Notify(Notice("a notice")))
+    np.testing.assert_array_equal(part(viewer.screen(SIZE), layout_now(viewer).status), line)
+
+
+def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: HeadlessViewer) -> None:
+    """Beside the square, in the middle row, from an eye that looks behind it."""
+    viewer.do(ShowValues(True), MoveEye(ViewOffset(0, 1)))
+    origins = set()
+    for x in range(0, WIDTH, 2):
+        disparity = viewer.pick(x, HEIGHT / 2)
+        viewer.do(SetHover(Hover(x, HEIGHT / 2, disparity)))
+        viewer.screen((400, 300))
+        assert viewer.state.inspection.probe is not None
+        origins.add(viewer.state.inspection.probe.origin)
+    assert origins == {"generated", "inpainted"}

@@ -1,0 +1,179 @@
+"""Every panel, drawn without a window: something is there, in both themes, whole at any size of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iibr_core.types import ViewOffset
+from tests.viewer.conftest import headless_with_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import (
+    Action,
+    AskForPath,
+    AskToSave,
+    DismissNotice,
+    MoveEye,
+    Notify,
+    PictureDrawn,
+    ProgressMade,
+    SetAperture,
+    SetApertureShape,
+    SetFontScale,
+    SetHover,
+    SetLoop,
+    SetTheme,
+    ShowPrompt,
+    ShowTiltHandles,
+    ToggleSection,
+)
+from viewer.model.layout import PANEL_WIDTH, layout_of
+from viewer.model.state.app_state import (
+    APERTURE_KINDS,
+    SECTIONS,
+    ApertureKind,
+    ApertureMask,
+    ApertureShape,
+    AppState,
+    DrawReport,
+    Hover,
+    Notice,
+    PalettePrompt,
+    Progress,
+    SavedSettings,
+    Section,
+    Source,
+)
+from viewer.ui.style import DARK, LIGHT
+
+SIZE = 640, 880
+ENOUGH_PIXELS = 60
+"""That differ, at least, where something new is drawn: a short word."""
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+    with headless_with_scene(tmp_path_factory.mktemp("screens")) as viewer:
+        yield viewer
+
+
+def changed_after(viewer: HeadlessViewer, *actions: Action) -> np.ndarray:
+    """(H, W) bool: where the screen differs after the actions."""
+    before = viewer.screen(SIZE).astype(int)
+    viewer.do(*actions)
+    return np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24
+
+
+def in_panel(screen: np.ndarray, scale: float = 1.0) -> np.ndarray:
+    return screen[:, -int(PANEL_WIDTH * scale) :]
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section) -> None:
+    first = viewer.screen(SIZE)
+    changed = changed_after(viewer, ToggleSection(section))
+    assert in_panel(changed).sum() > 10 * ENOUGH_PIXELS
+    assert not changed[:, : -int(PANEL_WIDTH)].any()
+    viewer.do(ToggleSection(section))
+    np.testing.assert_array_equal(viewer.screen(SIZE), first)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        ShowPrompt("help"),
+        ShowPrompt(PalettePrompt("mo")),
+        AskToSave(),
+        AskForPath("photo"),
+        Notify(Notice("damaged.png: cut off", is_error=True)),
+        ShowTiltHandles(True),
+        SetHover(Hover(48.0, 32.0, 1.5)),
+    ],
+    ids=lambda action: type(action).__name__,
+)
+def test_what_lies_over_the_picture_is_seen_and_stays_beside_the_panel(viewer: HeadlessViewer, action: Action) -> None:
+    changed = changed_after(viewer, action)
+    assert changed[:, : -int(PANEL_WIDTH)].sum() > ENOUGH_PIXELS
+    border = np.concatenate([changed[0], changed[-1], changed[:, 0]])
+    assert not border.any(), "cut off at the window's border"
+
+
+@pytest.mark.parametrize("kind", APERTURE_KINDS)
+def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind: ApertureKind) -> None:
+    mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255])) if kind == "mask" else None
+    other: ApertureKind = "ring" if kind == "disc" else "disc"
+    viewer.do(SetApertureShape(ApertureShape(other)))
+    changed = changed_after(viewer, SetApertureShape(ApertureShape(kind, mask=mask)))
+    assert in_panel(changed).sum() > 10 * ENOUGH_PIXELS
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        SetLoop("eight"),
+        SetAperture(2.0),
+        ProgressMade(1, Progress(4, 9, 0.3)),
+        PictureDrawn(DrawReport(3, 9, 12.0, 0.004)),
+    ],
+    ids=lambda action: type(action).__name__,
+)
+def test_the_panel_tells(viewer: HeadlessViewer, action: Action) -> None:
+    assert in_panel(changed_after(viewer, action)).sum() > ENOUGH_PIXELS
+
+
+def test_a_viewpoint_beyond_the_views_is_marked_in_another_colour(viewer: HeadlessViewer) -> None:
+    def marked() -> int:
+        panel = in_panel(viewer.screen(SIZE)).astype(int)
+        return int((np.abs(panel - np.round(255 * np.array(DARK.warning[:3]))).max(axis=2) < 6).sum())
+
+    viewer.do(MoveEye(ViewOffset(0, 1)))
+    assert marked() == 0
+    viewer.do(MoveEye(ViewOffset(0, 1.4)))
+    assert marked() > ENOUGH_PIXELS
+
+
+def test_light_and_dark(viewer: HeadlessViewer) -> None:
+    for theme, palette in (("dark", DARK), ("light", LIGHT)):
+        viewer.do(SetTheme(theme))  # type: ignore[arg-type]
+        screen = viewer.screen(SIZE) / 255
+        np.testing.assert_allclose(screen[-2, -8], palette.panel[:3], atol=0.01)
+        np.testing.assert_allclose(screen[2, 2], palette.background[:3], atol=0.01)
+        text = np.abs(in_panel(screen) - np.array(palette.text[:3])).max(axis=2) < 0.1
+        assert text.sum() > 20 * ENOUGH_PIXELS
+
+
+def test_text_twice_as_large_in_a_window_twice_as_large_is_the_same_screen_finer(viewer: HeadlessViewer) -> None:
+    viewer.do(Notify(Notice("A notice that is long enough to be wrapped into a second line of text, at any size.")))
+    small = viewer.screen(SIZE).astype(float)
+    viewer.do(SetFontScale(2.0))
+    large = viewer.screen((2 * SIZE[0], 2 * SIZE[1])).astype(float)
+    halved = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3))
+    layout = layout_of(SIZE, (96, 64))
+    assert layout.picture is not None
+    beside = small.copy()
+    np.copyto(beside, halved, where=_blurred(np.abs(halved - small).max(axis=2) < 60)[..., None])
+    assert (np.abs(beside - halved).max(axis=2) > 0).mean() < 0.01, "lines broke elsewhere or widgets moved"
+
+
+def _blurred(same: np.ndarray) -> np.ndarray:
+    """True where the pixel or one of its neighbours is the same: glyphs lie up to a pixel elsewhere."""
+    padded = np.pad(same, 1)
+    height, width = same.shape
+    return np.any([padded[y : y + height, x : x + width] for y in range(3) for x in range(3)], axis=0)
+
+
+def test_an_empty_window_lists_recent_files(viewer: HeadlessViewer) -> None:
+    viewer.state = replace(AppState(), recent=())
+    before = viewer.screen(SIZE).astype(int)
+    viewer.state = replace(AppState(), recent=("/photos/garden.jpg", "/photos/bridge.jpg"))
+    assert (np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24).sum() > 3 * ENOUGH_PIXELS
+
+
+def test_settings_on_offer_have_a_button(viewer: HeadlessViewer) -> None:
+    plain = Notice("This picture was saved by iibr.")
+    offer = replace(plain, offer=SavedSettings(viewer.state.optics, 1.0, Source(""), (1, 1)))
+    viewer.do(Notify(plain))
+    assert changed_after(viewer, DismissNotice(plain), Notify(offer)).sum() > 5 * ENOUGH_PIXELS

@@ -1,0 +1,37 @@
+"""A sheet of small pictures that shows on paper what the window shows in motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.types import ViewOffset
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import MoveEye, ResetOptics, SetAperture, SetFocus
+from viewer.model.lens.limits import aperture_limit
+
+TILE_WIDTH = 480
+GAP = 8
+
+
+def contact_sheet(viewer: HeadlessViewer) -> NDArray[np.uint8]:
+    """Two rows of three: the viewpoint from left to right, and the focus from near to far with an open aperture."""
+    scene = viewer.state.scene
+    assert scene is not None
+    size = (TILE_WIDTH, max(round(TILE_WIDTH * scene.height / scene.width), 1))
+    reach = scene.grid.columns // 2
+    far, near = scene.disparity_range_px
+    viewpoints = [(MoveEye(ViewOffset(0, s)),) for s in (-reach, 0, reach)]
+    focused = [(SetFocus(d), SetAperture(0.8 * aperture_limit(scene.grid))) for d in (near, (near + far) / 2, far)]
+    tiles = []
+    for actions in (*viewpoints, *focused):
+        viewer.do(ResetOptics(), *actions)
+        tiles.append(viewer.picture(size))
+    viewer.do(ResetOptics())
+    return _sheet(tiles, columns=3)
+
+
+def _sheet(tiles: list[NDArray[np.uint8]], columns: int) -> NDArray[np.uint8]:
+    framed = [np.pad(tile, ((GAP, 0), (GAP, 0), (0, 0))) for tile in tiles]
+    rows = [np.hstack(framed[i : i + columns]) for i in range(0, len(framed), columns)]
+    return np.pad(np.vstack(rows), ((0, GAP), (0, GAP), (0, 0)))

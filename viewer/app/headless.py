@@ -1,0 +1,151 @@
+"""The viewer without a window: the same worker's job, state, stage and panels, drawn into an image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from viewer.app.image_export import drawn_pixels
+from viewer.background.comparison_worker import Looker
+from viewer.background.scene_worker import Request, SceneReady, results_of
+from viewer.display.inspection_view import LightTable
+from viewer.display.scene_view import Stage
+from viewer.gpu.context import Backend, create_headless
+from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened
+from viewer.model.inspection_request import NO_AIDS, Aids, beside_of, wanted_inquiry
+from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterboxed
+from viewer.model.reducers.root import apply
+from viewer.model.state.app_state import CENTRE, AppState, Progress, Source
+from viewer.model.state.depth_editing import DepthWork
+from viewer.model.state.inspection import Probed
+
+LAYOUT_FRAMES = 3
+"""ImGui knows the size of a text only after it was built once."""
+
+
+class HeadlessViewer:
+    """Opens a scene to the end, then takes pictures of it. Use as a context manager."""
+
+    def __init__(self, backend: Backend = "auto") -> None:
+        """Make a GL context without a display. Raises InputError where that cannot be."""
+        self.state = AppState()
+        self._gl = create_headless(backend)
+        self._stage = Stage(self._gl)
+        self._table = LightTable(self._gl, self._stage)
+        self._looker = Looker()
+
+    def __enter__(self) -> HeadlessViewer:
+        """Nothing more to do."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Free everything."""
+        self._table.release()
+        self._stage.release()
+        self._gl.release()
+
+    @property
+    def has_panels(self) -> bool:
+        """Whether `screen` works here: ImGui's own OpenGL loader finds no functions in OSMesa."""
+        return self._gl.backend != "osmesa"
+
+    def open(
+        self,
+        source: Source,
+        depth_strength: float,
+        on_progress: Callable[[Progress], None],
+        edits: DepthEdits = UNEDITED,
+    ) -> None:
+        """Read and plan the scene, its depth edited so, and make all its views, telling how far it is.
+
+        Raises InputError.
+        """
+        self.state = AppState(depth_strength=depth_strength)
+        self.do(OpenPath(source))
+        on_progress(self.state.progress)
+        work = DepthWork(source.refine, edits)
+        request = Request(self.state.generation, source, depth_strength, work=work)
+        for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
+            if isinstance(result, SceneReady):
+                self._stage.open(result)
+                self._table.open()
+                self.do(SceneOpened(result.generation, result.scene))
+                self.state = replace(self.state, depth=work)
+            else:
+                self._stage.add(result.view)
+                self._table.add(result.view)
+                self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
+                on_progress(result.progress)
+            self._stage.upload_all()
+
+    def pick(self, x_px: float, y_px: float) -> float | None:
+        """Disparity seen at a pixel of the picture from the present viewpoint; None where the scene has none."""
+        return self._stage.pick(self.state.optics.eye, x_px, y_px)
+
+    def do(self, *actions: Action) -> None:
+        """Change the state."""
+        for action in actions:
+            self.state = apply(self.state, action)
+
+    def picture(self, size: tuple[int, int] | None = None, as_float: bool = False) -> NDArray[Any]:
+        """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3).
+
+        sRGB-encoded, uint8 or float32 with 1 = white. Raises InputError for absurd sizes.
+        """
+        scene = self.state.scene
+        assert scene is not None
+        width, height = size or (scene.width, scene.height)
+        box = letterboxed(Rect(0, 0, width, height), (scene.width, scene.height))
+        assert box is not None
+        layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
+        image = np.empty((height, width, 3), np.float32 if as_float else np.uint8)
+        image[:] = BACKGROUND[:3] if as_float else np.round(np.array(BACKGROUND[:3]) * 255)
+        assert layout.picture_px is not None
+        x, y, box_width, box_height = layout.picture_px
+        pixels = drawn_pixels(self._stage, self.state, (box_width, box_height), as_float)
+        image[y : y + box_height, x : x + box_width] = pixels
+        return image
+
+    def screen(self, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
+        from viewer.ui.host import UiHost  # pictures alone need no ImGui
+        from viewer.ui.screen import build_screen
+        from viewer.ui.style import Look
+
+        scene, preferences = self.state.scene, self.state.preferences
+        look = Look(preferences.font_scale, preferences.theme)
+        picture_size = (scene.width, scene.height) if scene else None
+        layout = layout_of(size, picture_size, ui_scale=look.ui_scale, beside=beside_of(self.state))
+        has_picture = layout.picture_px and self._stage.converge(self.state, layout.picture_px[2:])
+        texture = self._stage.texture if has_picture else None
+        aids = self._inspected(layout) if has_picture else NO_AIDS
+        target = self._gl.ctx.simple_framebuffer(size, 4)
+        ui = UiHost(look)
+        try:
+            for _ in range(LAYOUT_FRAMES):
+                ui.begin(layout, look)
+                build_screen(self.state, layout, texture, aids)
+                ui.end()
+                target.use()
+                ui.draw()
+            rows = np.frombuffer(target.read(components=3), np.uint8)
+        finally:
+            ui.release()
+            target.release()
+        return rows.reshape(size[1], size[0], 3)[::-1]
+
+    def _inspected(self, layout: Layout) -> Aids:
+        """What inspection shows, worked out to the end. The pointer is where the state says."""
+        inquiry = wanted_inquiry(self.state, is_moving=False, before=None)
+        inputs = self._table.inputs(inquiry, self.state)
+        if inquiry is not None and inputs is not None:
+            for seen in self._looker.seen(inquiry, inputs, lambda: False):
+                self.do(*self._table.take(seen))
+        self.do(Probed(self._table.probe(self.state)))
+        return self._table.draw(self.state, layout)

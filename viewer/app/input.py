@@ -1,0 +1,310 @@
+"""Mouse, keys and dropped files -> actions. Reading ImGui's input is one function; judging it another, a pure one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+from iibr_core.types import ViewOffset
+from viewer.model.actions import (
+    Action,
+    DoTask,
+    EndGesture,
+    FocusOn,
+    MoveEye,
+    MoveTiltHandle,
+    OpenPath,
+    Quit,
+    ReturnHome,
+    SetFocus,
+    SetHover,
+    ShowPrompt,
+)
+from viewer.model.commands import BY_NAME, COMMANDS, Chord
+from viewer.model.inspection_request import view_at
+from viewer.model.layout import Layout, Rect, pixel_at
+from viewer.model.lens.focal_plane import handle_points, place_of
+from viewer.model.lens.limits import focus_limits
+from viewer.model.state.app_state import (
+    CENTRE,
+    AppState,
+    Hover,
+    ReadTruthTask,
+    Scene,
+    Source,
+    source_beside,
+    source_with_map,
+)
+from viewer.model.state.depth_editing import DropStroke, Paint, SetBrush
+from viewer.model.state.inspection import MoveDivider, ShowGrid
+
+DRAG_THRESHOLD = 4.0
+"""A press that moved farther than this (window units) is a drag, not a click."""
+
+DRAG_ACROSS_GRID = 0.6
+"""The share of the picture's width that a drag takes from one side of the grid to the other, at least."""
+
+FOCUS_STEPS = 40
+"""Notches of the wheel from the nearest focus to the farthest."""
+
+BRUSH_NOTCH = 1.15
+"""A notch of the wheel makes the brush so many times as large."""
+
+ARROW_STEP_VIEWS = 0.5
+HANDLE_REACH = 14.0
+"""A press this close to a tilt handle (window units at usual size) takes it."""
+
+DIVIDER_REACH = 8.0
+"""A press this close to the divider takes it."""
+
+DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """The mouse as seen in one frame, in window units; steps are how far it moved since the frame before."""
+
+    x: float = 0.0
+    y: float = 0.0
+    step_x: float = 0.0
+    step_y: float = 0.0
+    drag_distance: float = 0.0
+    pressed_x: float = 0.0
+    pressed_y: float = 0.0
+    is_down: bool = False
+    is_pressed: bool = False
+    is_released: bool = False
+    clicks: int = 0
+    wheel: float = 0.0
+    is_over_panel: bool = False
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The keys of this frame that mean something: arrows as a view offset, Esc, and commands by name."""
+
+    arrows: ViewOffset = CENTRE
+    is_escape: bool = False
+    commands: tuple[str, ...] = ()
+
+
+Pick = Callable[[float, float], float | None]
+"""Disparity at a pixel of the picture, or None."""
+
+
+def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
+    """What the mouse asks for. Drags and clicks count where they began in the picture; the panel's never arrive."""
+    scene, picture = state.scene, layout.picture
+    if scene is None or picture is None or pointer.is_over_panel:
+        return []
+    if state.inspection.shows_grid:
+        return _on_sheet(pointer, layout, scene, picture)
+    if is_brushing(state):
+        return _brushed(pointer, layout, state, scene, picture, pick)
+    if pointer.wheel and picture.contains(pointer.x, pointer.y):
+        low, high = focus_limits(scene)
+        return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
+    if not picture.contains(pointer.pressed_x, pointer.pressed_y):
+        return []
+    if pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD:
+        return _drag(pointer, layout, state, scene, picture, pick)
+    if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
+        if _takes_divider(pointer, layout, state, picture):
+            return []
+        if pointer.clicks > 1:
+            return [ReturnHome()]
+        at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        picked = pick(*at)
+        return [] if picked is None else [FocusOn(place_of(*at, scene), picked)]
+    return []
+
+
+def gesture_start(pointer: Pointer, state: AppState) -> list[Action]:
+    """What a press ends: more of the same kind is another edit from here on. Goes before the frame's edits."""
+    return [EndGesture()] if pointer.is_pressed and state.history.gesture else []
+
+
+def gesture_end(pointer: Pointer) -> list[Action]:
+    """What letting go ends. Goes after the frame's edits."""
+    return [EndGesture()] if pointer.is_released else []
+
+
+def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
+    """Tell where the pointer is in the picture, if that is news. While it drags it points at nothing."""
+    scene, picture = state.scene, layout.picture
+    hover = None
+    is_pointing = (
+        not pointer.is_over_panel
+        and not state.inspection.shows_grid
+        and (is_brushing(state) or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
+    )
+    if scene is not None and picture is not None and is_pointing and picture.contains(pointer.x, pointer.y):
+        x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        hover = Hover(x_px, y_px, pick(x_px, y_px))
+    return [SetHover(hover)] if hover != state.hover else []
+
+
+def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
+    """What the keys ask for. Esc closes what is open in the window first."""
+    actions: list[Action] = []
+    if keys.is_escape:
+        actions.append(_closed(state))
+    actions += [BY_NAME[name].action(state) for name in keys.commands]
+    if any(keys.arrows):
+        eye = state.optics.eye
+        step = ARROW_STEP_VIEWS
+        actions.append(MoveEye(ViewOffset(eye.t + step * keys.arrows.t, eye.s + step * keys.arrows.s)))
+    return actions
+
+
+def _closed(state: AppState) -> Action:
+    """What Esc closes: a prompt, the sheet of views, a stroke, the brush, then the program."""
+    if state.prompt is not None:
+        return ShowPrompt(None)
+    if state.stroke is not None:
+        return DropStroke()
+    if state.brush.is_on and not state.inspection.shows_grid:
+        return SetBrush(replace(state.brush, is_on=False))
+    return ShowGrid(False) if state.inspection.shows_grid else Quit()
+
+
+def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bool = False) -> list[Action]:
+    """Open the dropped photo, with a disparity map dropped along; a map alone is for the photo that is open.
+
+    is_ground_truth: it was dropped where ground truth is.
+    """
+    if is_ground_truth and state.scene is not None:
+        return [DoTask(ReadTruthTask(paths[0]))]
+    maps = [path for path in paths if PurePath(path).suffix.lower() in DISPARITY_SUFFIXES]
+    others = [path for path in paths if path not in maps]
+    if others:
+        source = source_beside(state.source, others[0])
+        return [OpenPath(source_with_map(source, maps[0]) if maps else source)]
+    if maps and state.source:
+        return [OpenPath(source_with_map(state.source, maps[0]))]
+    return [OpenPath(Source(path)) for path in maps[:1]]
+
+
+def is_brushing(state: AppState) -> bool:
+    """Whether dragging over the picture paints."""
+    return state.brush.is_on and state.scene is not None and state.scene.plan is not None
+
+
+def _brushed(
+    pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
+) -> list[Action]:
+    """Paint on the surface under the pointer, wherever it lies in the photo; the wheel makes the brush larger."""
+    if pointer.wheel and picture.contains(pointer.x, pointer.y):
+        return [SetBrush(replace(state.brush, radius=state.brush.radius * BRUSH_NOTCH**pointer.wheel))]
+    begins = pointer.is_pressed and picture.contains(pointer.pressed_x, pointer.pressed_y)
+    if not pointer.is_down or not (begins or state.stroke is not None):
+        return []
+    x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+    disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
+    x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
+    return [Paint(((x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height))]
+
+
+def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:
+    """The divider or a tilt handle where one was taken, else the viewpoint."""
+    if _takes_divider(pointer, layout, state, picture):
+        return [MoveDivider((pointer.x - picture.x) / picture.width)]
+    index = _taken_handle(pointer, layout, state, picture)
+    if index is not None:
+        at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        return [MoveTiltHandle(index, place_of(*at, scene), pick(*at))]
+    return _eye_drag(pointer, layout, scene, state.optics.eye)
+
+
+def _takes_divider(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> bool:
+    """Whether the press was close to the divider, or it is dragged already."""
+    inspection = state.inspection
+    if inspection.comparison is None:
+        return False
+    x = picture.x + inspection.divider * picture.width
+    return inspection.divider_taken or abs(pointer.pressed_x - x) <= DIVIDER_REACH * layout.ui_scale
+
+
+def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, picture: Rect) -> list[Action]:
+    """Go to the view that was clicked."""
+    is_click = pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD
+    view = view_at(picture, scene.grid, layout.ui_scale, pointer.x, pointer.y) if is_click else None
+    return [] if view is None else [MoveEye(scene.grid.offset(*view))]
+
+
+def _taken_handle(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> int | None:
+    """Which tilt handle is dragged: the one taken already, else the nearer one the press was close to."""
+    handles = state.tilt_handles
+    if handles is None:
+        return None
+    if handles.taken is not None:
+        return handles.taken
+    distances = [math.hypot(x - pointer.pressed_x, y - pointer.pressed_y) for x, y in handle_points(handles, picture)]
+    nearest = distances.index(min(distances))
+    return nearest if distances[nearest] <= HANDLE_REACH * layout.ui_scale else None
+
+
+def _eye_drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -> list[Action]:
+    """Content follows the hand: a point of disparity d goes d px left for a step right, so the eye goes against it."""
+    if not (pointer.step_x or pointer.step_y):
+        return []
+    per_view = units_per_view(layout, scene)
+    return [MoveEye(ViewOffset(eye.t - pointer.step_y / per_view, eye.s - pointer.step_x / per_view))]
+
+
+def units_per_view(layout: Layout, scene: Scene) -> float:
+    """Window units of drag for one view step.
+
+    As far as the nearest surface moves on screen, so that it sticks to the pointer; but no finer than crosses the grid
+    in `DRAG_ACROSS_GRID` of the picture, or scenes of little parallax would be too touchy.
+    """
+    assert layout.picture is not None
+    nearest = scene.disparity_range_px[1] * layout.picture.width / scene.width
+    return max(nearest, DRAG_ACROSS_GRID * layout.picture.width / max(scene.grid.columns - 1, 1))
+
+
+def read_pointer() -> Pointer:
+    """The mouse of this ImGui frame."""
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    moved = imgui.get_mouse_drag_delta(imgui.MouseButton_.left, 0.0)
+    return Pointer(
+        x=io.mouse_pos.x,
+        y=io.mouse_pos.y,
+        step_x=io.mouse_delta.x,
+        step_y=io.mouse_delta.y,
+        drag_distance=float(io.mouse_drag_max_distance_sqr[0]) ** 0.5,
+        pressed_x=io.mouse_pos.x - moved.x,
+        pressed_y=io.mouse_pos.y - moved.y,
+        is_down=bool(io.mouse_down[0]),
+        is_pressed=bool(io.mouse_clicked[0]),
+        is_released=bool(io.mouse_released[0]),
+        clicks=int(io.mouse_clicked_last_count[0]),
+        wheel=io.mouse_wheel,
+        is_over_panel=io.want_capture_mouse,
+    )
+
+
+def read_keys() -> Keys:
+    """The keys of this ImGui frame; none while a text field has them."""
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    if io.want_text_input:
+        return Keys()
+
+    def pressed(key: imgui.Key) -> bool:
+        return imgui.is_key_pressed(key)
+
+    def is_struck(chord: Chord) -> bool:
+        holds = bool(io.key_ctrl or io.key_super) == chord.ctrl and bool(io.key_shift) == chord.shift
+        return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key))
+
+    down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
+    right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
+    commands = tuple(command.name for command in COMMANDS if any(map(is_struck, command.chords)))
+    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False))
+    return Keys(ViewOffset(float(down), float(right)), is_escape, commands)

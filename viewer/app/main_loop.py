@@ -1,0 +1,315 @@
+"""The window's loop, and nothing else: poll, drain results, panels and input, apply actions, draw if changed, sleep."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from iibr_core.types import InputError
+from viewer.app.input import (
+    Pointer,
+    actions_from_drop,
+    actions_from_hover,
+    actions_from_keys,
+    actions_from_pointer,
+    gesture_end,
+    gesture_start,
+    read_keys,
+    read_pointer,
+)
+from viewer.app.preferences_store import keep, with_kept
+from viewer.app.side_effects import Errands
+from viewer.app.window import Window, wake
+from viewer.background.comparison_worker import SecondLook
+from viewer.background.scene_worker import Doing, Request, Result, SceneReady, ViewReady, Worker
+from viewer.display.depth_preview import DepthPreview
+from viewer.display.inspection_view import LightTable
+from viewer.display.scene_view import VIEW_REFRESH_S, Stage
+from viewer.gpu.glfw_context import create_for_window
+from viewer.model.actions import (
+    Action,
+    DoTask,
+    Notify,
+    OpenFailed,
+    OpenPath,
+    PictureDrawn,
+    PlaceWindow,
+    ProgressMade,
+    Quit,
+    SceneOpened,
+    Tick,
+    WorkerLost,
+)
+from viewer.model.inspection_request import NO_AIDS, Aids, beside_of, wanted_inquiry
+from viewer.model.layout import Layout, layout_of
+from viewer.model.reducers.depth_editing import is_depth_ahead, work_asked_for
+from viewer.model.reducers.root import apply
+from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask
+from viewer.model.state.depth_editing import DepthWork, DropStroke
+from viewer.model.state.inspection import Probed
+from viewer.ui.host import UiHost
+from viewer.ui.screen import build_screen
+from viewer.ui.style import Look
+
+UPLOAD_BUDGET_S = 0.006
+IDLE_WAIT_S = 1.0
+"""Nothing is expected to happen unannounced; this only bounds the harm of a lost wake-up."""
+
+MOTION_FRAME_S = 1 / 60
+DIALOG_LOOK_S = 0.1
+"""How often an open file dialog is asked for its answer."""
+
+SETTLING_FRAMES = 3
+"""ImGui hands out quick events over several frames and lays out in two: so many must look the same before a sleep."""
+
+EMPTY = AppState()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Everything the window shows: picture and what inspection adds, panels (as a digest), where they lie, their look,
+    repairs asked for.
+    """
+
+    picture: Picture | None
+    aids: Aids
+    panels: bytes
+    layout: Layout
+    look: Look
+    damages: int
+
+
+class App:
+    """The viewer: one window, one worker. state changes only through `apply`; frames_shown counts what was shown."""
+
+    def __init__(self, state: AppState = EMPTY, kept_in: Path | None = None) -> None:
+        """Open the window. kept_in: folder of preferences and recent files; None keeps nothing.
+
+        Raises InputError where no window can be opened.
+        """
+        self.state = with_kept(state, kept_in) if kept_in else state
+        self.frames_shown = 0
+        self.window = Window("iibr", self.state.preferences.window)
+        try:
+            self._gl = create_for_window(self.window.handle)
+        except InputError:
+            self.window.close()
+            raise
+        self.stage = Stage(self._gl)
+        self.table = LightTable(self._gl, self.stage)
+        self._depth = DepthPreview(self.stage)
+        self._second_look = SecondLook(wake)
+        self._ui = UiHost(self.look(), self.window.handle)
+        self._worker = Worker(wake)
+        self._errands = Errands(self.stage)
+        self._kept_in = kept_in
+        self._kept_recent = self.state.recent
+        self._submitted = 0
+        self._work = DepthWork()
+        self._stopped: int | None = None
+        self._stepped_at = 0.0
+        self._shown: Frame | None = None
+        self._same_frames = 0
+        self._is_busy = True
+
+    def run(self) -> None:
+        """Show frames until the user quits."""
+        while not self.state.should_quit:
+            self.step()
+
+    def step(self) -> None:
+        """One turn of the loop; sleeps first where nothing was going on in the last ones."""
+        self.window.poll(self.wait_s)
+        heard = self._drained() + self._dropped() + self._happened()
+        self.do(*heard)
+        self._is_busy = self.stage.upload(UPLOAD_BUDGET_S) or bool(heard)
+        self._preview_depth()
+        layout, look = self.layout(), self.look()
+        picture = self.stage.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
+        if picture and self.stage.report != self.state.report:
+            self.do(PictureDrawn(self.stage.report))
+        aids = self.table.draw(self.state, layout) if picture else NO_AIDS
+        self._ui.begin(layout, look)
+        pointer = read_pointer()
+        actions = gesture_start(pointer, self.state)
+        actions += build_screen(self.state, layout, self.stage.texture if picture else None, aids)
+        actions += self._input(pointer, layout)
+        self._show(Frame(picture, aids, self._ui.end(), layout, look, self.window.damages))
+        self.do(*actions)
+        self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
+        self._is_busy |= bool(actions)
+        self._direct_worker()
+        self._keep_recent()
+
+    @property
+    def wait_s(self) -> float:
+        """How long the next turn may sleep before it looks."""
+        if self.state.motion.is_running:
+            return max(self._stepped_at + MOTION_FRAME_S - time.perf_counter(), 0.0)
+        if self._is_busy or self._same_frames < SETTLING_FRAMES:
+            return 0.0
+        if self._errands.is_waiting:
+            return DIALOG_LOOK_S
+        return IDLE_WAIT_S if self.stage.shows_all_views() else VIEW_REFRESH_S
+
+    def layout(self) -> Layout:
+        """Where things lie in the window as it is now."""
+        scene = self.state.scene
+        size = (scene.width, scene.height) if scene else None
+        beside = beside_of(self.state)
+        return layout_of(self.window.size, size, self.window.pixel_ratio, self.look().ui_scale, beside)
+
+    def look(self) -> Look:
+        """Theme, and size of text and widgets on this display."""
+        preferences = self.state.preferences
+        return Look(self.window.ui_scale * preferences.font_scale, preferences.theme)
+
+    def close(self) -> None:
+        """Stop the worker, keep what is kept, and free everything."""
+        self._worker.close()
+        self._second_look.close()
+        self._keep()
+        self._ui.release()
+        self.table.release()
+        self.stage.release()
+        self._gl.release()
+        self.window.close()
+
+    def do(self, *actions: Action) -> None:
+        """Change the state. What follows from it may take a few frames to be seen, see SETTLING_FRAMES."""
+        if actions:
+            self._same_frames = 0
+        for action in actions:
+            self.state = apply(self.state, action)
+        self._worker.eye = self.state.optics.eye
+
+    def _happened(self) -> list[Action]:
+        """What neither user nor worker says: the clock, errands done, the window moved, the worker lost."""
+        self._stepped_at = time.perf_counter()
+        actions = self._errands.run(self.state)
+        for seen in self._second_look.found():
+            actions += self.table.take(seen)
+        if self.state.motion.is_running:
+            actions.append(Tick(self._stepped_at))
+        place = self.window.place
+        if place is not None and place != self.state.preferences.window:
+            actions.append(PlaceWindow(place))
+        if self._worker.is_lost and self.state.stopped != self.state.generation == self._submitted:
+            actions.append(WorkerLost())
+        return actions
+
+    def _drained(self) -> list[Action]:
+        """The worker's results, as actions; the one place where they arrive."""
+        actions: list[Action] = []
+        while self.stage.has_room and (result := self._worker.next_result()) is not None:
+            actions += self._taken(result)
+        return actions
+
+    def _taken(self, result: Result) -> list[Action]:
+        try:
+            if isinstance(result, SceneReady):
+                self.stage.open(result)
+                self.table.open()
+                self.window.set_title(f"{result.scene.name} - iibr")
+                return [SceneOpened(result.generation, result.scene)]
+            if isinstance(result, ViewReady):
+                self.stage.add(result.view)
+                self.table.add(result.view)
+                view = result.view.row, result.view.column
+                return [ProgressMade(result.generation, result.progress, view)]
+            if isinstance(result, Doing):
+                return [ProgressMade(result.generation, result.progress)]
+        except InputError as error:  # no room on the graphics card: there is no use in more views
+            self._worker.cancel()
+            return [OpenFailed(result.generation, str(error))]
+        return [OpenFailed(result.generation, result.message)]
+
+    def _dropped(self) -> list[Action]:
+        paths = self.window.take_dropped()
+        is_inspecting = "inspect" in self.state.preferences.open_sections
+        on_panel = self.layout().panel.contains(*self.window.pointer)
+        return actions_from_drop(paths, self.state, is_inspecting and on_panel) if paths else []
+
+    def _input(self, pointer: Pointer, layout: Layout) -> list[Action]:
+        pick = partial(self.stage.pick, self.state.optics.eye)
+        actions = actions_from_pointer(pointer, layout, self.state, pick)
+        actions += actions_from_hover(pointer, layout, self.state, pick)
+        actions += actions_from_keys(read_keys(), self.state)
+        actions += gesture_end(pointer)
+        return [*actions, Quit()] if self.window.should_close else actions
+
+    def _inspect(self, is_moving: bool) -> None:
+        """Tell what is under the pointer, and have worked out what else is looked at."""
+        probe = self.table.probe(self.state)
+        if probe != self.state.inspection.probe:
+            self.do(Probed(probe))
+        before = self._second_look.wanted
+        inquiry = wanted_inquiry(self.state, is_moving, before)
+        if inquiry != before:
+            self._second_look.want(inquiry, self.table.inputs(inquiry, self.state))
+
+    def _direct_worker(self) -> None:
+        """A new generation is a new job, a stopped one is cancelled. The photo is read again only if one was opened."""
+        if self.state.stopped == self.state.generation != self._stopped:
+            self._worker.cancel()
+            self._stopped = self.state.stopped
+        if self.state.generation == self._submitted or self.state.source is None:
+            return
+        scene = self.state.scene
+        loaded = self.stage.loaded if scene and scene.source is self.state.source else None
+        if self.state.stroke is not None:
+            return  # it will be another one
+        self._submitted, self._work = self.state.generation, work_asked_for(self.state)
+        strength = self.state.depth_strength
+        self._worker.submit(Request(self.state.generation, self.state.source, strength, loaded, self._work))
+
+    def _preview_depth(self) -> None:
+        """While depth is edited, show it; the views of what it was before need not be made."""
+        if not is_depth_ahead(self.state, self._work):
+            return
+        self._worker.cancel()
+        try:
+            self._depth.update(self.state)
+        except InputError as error:
+            self.do(Notify(Notice(str(error), is_error=True)), DropStroke())
+
+    def _keep_recent(self) -> None:
+        """At once: they are what one misses after a crash."""
+        if self.state.recent != self._kept_recent:
+            self._kept_recent = self.state.recent
+            self._keep()
+
+    def _keep(self) -> None:
+        if self._kept_in is None:
+            return
+        try:
+            keep(self.state, self._kept_in)
+        except InputError as error:
+            self.do(Notify(Notice(str(error), is_error=True)))
+
+    def _show(self, frame: Frame) -> None:
+        if frame == self._shown or not all(self.window.framebuffer_size):
+            self._same_frames += 1
+            return
+        self._gl.ctx.screen.use()
+        self._ui.draw()
+        self.window.show_frame()
+        self._shown, self._same_frames = frame, 0
+        self.frames_shown += 1
+
+
+def run(state: AppState, kept_in: Path | None = None) -> None:
+    """Open the window on this state and show it until the user quits. Raises InputError where none can be opened."""
+    app = App(state, kept_in)
+    try:
+        app.run()
+    finally:
+        app.close()
+
+
+def opening(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
+    """The state to start with: nothing open yet, this asked for, and this light field to compare with."""
+    state = apply(AppState(depth_strength=depth_strength), action)
+    return apply(state, DoTask(ReadTruthTask(ground_truth))) if ground_truth else state

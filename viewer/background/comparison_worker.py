@@ -1,0 +1,223 @@
+"""Work beside the worker's: single views for comparisons, their scores, the entropy of weights. One thread.
+
+The newest inquiry wins. Rays and images are kept only as long as something is looked at. The core's heavy imports
+happen in the thread.
+"""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import stored_from_encoded
+from iibr_core.generation.plan import ScenePlan, plan_literal
+from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
+from viewer.background.loaded_photo import Loaded
+from viewer.background.scene_worker import message_of
+from viewer.model.inspection_request import Inquiry
+
+if TYPE_CHECKING:
+    from iibr_core.rendering.ray_set import RaySet
+    from iibr_core.rendering.view_synthesis import RenderedView
+
+Bytes = NDArray[np.uint8]
+EQUAL_PSNR_DB = float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What inquiries are made from: the photo and its plan, or the stored view (H, W, 3) of a light field from disk.
+
+    quality: of the scene's own views.
+    """
+
+    quality: Quality
+    loaded: Loaded | None = None
+    plan: ScenePlan | None = None
+    stored: StoredColors | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PairReady:
+    """Two images (H, W, 3), sRGB bytes, of the same view."""
+
+    inquiry: Inquiry
+    left: Bytes
+    right: Bytes
+
+
+@dataclass(frozen=True)
+class PairScored:
+    """How far the pair of this inquiry is apart: PSNR (infinite where equal), and the mean of FLIP."""
+
+    inquiry: Inquiry
+    psnr_db: float
+    flip: float
+
+
+@dataclass(frozen=True, eq=False)
+class EntropyReady:
+    """Entropy (H, W) of the view of this inquiry, 255 = 1."""
+
+    inquiry: Inquiry
+    entropy: Bytes
+
+
+@dataclass(frozen=True)
+class LookFailed:
+    """Nothing came of it; the message is one line for people."""
+
+    inquiry: Inquiry
+    message: str
+
+
+Seen = PairReady | PairScored | EntropyReady | LookFailed
+
+
+def psnr_db(left: Bytes, right: Bytes) -> float:
+    """Peak signal-to-noise ratio of sRGB bytes; infinite where they are equal."""
+    mean_square = np.mean(np.square(left.astype(np.float32) - right), dtype=np.float64)
+    return float(10 * np.log10(255**2 / mean_square)) if mean_square > 0 else EQUAL_PSNR_DB
+
+
+def mean_flip(reference: Bytes, image: Bytes) -> float:
+    """Mean of FLIP (LDR, usual viewing distance) between sRGB bytes (H, W, 3), 0 = no difference to be seen."""
+    from flip_evaluator import evaluate
+
+    _, mean, _ = evaluate(reference / np.float32(255), image / np.float32(255), "LDR", True, True)
+    return float(mean)
+
+
+class Looker:
+    """Carries inquiries out, in whatever thread calls it; keeps rays and the last pair from one inquiry to the next."""
+
+    def __init__(self) -> None:
+        self._rays: RaySet | None = None
+        self._rays_of: tuple[int, GridShape | None] | None = None
+        self._pair: PairReady | None = None
+
+    def forget(self) -> None:
+        """Free what is kept."""
+        self._rays = self._rays_of = self._pair = None
+
+    def seen(self, inquiry: Inquiry, inputs: Inputs, should_stop: Callable[[], bool]) -> Iterator[Seen]:
+        """What comes of a inquiry, in order. Raises InputError, or Cancelled once should_stop is true."""
+        if inquiry.kind == "entropy":
+            view = self._made(inquiry, inputs, "fast", should_stop)
+            assert view.entropy is not None
+            yield EntropyReady(inquiry, np.rint(np.clip(view.entropy, 0, 1) * 255).astype(np.uint8))
+            return
+        unscored = replace(inquiry, is_scored=False)
+        if self._pair is None or self._pair.inquiry != unscored:
+            self._pair = PairReady(unscored, *self._pair_of(inquiry, inputs, should_stop))
+            yield self._pair
+        if inquiry.is_scored and not should_stop():
+            left, right = self._pair.left, self._pair.right
+            yield PairScored(inquiry, psnr_db(left, right), mean_flip(right, left))
+
+    def _pair_of(self, inquiry: Inquiry, inputs: Inputs, should_stop: Callable[[], bool]) -> tuple[Bytes, Bytes]:
+        if inquiry.truth is not None:
+            from iibr_core.formats.light_fields.hci import read_view
+
+            truth = read_view(Path(inquiry.truth.path).expanduser(), *inquiry.view)
+            made = inputs.stored
+            if made is None:
+                made = _bytes_of(self._made(inquiry, inputs, inputs.quality, should_stop).colors)
+            if truth.shape != made.shape:
+                raise InputError(f"{inquiry.truth.path}: its views have changed; choose the folder again")
+            return _bytes_of(made), _bytes_of(truth)
+        fast, exact = (self._made(inquiry, inputs, quality, should_stop) for quality in ("fast", "exact"))
+        return _bytes_of(fast.colors), _bytes_of(exact.colors)
+
+    def _made(
+        self, inquiry: Inquiry, inputs: Inputs, quality: Quality, should_stop: Callable[[], bool]
+    ) -> RenderedView:
+        """The view by the ray set of the scene's plan, or at the ground truth's places; the middle one is the photo."""
+        from iibr_core.generation.light_field import ray_set, transformer_for
+        from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis
+
+        loaded, plan = inputs.loaded, inputs.plan
+        assert loaded is not None
+        assert plan is not None
+        grid = inquiry.truth.grid if inquiry.truth is not None else None
+        if grid is not None:
+            plan = plan_literal(loaded.photo, loaded.disparity, grid)
+        if inquiry.view == plan.grid.centre:
+            nothing = np.zeros(loaded.photo.size, np.float32)
+            nowhere = nothing.astype(np.bool_)
+            return RenderedView(loaded.photo.pixels, nothing, nowhere, nowhere, nothing)
+        if self._rays is None or self._rays_of != (inquiry.generation, grid):
+            self._rays = None  # two sets would be large
+            rays, farthest_views = ray_set(loaded.photo, plan.field_disparity(loaded.disparity), plan, should_stop)
+            for _ in farthest_views:
+                pass
+            self._rays, self._rays_of = rays, (inquiry.generation, grid)
+        transformer, every = transformer_for(quality), quality == "exact"
+        with ViewSynthesis(should_stop, transformer, every, keeps_entropy=inquiry.kind == "entropy") as synthesis:
+            return synthesis.render(self._rays, plan.grid.offset(*inquiry.view))
+
+
+class SecondLook:
+    """The thread that carries out the newest inquiry. wake is called, in that thread, when something was found."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self.wanted: Inquiry | None = None
+        self._wake = wake
+        self._looker = Looker()
+        self._found: queue.SimpleQueue[Seen] = queue.SimpleQueue()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="iibr-second-inquiry")
+
+    def want(self, inquiry: Inquiry | None, inputs: Inputs | None) -> None:
+        """Find this out instead of anything else; nothing happens if it is wanted already, or inputs are missing."""
+        if inquiry == self.wanted or (inquiry is not None and inputs is None):
+            return
+        self.wanted = inquiry
+        if inquiry is not None and inputs is not None:
+            self._thread.submit(self._carry_out, inquiry, inputs)
+        else:
+            self._thread.submit(self._looker.forget)
+
+    def found(self) -> list[Seen]:
+        """What came of the newest inquiry since the last call."""
+        found = []
+        while not self._found.empty():
+            found.append(self._found.get())
+        return [seen for seen in found if _is_of(seen.inquiry, self.wanted)]
+
+    def close(self) -> None:
+        """Stop, and wait for the thread to end."""
+        self.wanted = None
+        self._thread.shutdown(cancel_futures=True)
+
+    def _carry_out(self, inquiry: Inquiry, inputs: Inputs) -> None:
+        from iibr_core.runtime.tiling import Cancelled
+
+        try:
+            for seen in self._looker.seen(inquiry, inputs, lambda: self.wanted != inquiry):
+                self._tell(seen)
+        except Cancelled:
+            return
+        except Exception as error:  # the one place where it can still be shown to the user
+            self._tell(LookFailed(inquiry, message_of(error)))
+
+    def _tell(self, seen: Seen) -> None:
+        self._found.put(seen)
+        self._wake()
+
+
+def _is_of(inquiry: Inquiry, wanted: Inquiry | None) -> bool:
+    return wanted is not None and replace(inquiry, is_scored=wanted.is_scored) == wanted
+
+
+def _bytes_of(colors: StoredColors | FloatImage) -> Bytes:
+    """Stored or encoded colours as sRGB bytes; what exceeds white is white."""
+    if colors.dtype == np.uint8:
+        return np.asarray(colors, np.uint8)
+    return np.asarray(stored_from_encoded(colors.astype(np.float32), False), np.uint8)

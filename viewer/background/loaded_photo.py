@@ -1,0 +1,170 @@
+"""A photo and its disparity as the worker holds them: read once, then refined and edited as often as the user likes."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from iibr_core.depth.choice import DepthChoice, DepthOrigin
+from iibr_core.depth.editing.edits import UNEDITED, Levels, levels_of
+from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, ScenePlan, plan_for_viewing
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import Disparity, FloatImage, Photo
+from viewer.model.saved_settings import settings_text_in
+from viewer.model.state.app_state import Progress, Source
+from viewer.model.state.depth_editing import DepthWork
+
+if TYPE_CHECKING:
+    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.search import PhotoWithDepth
+
+TELL_EVERY_S = 0.1
+NOT_YET = 0.0
+"""Disparity is read as it is, and refined afterwards: so often as the user wants to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A photo as read and its disparity, kept so that another plan does not read them again.
+
+    disparity: what `work` made of what was `found`, by way of what was `refined`. origin: where it was found. settings:
+    text of the settings the photo was saved with by this program, "" without. models: names of the depth models on this
+    machine. levels: of what was refined. canvas: what the worker edits on; nobody else touches it.
+    """
+
+    photo: Photo
+    disparity: Disparity
+    origin: DepthOrigin
+    settings: str
+    models: tuple[str, ...]
+    work: DepthWork
+    found: Disparity
+    refined: Disparity
+    levels: Levels
+    canvas: DepthCanvas
+
+
+def load(
+    source: Source,
+    should_stop: ShouldStop = never,
+    tell: Callable[[Progress], None] = lambda progress: None,
+    work: DepthWork | None = None,
+) -> Loaded:
+    """Read a photo and find its disparity, telling what is going on, not more often than people can see.
+
+    work: what to make of the disparity, None for what the source says. Raises InputError, and Cancelled once
+    should_stop is true.
+    """
+    from iibr_core.depth.search import open_with_depth
+    from iibr_core.formats.images.heic import is_heic
+    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+
+    said_at: dict[str, float] = {}
+
+    def tell_at_times(doing: str, share: float) -> None:
+        now = time.perf_counter()
+        if now - said_at.get(doing, -math.inf) >= TELL_EVERY_S:
+            said_at[doing] = now
+            tell(Progress(doing=f"{doing}, {share:.0%}" if share else doing))
+
+    path = Path(source.path)
+    found = open_with_depth(
+        path,
+        DepthChoice(
+            source.depth_start,
+            source.disparity_path,
+            source.disparity_scale,
+            source.depth_model,
+            NOT_YET,
+            source.memory_bytes,
+        ),
+        source.max_pixels or DEFAULT_MAX_PIXELS,
+        source.grid,
+        should_stop,
+        tell_at_times,
+    )
+    # This program saves no HEIC.
+    settings = "" if is_heic(path) else settings_text_in(path)
+    return _with_work(found, settings, _models_here(), work or DepthWork(source.refine), should_stop)
+
+
+def worked(loaded: Loaded, work: DepthWork, should_stop: ShouldStop = never) -> Loaded:
+    """The same with something else made of its disparity; only what changed is worked out.
+
+    Raises InputError, and Cancelled once should_stop is true.
+    """
+    if loaded.work == work:
+        return loaded
+    if loaded.work.refine != work.refine:
+        loaded = _refined(loaded, work.refine, should_stop)
+    values = loaded.canvas.shown(work.edits)
+    return replace(loaded, work=work, disparity=replace(loaded.refined, values=values))
+
+
+def planned(source: Source, loaded: Loaded, depth_strength: float) -> ScenePlan:
+    """The plan for viewing. What was not edited keeps its parallax: clips and strokes must not move all the rest.
+
+    Raises InputError where an override is out of range.
+    """
+    zero = source.focus_disparity
+    if loaded.work.edits != UNEDITED:
+        zero = still_disparity(source, loaded.canvas.before_strokes(loaded.work.edits))
+        range_px, edited_px = (_robust_range(map_.values) for map_ in (loaded.refined, loaded.disparity))
+        depth_strength *= edited_px / range_px if range_px else 1.0
+    overrides = PlanOverrides(source.grid, depth_strength, zero, source.memory_bytes)
+    return plan_for_viewing(loaded.photo, loaded.disparity, overrides)
+
+
+def still_disparity(source: Source, before_strokes: FloatImage) -> float:
+    """The disparity (as given) of the plane that stays still, wherever the brush goes."""
+    return float(np.median(before_strokes)) if source.focus_disparity is None else source.focus_disparity
+
+
+def prepare_brush() -> None:
+    """Have the brush compiled, so that the first stroke does not wait for it."""
+    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
+
+    strokes = tuple(Stroke(tool, ((0.5, 0.5),), 0.1, 0.5) for tool in BRUSH_TOOLS)
+    DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).shown(DepthEdits(strokes=strokes))
+
+
+def _with_work(
+    found: PhotoWithDepth, settings: str, models: tuple[str, ...], work: DepthWork, should_stop: ShouldStop
+) -> Loaded:
+    from iibr_core.depth.editing.brush import DepthCanvas
+
+    values = found.disparity
+    canvas = DepthCanvas(found.photo.pixels, values.values)
+    as_found = DepthWork(NOT_YET)
+    levels = levels_of(values.values)
+    loaded = Loaded(found.photo, values, found.origin, settings, models, as_found, values, values, levels, canvas)
+    return worked(loaded, work, should_stop)
+
+
+def _refined(loaded: Loaded, strength: float, should_stop: ShouldStop) -> Loaded:
+    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.refine import refine
+
+    values = loaded.found.values
+    if strength > 0:
+        values = refine(loaded.photo.pixels, values, strength, should_stop)
+    canvas = DepthCanvas(loaded.photo.pixels, values)
+    return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)
+
+
+def _robust_range(values: FloatImage) -> float:
+    low, high = np.percentile(values, ROBUST_PERCENTILES)
+    return float(high - low)
+
+
+def _models_here() -> tuple[str, ...]:
+    from iibr_core.depth.models.catalog import KNOWN_MODELS, cached_folder, is_installed
+
+    return tuple(model.name for model in KNOWN_MODELS if is_installed(model.package) and cached_folder(model))

@@ -1,0 +1,1 @@
+"""The `iibr` command: one file a command."""

@@ -1,0 +1,106 @@
+"""What `iibr evaluate` does: finds scenes, judges them, writes the report. Heavy imports wait."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args
+
+import typer
+
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.types import InputError, Quality
+from viewer.cli.options import DepthModel, MaxPixels, Refine, quality_from_text
+from viewer.cli.terminal import print_notes, progress_shown
+
+if TYPE_CHECKING:
+    from iibr_core.evaluation.trials import DisparityFrom
+
+
+def evaluate(
+    datasets: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DATASET...",
+            help="Folders: HCI, Stanford archive, Heber, LLFF, Middlebury, views/v00_u00.png ..., or of such folders.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report (JSON, Markdown, HTML).")],
+    disparity: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|gt|estimate|FILE",
+            help="Of the given view: the data set's (gt), estimated from the photo, a file; auto: gt if there is one.",
+        ),
+    ] = "auto",
+    quality: Annotated[
+        list[Any] | None,
+        typer.Option(
+            "--quality",
+            parser=quality_from_text,
+            metavar="fast|balanced|exact",
+            help="Judge this one; may be given several times.",
+            show_default="all",
+        ),
+    ] = None,
+    depth_model: DepthModel = None,
+    refine: Refine = 1.0,
+    views: Annotated[
+        int | None, typer.Option(min=1, help="Judge at most so many views of a scene.", show_default="all")
+    ] = None,
+    max_pixels: MaxPixels = None,
+    lpips: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="LPIPS too: its alex.pth and torchvision's alexnet-*.pth.", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Judge views against data sets whose true views are known, beside a plain warp and beside doing nothing.
+
+    Example: iibr evaluate hci/dino hci/cotton --out report
+    """
+    from iibr_core.evaluation.packages import require_packages
+
+    require_packages("scipy", "skimage")
+    from iibr_core.evaluation.datasets import find_scenes
+    from iibr_core.evaluation.protocol import QUALITIES, Options
+    from iibr_core.evaluation.protocol import evaluate as judge
+    from iibr_core.evaluation.report import require_report_folder, write_report
+    from iibr_core.evaluation.tables import summary_line
+    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+
+    require_report_folder(out)
+    chosen: tuple[Quality, ...] = tuple(dict.fromkeys(quality)) if quality else QUALITIES
+    options = Options(
+        _source(disparity), DepthChoice(model=depth_model, refine=refine), chosen,
+        max_pixels or DEFAULT_MAX_PIXELS, views, lpips,
+    )  # fmt: skip
+    scenes = [scene for folder in datasets for scene in find_scenes(folder)]
+    judgements = []
+    with progress_shown("reading") as show:
+        for scene in scenes:
+            found = judge(scene, options, lambda done, total, doing: show(done, total, doing))
+            judgements += found
+    for judgement in judgements:
+        print(summary_line(judgement))
+    notes = dict.fromkeys(f"{judgement.scene}: {note}" for judgement in judgements for note in judgement.notes)
+    print_notes(tuple(notes))
+    write_report(out, judgements, shlex.join(["iibr", *sys.argv[1:]]))
+    print(out / "index.html")
+
+
+def _source(text: str) -> DisparityFrom | Path:
+    """Where disparity comes from. Raises InputError for what is neither a word nor a file."""
+    from iibr_core.evaluation.trials import DisparityFrom
+
+    words: tuple[DisparityFrom, ...] = get_args(DisparityFrom)
+    for word in words:
+        if text == word:
+            return word
+    path = Path(text)
+    if not path.is_file():
+        raise InputError(f"--disparity {text}: is no file; give {', '.join(words)} or a disparity map")
+    return path

@@ -1,0 +1,69 @@
+"""What `iibr models` does: list the depth models that are known and which of them are here; fetch one."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from iibr_core.depth.models.catalog import KnownModel
+
+EXIT_DECLINED = 1
+
+models = typer.Typer(invoke_without_command=True, help="Depth models: list them, or get one.")
+
+
+@models.callback()
+def list_models(context: typer.Context) -> None:
+    """List the depth models that are known, and which are on this machine.
+
+    Example: iibr models
+    """
+    if context.invoked_subcommand is not None:
+        return
+    from iibr_core.depth.models.catalog import KNOWN_MODELS
+
+    names = max(len(model.name) for model in KNOWN_MODELS)
+    for model in KNOWN_MODELS:
+        size = f"{model.megabytes:,} MB"
+        print(f"{model.name:{names}}  {size:>8}  {_state(model):12}  {model.licence}")
+    print("Get one: iibr models get NAME. Use one: --depth-model NAME, or --depth-model FOLDER for any other.")
+
+
+@models.command()
+def get(
+    name: Annotated[str, typer.Argument(help="As `iibr models` lists it.")],
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+) -> None:
+    """Download a depth model, after telling its size and licence.
+
+    Example: iibr models get depth-anything-v2-small
+    """
+    from iibr_core.depth.models.catalog import bytes_of, cached_folder, fetch, is_installed, known_model
+
+    model = known_model(name)
+    folder = cached_folder(model)
+    if folder is not None:
+        print(f"{model.title} is here already: {folder}")
+        return
+    about = (
+        f"{model.title}: about {model.megabytes:,} MB from huggingface.co/{model.repository}, licence {model.licence}"
+    )
+    print(about, file=sys.stderr)
+    if not yes and not typer.confirm("Download it?", err=True):
+        print("Nothing was downloaded.", file=sys.stderr)
+        raise typer.Exit(EXIT_DECLINED)
+    folder = fetch(model)
+    print(f"{folder} ({bytes_of(folder) / 1e6:,.0f} MB). Use it: iibr view PHOTO --depth-model {model.name}")
+    if not is_installed(model.package):
+        print(f"It also needs the package {model.package}: {model.install}")
+
+
+def _state(model: KnownModel) -> str:
+    from iibr_core.depth.models.catalog import cached_folder, is_installed
+
+    if cached_folder(model) is None:
+        return "not here"
+    return "here" if is_installed(model.package) else f"lacks {model.package}"

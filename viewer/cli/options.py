@@ -1,0 +1,169 @@
+"""The options that commands share, and their values from text, with errors that say what would be right."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, get_args
+
+import typer
+
+from iibr_core.depth.choice import DepthStart
+from iibr_core.types import GridShape, Quality, ViewOffset
+
+MAX_GRID = 99
+_UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
+
+
+class Size(NamedTuple):
+    """Of an image, in pixels."""
+
+    width: int
+    height: int
+
+
+def grid_from_text(text: str) -> GridShape:
+    """A grid of views: "9" is 9x9, "3x9" is 3 rows of 9. Raises BadParameter."""
+    match = re.fullmatch(r"(\d+)(?:x(\d+))?", text.strip())
+    grid = GridShape(int(match[1]), int(match[2] or match[1])) if match else GridShape(0, 0)
+    if not (1 <= grid.rows <= MAX_GRID and 1 <= grid.columns <= MAX_GRID):
+        raise typer.BadParameter(f"{text!r} is no grid of views: give 1 to {MAX_GRID}, as 9 or 3x9")
+    return grid
+
+
+def size_from_text(text: str) -> Size:
+    """A size from "1280x800". Raises BadParameter."""
+    match = re.fullmatch(r"(\d+)x(\d+)", text.strip())
+    size = Size(int(match[1]), int(match[2])) if match else Size(0, 0)
+    if not all(1 <= side <= 16384 for side in size):
+        raise typer.BadParameter(f"{text!r} is no size in pixels: give width x height, as 1280x800")
+    return size
+
+
+def view_from_text(text: str) -> ViewOffset:
+    """A view offset from "S,T": steps to the right, then down. Raises BadParameter."""
+    parts = text.split(",")
+    try:
+        s, t = (finite_from_text(part) for part in parts)
+    except (ValueError, typer.BadParameter):
+        raise typer.BadParameter(f"{text!r} is no viewpoint: give S,T in view steps, as 2,-1.5") from None
+    return ViewOffset(t, s)
+
+
+def quality_from_text(text: str) -> Quality:
+    """Where the ray transformer runs, by name. Raises BadParameter."""
+    qualities: tuple[Quality, ...] = get_args(Quality)
+    for quality in qualities:
+        if text == quality:
+            return quality
+    raise typer.BadParameter(f"{text!r} is no quality: give {', '.join(qualities[:-1])} or {qualities[-1]}")
+
+
+def finite_from_text(text: str) -> float:
+    """A finite number. Raises BadParameter."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise typer.BadParameter(f"{text!r} is no finite number")
+    return value
+
+
+def given_options(context: typer.Context) -> set[str]:
+    """Names of the options that were given rather than left at their defaults, as fields of `Source` where they are."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    names = {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
+    return names | {"memory_bytes"} if "memory" in names else names
+
+
+def memory_from_text(text: str) -> int:
+    """Bytes from "2G", "500M" or "1000000". Raises BadParameter."""
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)
+    memory = int(float(match[1]) * _UNITS[match[2].upper()]) if match else 0
+    if memory < 1:
+        raise typer.BadParameter(f"{text!r} is no amount of memory: give bytes, or as 500M or 2G")
+    return memory
+
+
+def depth_start_from_text(text: str) -> DepthStart:
+    """Where the search for depth begins, by name. Raises BadParameter."""
+    starts: tuple[DepthStart, ...] = get_args(DepthStart)
+    for start in starts:
+        if text == start:
+            return start
+    raise typer.BadParameter(f"{text!r} is no source of depth: give {', '.join(starts[:-1])} or {starts[-1]}")
+
+
+def refine_from_text(text: str) -> float:
+    """A strength from 0 (off) to 1 (on). Raises BadParameter."""
+    strength = {"on": 1.0, "off": 0.0}.get(str(text).lower())
+    strength = finite_from_text(text) if strength is None else strength
+    if not 0 <= strength <= 1:
+        raise typer.BadParameter(f"{text!r} is no strength: give on, off or a number from 0 to 1")
+    return strength
+
+
+def number_option(help_text: str) -> Any:
+    """An option that is any finite number."""
+    return typer.Option(parser=finite_from_text, metavar="X", help=help_text)
+
+
+PhotoPath = Annotated[Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP, HEIC).", show_default=False)]
+ScenePath = Annotated[Path, typer.Argument(help="A photo or a light-field folder.", show_default=False)]
+DisparityFile = Annotated[
+    Path | None,
+    typer.Option("--disparity", metavar="FILE", help="Disparity map: PFM, EXR, NPY or 16-bit PNG.", show_default=False),
+]
+DisparityScale = Annotated[
+    float, number_option("Multiply the disparity file's values by this (a 16-bit PNG needs it).")
+]
+DepthFrom = Annotated[
+    DepthStart,
+    typer.Option(
+        "--depth",
+        parser=depth_start_from_text,
+        metavar="auto|embedded|model|rough|flat",
+        help="Where the search for depth begins: a file (auto), the photo's own, a model, a guess; flat is none.",
+    ),
+]
+DepthModel = Annotated[
+    str | None,
+    typer.Option(
+        "--depth-model",
+        metavar="FOLDER|NAME",
+        help="Trained model for photos without depth, see `iibr models`.",
+        show_default="the usual one, if it is there",
+    ),
+]
+Refine = Annotated[
+    float,
+    typer.Option(
+        parser=refine_from_text,
+        metavar="on|off|0..1",
+        help="How far disparity edges are drawn to the photo's edges.",
+        show_default="on",
+    ),
+]
+DepthStrength = Annotated[float, number_option("Multiply the parallax the plan chose.")]
+FocusDisparity = Annotated[float | None, number_option("The disparity (as given) of the plane that stays still.")]
+Grid = Annotated[
+    GridShape | None,
+    typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.", show_default="the plan's"),
+]
+MaxPixels = Annotated[int | None, typer.Option(min=1, help="Larger photos are made smaller.", show_default="2000000")]
+Memory = Annotated[
+    int | None,
+    typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
+]
+
+QualityChoice = Annotated[
+    Quality,
+    typer.Option(
+        "--quality",
+        parser=quality_from_text,
+        metavar="fast|balanced|exact",
+        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere.",
+    ),
+]

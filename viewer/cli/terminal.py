@@ -1,0 +1,52 @@
+"""What commands say on stderr while they work: notes, where depth comes from, a bar."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from iibr_core.depth.choice import DepthOrigin
+
+
+class Commands(TyperGroup):
+    """Typer ends without a word when it is interrupted; this one aborts, and whoever runs it says so."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command. Raises typer.Abort for KeyboardInterrupt."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise typer.Abort from error
+
+
+def print_notes(notes: tuple[str, ...]) -> None:
+    """One line each."""
+    for note in notes:
+        print(f"note: {note}", file=sys.stderr)
+
+
+def print_depth(origin: DepthOrigin | None) -> None:
+    """One line about where depth comes from; none for light fields, and where the notes say it with advice."""
+    if origin is not None and not origin.advice:
+        print_notes((origin.line,))
+
+
+@contextmanager
+def progress_shown(doing: str) -> Iterator[Callable[..., None]]:
+    """A bar on stderr while the block runs; call what is yielded with (done, total, what is being done)."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(doing, total=None)
+
+        def show(done: int, total: int, now: str = "") -> None:
+            said = now or ("making views" if total else doing)
+            bar.update(task, completed=done, total=total or None, description=said)
+
+        yield show

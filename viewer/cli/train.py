@@ -1,0 +1,80 @@
+"""What `iibr train` does: the ray transformer, the training loop, a bar, and one line about how it ended.
+
+A module of its own because it imports torch; only the command itself imports it.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import torch
+
+from iibr_core.ray_transformer.model import RayTransformer
+from iibr_core.training import trainer
+from iibr_core.training.batches import training_batch
+from iibr_core.training.losses import LossWeights
+from iibr_core.training.trainer import Batch, TrainConfig
+
+LAMBDAS = LossWeights(entropy=0.01)
+"""The paper's 1 for the entropy outweighs the colours where hypotheses share a pixel, and makes edges ragged."""
+EXIT_DIVERGED = 1
+EXIT_INTERRUPTED = 130
+
+
+def train_weights(
+    steps: int, out: Path, seed: int, learning_rate: float, device: str, resume: bool, checkpoint_every: int
+) -> int:
+    """Train and write `out`; prints how it ended and returns the exit code. See `iibr_core.training.trainer.train`.
+
+    Raises InputError for a bad path, device, value or checkpoint.
+    """
+    config = TrainConfig(
+        steps,
+        seed,
+        learning_rate,
+        cosine_decay=True,
+        lambdas=LAMBDAS,
+        device=device,
+        checkpoint_every=checkpoint_every,
+    )
+    command = shlex.join(["iibr", *sys.argv[1:]])
+    published = command.replace(str(out), out.name)  # the folder is nobody's business
+    torch.manual_seed(seed)
+    model = RayTransformer()
+
+    def batches(step: int) -> Batch:
+        return training_batch(step, seed)
+
+    try:
+        with _bar_shown() as show:
+            trainer.train(model, batches, config, out, resume=resume, metadata={"command": published}, progress=show)
+    except KeyboardInterrupt:
+        if not trainer.checkpoint_path(out).is_file():
+            return _ended("interrupted before the first step was done", EXIT_INTERRUPTED)
+        again = command if resume else f"{command} --resume"
+        return _ended(f"interrupted; what was learned is saved, go on with: {again}", EXIT_INTERRUPTED)
+    except trainer.TrainingDiverged as error:
+        return _ended(str(error), EXIT_DIVERGED)
+    print(f"{out}: {out.stat().st_size / 1000:.1f} kB after {steps} steps")
+    return 0
+
+
+def _ended(message: str, code: int) -> int:
+    print(f"iibr: {message}", file=sys.stderr)
+    return code
+
+
+@contextmanager
+def _bar_shown() -> Iterator[Callable[[int, int, float], None]]:
+    """A bar on stderr while the block runs; call what is yielded with (step, steps, loss)."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[loss]}"), TimeRemainingColumn())
+    with Progress("training", *columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None, loss="")
+        yield lambda step, steps, loss: bar.update(task, completed=step, total=steps, loss=f"loss {loss:.4g}")

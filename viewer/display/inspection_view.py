@@ -1,0 +1,247 @@
+"""What inspection shows beside and over the picture, drawn from the stage's light field when its record changed.
+
+Everything is called from the one GL thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.types import ViewUpdate
+from viewer.background.comparison_worker import EntropyReady, Inputs, LookFailed, PairReady, PairScored, Seen
+from viewer.display.scene_view import Stage
+from viewer.gpu.context import GLContext
+from viewer.gpu.inspection_passes import Cell, InspectionPasses, Line, OverlayStyle
+from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.refocus.view_sampling import nearest_present
+from viewer.model.actions import Action, Notify
+from viewer.model.colormap import VIRIDIS
+from viewer.model.inspection_request import NO_AIDS, Aids, Inquiry, sheet_cells, view_near
+from viewer.model.layout import Layout, Rect
+from viewer.model.state.app_state import AppState, Hover, Notice, Scene
+from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
+
+INPAINTED_RGB = (255, 184, 60)
+
+
+@dataclass(frozen=True)
+class _Base:
+    """What images depend on: the field, how many of its views are there, brightness as a factor, how often edited depth
+    was shown in its place.
+    """
+
+    generation: int
+    views: int
+    exposure: float
+    previews: int
+
+
+class LightTable:
+    """Draws what the state asks for, and keeps what views say beside their colours."""
+
+    def __init__(self, gl: GLContext, stage: Stage) -> None:
+        self._stage = stage
+        self._passes = InspectionPasses(gl.ctx, stage.renderer.programs)
+        self._drawn: dict[str, tuple[object, int]] = {}
+        self._on_sheet: frozenset[ViewIndex] = frozenset()
+        self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
+        self._entropy: EntropyReady | None = None
+        self._pair: PairReady | None = None
+        self._probed: tuple[object, Probe | None] = (None, None)
+
+    def open(self) -> None:
+        """Another scene is on the stage."""
+        self._inpainted.clear()
+        self._drawn.clear()
+        self._entropy = self._pair = None
+
+    def add(self, view: ViewUpdate) -> None:
+        """Keep what of a view was inpainted, eight pixels a byte."""
+        if view.inpainted is not None:
+            self._inpainted[view.row, view.column] = np.packbits(view.inpainted, axis=1)
+
+    def draw(self, state: AppState, layout: Layout) -> Aids:
+        """Draw what changed and say where it is."""
+        scene, field = state.scene, self._stage.renderer.field
+        if scene is None or field is None or layout.picture_px is None or not field.present.any():
+            return NO_AIDS
+        exposure = 2.0**state.optics.exposure_stops
+        base = _Base(self._stage.generation, self._stage.views_present, exposure, self._stage.previews)
+        if field.grid != scene.grid:  # only the photo's own view is there, or what is being done to its depth
+            overlay = self._overlay(state, scene, field, layout.picture_px[2:], base)
+            return Aids(overlay=overlay, shown=(self._drawn["overlay"][0],) if overlay else ())
+        names = self._strips(state, scene, field, layout, base)
+        names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
+        names["overlay"] = self._overlay(state, scene, field, layout.picture_px[2:], base)
+        names |= self._compared(state, scene, field, base)
+        return Aids(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
+
+    def probe(self, state: AppState) -> Probe | None:
+        """What is known of the picture under the pointer, where that is asked for."""
+        scene, hover, field = state.scene, state.hover, self._stage.renderer.field
+        if scene is None or hover is None or field is None or not state.inspection.shows_values:
+            return None
+        asked = hover, state.optics, self._stage.generation, self._stage.views_present, self._stage.report
+        if self._probed[0] != asked:
+            self._probed = asked, self._found_at(hover, state, scene, field)
+        return self._probed[1]
+
+    def inputs(self, inquiry: Inquiry | None, state: AppState) -> Inputs | None:
+        """What this inquiry is made from; None while that is not there."""
+        scene, stage = state.scene, self._stage
+        if inquiry is None or scene is None or stage.generation != inquiry.generation or stage.renderer.field is None:
+            return None
+        if stage.loaded is not None and scene.plan is not None:
+            return Inputs(scene.source.quality, stage.loaded, scene.plan)
+        if stage.renderer.field.grid != scene.grid:
+            return None
+        stored = self._passes.read_view(stage.renderer.field, *inquiry.view)
+        return None if stored is None else Inputs(scene.source.quality, stored=stored)
+
+    def take(self, seen: Seen) -> list[Action]:
+        """Show what the second inquiry found."""
+        inquiry = seen.inquiry
+        match seen:
+            case PairReady():
+                self._pair = seen
+                return [PairCompared(Pair(inquiry.generation, _comparison_of(inquiry), inquiry.view))]
+            case PairScored(_, psnr_db, flip):
+                return [PairCompared(Pair(inquiry.generation, _comparison_of(inquiry), inquiry.view, psnr_db, flip))]
+            case EntropyReady():
+                self._entropy = seen
+                return []
+            case LookFailed(_, message):
+                off = SetOverlay(None) if inquiry.kind == "entropy" else Compare(None)
+                return [Notify(Notice(message, is_error=True)), off]
+
+    def release(self) -> None:
+        """Free the GL objects."""
+        self._passes.release()
+
+    def _once(self, name: str, record: object, draw: Callable[[], int]) -> int:
+        """The image of this name, drawn anew only if its record changed."""
+        if name not in self._drawn or self._drawn[name][0] != record:
+            self._drawn[name] = record, draw()
+        return self._drawn[name][1]
+
+    def _strips(
+        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _Base
+    ) -> dict[str, int | None]:
+        names: dict[str, int | None] = {"strip_across": None, "strip_down": None}
+        x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
+        row, column = view_near(state.optics.eye, scene.grid)
+        lines = (
+            ("strip_across", layout.strip_across, Line(row, (y + 0.5) / scene.height)),
+            ("strip_down", layout.strip_down, Line(column, (x + 0.5) / scene.width, is_upright=True)),
+        )
+        for name, rect, line in lines:
+            if rect is not None:
+                size_px = layout.in_pixels(rect)[2:]
+                draw = partial(self._passes.draw_epi, field, line, size_px, base.exposure)
+                names[name] = self._once(name, (base, line, size_px), draw)
+        return names
+
+    def _sheet(self, field: LightFieldTexture, layout: Layout, base: _Base) -> int:
+        """All views; those that came since the last time are added."""
+        assert layout.picture is not None
+        size_px = layout.in_pixels(layout.picture)[2:]
+        record = base.generation, base.exposure, size_px, field.stride
+        there = frozenset((int(row), int(column)) for row, column in np.argwhere(field.present))
+        old = self._drawn.get("sheet")
+        is_new = old is None or old[0] != (record, self._on_sheet)
+        name = self._passes.start_sheet(size_px) if is_new or old is None else old[1]
+        cells = sheet_cells(Rect(0, 0, *size_px), field.grid, layout.ui_scale * layout.pixel_ratio)
+        for i, cell in enumerate(cells):
+            view = divmod(i, field.grid.columns)
+            if is_new or (view in there and view not in self._on_sheet):
+                self._passes.draw_on_sheet(field, *view, _whole(cell), base.exposure)
+        self._on_sheet = there
+        self._drawn["sheet"] = (record, there), name
+        return name
+
+    def _overlay(
+        self, state: AppState, scene: Scene, field: LightFieldTexture, size_px: tuple[int, int], base: _Base
+    ) -> int | None:
+        kind, optics = state.inspection.overlay, state.optics
+        row, column = view_near(optics.eye, field.grid)
+        view: ViewIndex = tuple(nearest_present(field.present)[row, column].tolist())
+        if kind is None or not field.has_disparity[view] or (kind != "disparity" and field.grid != scene.grid):
+            return None
+        values: NDArray[np.uint8] | None = None
+        looked_up = None
+        if kind == "inpainted":
+            values = self._mask_of(view, field)
+        elif kind == "entropy":
+            if self._entropy is None or self._entropy.inquiry.generation != base.generation:
+                return None
+            looked_up, values = self._entropy.inquiry, self._entropy.entropy
+            view = looked_up.view
+        colors = (INPAINTED_RGB,) * len(VIRIDIS) if kind == "inpainted" else VIRIDIS
+        ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
+        ends = ends if ends[1] > ends[0] else (ends[0] - 0.5, ends[0] + 0.5)
+        record = base, kind, view, optics.eye, optics.dolly, size_px, state.inspection.opacity, looked_up
+        if not field.present[view]:
+            return None
+
+        def draw() -> int:
+            style = OverlayStyle(colors, ends, state.inspection.opacity, is_mask=kind == "inpainted")
+            return self._passes.draw_overlay(field, optics, view, size_px, style, values)
+
+        return self._once("overlay", record, draw)
+
+    def _mask_of(self, view: ViewIndex, field: LightFieldTexture) -> NDArray[np.uint8]:
+        packed = self._inpainted.get(view)
+        if packed is None:
+            return np.zeros((field.height, field.width), np.uint8)
+        return np.unpackbits(packed, axis=1, count=field.width) * np.uint8(255)
+
+    def _compared(self, state: AppState, scene: Scene, field: LightFieldTexture, base: _Base) -> dict[str, int | None]:
+        kind, pair = state.inspection.comparison, self._pair
+        if kind == "photo":
+            draw = partial(self._passes.draw_view, field, *scene.grid.centre, "photo", base.exposure)
+            return {"left": self._once("left", (base.generation, base.exposure), draw), "right": None}
+        if kind is None or pair is None or (pair.inquiry.generation, pair.inquiry.kind) != (base.generation, kind):
+            return {"left": None, "right": None}
+        left = self._once("left", (pair.inquiry, "left"), lambda: self._passes.show("left", pair.left))
+        right = self._once("right", (pair.inquiry, "right"), lambda: self._passes.show("right", pair.right))
+        return {"left": left, "right": right}
+
+    def _found_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
+        seen = None
+        if hover.disparity is not None and field.has_disparity.any():
+            shows = self._passes.seen_in(field, state.optics.eye, hover.x_px, hover.y_px, hover.disparity)
+            seen = int(shows.sum())
+        at = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
+        rgb = self._stage.renderer.read_pixel(*at)
+        return Probe(rgb, seen, int(field.present.sum()), self._origin(hover, state, scene, field))
+
+    def _origin(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Origin:
+        """By what the view nearest to the eye says of the surface under the pointer."""
+        if scene.plan is None:
+            return "stored"
+        eye = state.optics.eye
+        row, column = view_near(eye, scene.grid if field.grid == scene.grid else field.grid)
+        view: ViewIndex = tuple(nearest_present(field.present)[row, column].tolist())
+        packed = self._inpainted.get(view)
+        if packed is not None and hover.disparity is not None:
+            t, s = scene.grid.offset(*view)
+            x = round(hover.x_px - hover.disparity * (s - eye.s))
+            y = round(hover.y_px - hover.disparity * (t - eye.t))
+            if 0 <= x < scene.width and 0 <= y < scene.height and packed[y, x // 8] >> (7 - x % 8) & 1:
+                return "inpainted"
+        return "photo" if eye == scene.grid.offset(*scene.grid.centre) else "generated"
+
+
+def _comparison_of(inquiry: Inquiry) -> Comparison:
+    assert inquiry.kind != "entropy"
+    return inquiry.kind
+
+
+def _whole(cell: Rect) -> Cell:
+    left, top = round(cell.x), round(cell.y)
+    return Cell(left, top, max(round(cell.x + cell.width) - left, 1), max(round(cell.y + cell.height) - top, 1))

@@ -1,0 +1,216 @@
+"""The light field as it is on the graphics card, and the last picture drawn from it, with a window or headless.
+
+Views wait here until there is time to upload them; everything is called from the one GL thread.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import NDArray
+
+from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
+from viewer.background.loaded_photo import Loaded
+from viewer.background.scene_worker import SceneReady
+from viewer.display.picking import is_kept_for_picking, pick_disparity
+from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.state.app_state import CENTRE, AppState, DrawReport, Picture, Scene
+
+VIEW_REFRESH_S = 0.25
+"""While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
+
+STILL_BUDGET_S = 0.08
+"""For a picture that only new views change: no hand waits for it, and it is seen longer."""
+
+NO_MORE_VIEWS_S = 2.0
+"""After so long without a new view none is thought to be on its way."""
+
+WAITING_VIEWS = 4
+PREVIEW_GRID = GridShape(1, 1)
+
+
+class Stage:
+    """Holds the renderer and the views of the scene that is shown.
+
+    generation: whose views these are. previews: of edited depth shown so far. views_present: uploaded so far.
+    pictures_drawn: how often the picture was drawn.
+    """
+
+    def __init__(self, gl: GLContext) -> None:
+        self._gl = gl
+        self.renderer = Renderer(gl)
+        self.generation = 0
+        self.loaded: Loaded | None = None
+        self.views_present = 0
+        self.pictures_drawn = 0
+        self.previews = 0
+        self._scene: Scene | None = None
+        self._centre: ViewUpdate | None = None
+        self._is_preview = False
+        self._waiting: deque[ViewUpdate] = deque()
+        self._disparities: dict[ViewOffset, FloatImage] = {}
+        self._drawn: Picture | None = None
+        self._drawn_at = 0.0
+        self._view_came_at = 0.0
+
+    def open(self, ready: SceneReady) -> None:
+        """Show this scene from now on. Raises InputError where it does not fit the graphics card; the old one stays.
+
+        Its first view is shown in a field of its own until the second comes: making room for all takes a while.
+        """
+        scene = ready.scene
+        self._open_field(scene, PREVIEW_GRID)
+        self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
+        self.generation, self.loaded, self._scene, self._centre = ready.generation, ready.loaded, scene, ready.centre
+        self._is_preview = True
+        self.views_present = 1
+        self._waiting.clear()
+        self._disparities.clear()
+        self._keep_for_picking(scene, ready.centre)
+
+    def show_disparity(self, disparity: FloatImage) -> None:
+        """Show the photo warped by this field disparity (H, W) in place of its views, until those of a new plan come.
+
+        Raises InputError where the graphics card has no room.
+        """
+        scene, centre, field = self._scene, self._centre, self.renderer.field
+        assert scene is not None
+        assert centre is not None
+        assert field is not None
+        far, near = field.range_px
+        if not self._is_preview or disparity.min() < far or disparity.max() > near:
+            self._open_field(scene, PREVIEW_GRID)
+            self.views_present, self._is_preview = 1, True
+            self._waiting.clear()
+        self.renderer.upload_view(0, 0, centre.colors, disparity)
+        self._disparities = {CENTRE: disparity}
+        self.previews += 1
+
+    def add(self, view: ViewUpdate) -> None:
+        """Take a view of the present scene; it is uploaded later. Raises InputError where they do not fit all."""
+        scene = self._scene
+        assert scene is not None
+        if (view.row, view.column) == scene.grid.centre:
+            return  # there since the scene was opened
+        if self._is_preview and self._centre is not None:
+            self._open_field(scene, scene.grid)
+            self.renderer.upload_view(*scene.grid.centre, self._centre.colors, self._centre.disparity)
+            self._is_preview = False
+        self._waiting.append(view)
+        self._view_came_at = time.perf_counter()
+        self._keep_for_picking(scene, view)
+
+    @property
+    def has_room(self) -> bool:
+        """Whether more views may come; else they wait at the worker, who then pauses."""
+        return len(self._waiting) < WAITING_VIEWS
+
+    @property
+    def picture_drawn(self) -> Picture | None:
+        """The record of the picture drawn last, None before the first."""
+        return self._drawn
+
+    @property
+    def texture(self) -> int:
+        """GL name of the texture that holds the picture, rows bottom-up."""
+        return self.renderer.image_texture
+
+    def upload(self, budget_s: float) -> bool:
+        """Upload waiting views until the time is spent, at least one. True where some still wait."""
+        end = time.perf_counter() + budget_s
+        while self._waiting:
+            view = self._waiting.popleft()
+            self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
+            self.views_present += 1
+            if time.perf_counter() >= end:
+                break
+        return bool(self._waiting)
+
+    def upload_all(self) -> None:
+        """Upload every waiting view."""
+        while self.upload(math.inf):
+            pass
+
+    def pick(self, eye: ViewOffset, x_px: float, y_px: float) -> float | None:
+        """Disparity seen at a pixel of the picture; None where the scene has none."""
+        return pick_disparity(self._disparities, eye, x_px, y_px)
+
+    def draw(self, state: AppState, size_px: tuple[int, int]) -> Picture | None:
+        """Draw the picture this state asks for, unless it is there already; return its record, None without views."""
+        if self.views_present == 0:
+            return None
+        wanted = Picture(self.generation, self.views_present, state.optics, size_px, previews=self.previews)
+        budget_s = self._gl.frame_budget_s
+        if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
+            is_still = self._differs_by_views_only(wanted)
+            self.renderer.render_in_time(wanted.optics, wanted.size_px, STILL_BUDGET_S if is_still else budget_s)
+            self._drawn_at = time.perf_counter()
+            self.pictures_drawn += 1
+            self._drawn = replace(wanted, samples=self.report.samples)
+        elif self._is_same(wanted) and not self.renderer.is_converged and self._refines():
+            self.renderer.refine(budget_s)
+            self._drawn = replace(wanted, samples=self._drawn.samples + 1)
+        return self._drawn
+
+    def converge(self, state: AppState, size_px: tuple[int, int]) -> Picture | None:
+        """Like `draw`, with every sample the picture will ever get, however long that takes."""
+        if self.draw(state, size_px) is not None:
+            self.renderer.refine()
+        return self._drawn
+
+    def picture(self, state: AppState, size_px: tuple[int, int], is_linear: bool = False) -> NDArray[Any]:
+        """The converged picture of any size, (height, width, 3): uint8, sRGB-encoded, or float32 linear light.
+
+        Before the first view it is black. The window's own picture is drawn anew after this.
+        """
+        self._drawn = None
+        return self.renderer.converged_picture(state.optics, size_px, is_linear)
+
+    @property
+    def note(self) -> str:
+        """What of the scene the graphics card has no room for, a sentence for people; empty where it holds all."""
+        return self.renderer.note
+
+    @property
+    def report(self) -> DrawReport:
+        """What is known of the picture drawn last."""
+        return self.renderer.report
+
+    def shows_all_views(self) -> bool:
+        """Whether the picture last drawn knows every view uploaded."""
+        return self._drawn is None or self._drawn.views_present == self.views_present
+
+    def _open_field(self, scene: Scene, grid: GridShape) -> None:
+        self.renderer.open_field(grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity)
+
+    def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
+        if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):
+            self._disparities[scene.grid.offset(view.row, view.column)] = view.disparity
+
+    def _can_wait(self, wanted: Picture) -> bool:
+        """Whether only views are new, and the picture is too."""
+        return time.perf_counter() - self._drawn_at < VIEW_REFRESH_S and self._differs_by_views_only(wanted)
+
+    def _differs_by_views_only(self, wanted: Picture) -> bool:
+        if self._drawn is None:
+            return False
+        return replace(wanted, views_present=self._drawn.views_present, samples=self._drawn.samples) == self._drawn
+
+    def _is_same(self, wanted: Picture) -> bool:
+        """Whether the picture drawn last is this one, however far it has come."""
+        return self._drawn is not None and replace(wanted, samples=self._drawn.samples) == self._drawn
+
+    def _refines(self) -> bool:
+        """While views are being made, the processor has better things to do."""
+        scene = self._scene
+        has_all = scene is not None and self.views_present == scene.grid.rows * scene.grid.columns
+        return has_all or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
+
+    def release(self) -> None:
+        """Free the GL objects."""
+        self.renderer.release()

@@ -1,0 +1,1 @@
+"""Pictures through a lens, from stored views."""

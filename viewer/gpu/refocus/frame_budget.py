@@ -1,0 +1,126 @@
+"""What a picture drawn in a hurry leaves out, and how much of that the time allows. Plain numbers, no GL.
+
+Costs are counted in fetches of a texel; how long one takes is measured while drawing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.gpu.refocus.view_sampling import MAX_SOURCES
+
+
+@dataclass(frozen=True)
+class Haste:
+    """What is left out.
+
+    stride: view steps between samples of the aperture. sources: stored views that a pinhole view is made of, at most.
+    scale: of the picture's width and height.
+    """
+
+    stride: int = 1
+    sources: int = MAX_SOURCES
+    scale: float = 1.0
+
+
+NO_HASTE = Haste()
+HASTES = (
+    NO_HASTE,
+    Haste(sources=2),
+    Haste(sources=1),
+    Haste(sources=1, scale=0.7),
+    Haste(sources=1, scale=0.5),
+    Haste(2, 1, 0.7),
+    Haste(2, 1, 0.5),
+    Haste(3, 1, 0.5),
+    Haste(4, 1, 0.35),
+)
+"""From the best picture to the quickest. Fewer pixels show less than fewer samples: see docs/optics.md."""
+
+PICTURE_FETCHES, LAYERS_FETCHES = 4.0, 8.0
+PINHOLE_FETCHES, SOURCE_FETCHES = 4.0, 5.0
+DETOUR_FETCHES = 3.0
+OVERHEAD_S = 0.003
+"""What a picture takes however small it is."""
+
+BETTER_ONLY_WITHIN = 0.85
+"""Of the time: a picture near the limit would else change back and forth."""
+
+LATEST_COUNTS = 0.4
+"""How much the latest measurement counts against those before."""
+
+
+def stretched(image: NDArray[np.uint8], size_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it."""
+    rows, columns = (_taps(there, here) for there, here in zip(size_px[::-1], image.shape))
+    light = image.astype(np.float32)
+    light = light[rows[0]] + rows[2][:, None, None] * (light[rows[1]] - light[rows[0]])
+    light = light[:, columns[0]] + columns[2][:, None] * (light[:, columns[1]] - light[:, columns[0]])
+    return np.rint(light).astype(np.uint8)
+
+
+def _taps(there: int, here: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
+    """For each pixel there: the two beside its place here, and how much the second counts."""
+    places = np.clip((np.arange(there) + 0.5) * (here / there) - 0.5, 0, here - 1)
+    low = places.astype(np.intp)
+    return low, np.minimum(low + 1, here - 1), (places - low).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Work:
+    """What drawing a picture takes. samples: of the aperture, 0 without. sources: of the pinhole view, 0 without.
+
+    has_detours: whether views stand in for others. keeps_layers: see `Lens`. pixels: of the picture as drawn.
+    """
+
+    samples: int
+    sources: int
+    has_detours: bool
+    keeps_layers: bool
+    pixels: int
+
+    @property
+    def fetches(self) -> float:
+        """How many fetches of a texel it costs, about."""
+        of_samples = self.samples * (DETOUR_FETCHES if self.has_detours else 1.0)
+        of_pinhole = (PINHOLE_FETCHES + SOURCE_FETCHES * self.sources) * (1.5 if self.keeps_layers else 1.0)
+        of_picture = PICTURE_FETCHES + LAYERS_FETCHES * self.keeps_layers
+        return self.pixels * (of_picture + of_samples + of_pinhole * (self.sources > 0))
+
+    @property
+    def kind(self) -> tuple[bool, bool, bool, bool]:
+        """What sorts of work there are: the estimate of each is off in its own way."""
+        return self.samples > 0, self.sources > 0, self.has_detours, self.keeps_layers
+
+
+class Pace:
+    """How fast this machine draws. seconds_per_fetch: a first guess."""
+
+    def __init__(self, seconds_per_fetch: float) -> None:
+        self._guess = seconds_per_fetch
+        self._measured: dict[tuple[bool, bool, bool, bool], float] = {}
+
+    def seconds(self, work: Work) -> float:
+        """How long it will take, about."""
+        return OVERHEAD_S + self._measured.get(work.kind, self._guess) * work.fetches
+
+    def learn(self, work: Work, seconds: float) -> None:
+        """Take note of how long it took."""
+        before = self._measured.get(work.kind)
+        latest = max(seconds - OVERHEAD_S, 0.2 * seconds) / work.fetches
+        self._measured[work.kind] = latest if before is None else before + LATEST_COUNTS * (latest - before)
+
+
+def least_haste(work_in: Callable[[Haste], Work], pace: Pace, budget_s: float, before: int) -> int:
+    """Which of HASTES there is time for, as an index: the first, else the last. work_in: what each takes.
+
+    before: the one of the picture before; a better one is taken up only with time to spare.
+    """
+    for index, haste in enumerate(HASTES):
+        if pace.seconds(work_in(haste)) <= budget_s * (BETTER_ONLY_WITHIN if index < before else 1.0):
+            return index
+    return len(HASTES) - 1

@@ -1,0 +1,165 @@
+"""What the optics mean for one picture: numbers for the passes, worked out before anything is drawn. No GL."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.types import GridShape, ViewOffset
+from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.refocus.frame_budget import NO_HASTE, Haste
+from viewer.gpu.refocus.view_sampling import UNMOVED, ApertureSample, aperture_samples
+from viewer.model.state.app_state import ApertureShape, Optics
+
+HIGHLIGHT_GAIN = 15.0
+"""Full highlight recovery lets clipped pixels count for four stops more."""
+
+FADE_FROM_PX, FADE_TO_PX = 4.0, 6.0
+"""Over these widths of the whole blur, light moves from the sharp layer to those of half the size."""
+
+LEAST_ACROSS = 2.0
+"""Samples across the aperture, at least, however great the haste."""
+
+FEW_UP_TO_PX = 1.2
+"""As long as the whole blur of a tile is narrower, every other sample across and down shows the same."""
+
+
+class Cell(NamedTuple):
+    """A part of the picture in texture coordinates."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+
+WHOLE = Cell(0.0, 0.0, 1.0, 1.0)
+
+
+class Window(NamedTuple):
+    """The part of the picture that the targets hold, in texture coordinates."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+    def seen(self, cell: Cell) -> Cell:
+        """A part of the picture in texture coordinates of the targets, as far as they hold it."""
+        x = ((edge - self.left) / self.width for edge in (cell.left, cell.right))
+        y = ((edge - self.top) / self.height for edge in (cell.top, cell.bottom))
+        (left, right), (top, bottom) = ((min(max(edge, 0.0), 1.0) for edge in edges) for edges in (x, y))
+        return Cell(left, top, right, bottom)
+
+
+WHOLE_PICTURE = Window(0.0, 0.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Lens:
+    """What the optics mean for one picture.
+
+    aperture_share: of the aperture sum in the picture, the rest is the pinhole pass. stride: view steps between
+    samples. dolly: view steps (s, t) by which the ray crosses the grid elsewhere, per picture size. blur_px: output
+    pixels that one px of disparity beside the focus moves from one sample to the next. widest_blur_px: the most that
+    comes to in this field. samples_across: the whole blur in units of blur_px. keeps_layers: whether light is kept
+    apart by defocus and smoothed. most_sources: stored views that a pinhole view is made of. part: what is drawn.
+    """
+
+    eye: ViewOffset
+    diameter: float
+    shape: ApertureShape
+    stride: int
+    dolly: tuple[float, float]
+    focus_disparity: float
+    focus_tilt: tuple[float, float]
+    focus_range: float
+    aperture_share: float
+    blur_px: float
+    widest_blur_px: float
+    samples_across: float
+    keeps_layers: bool
+    highlight_gain: float
+    exposure: float
+    most_sources: int
+    part: Window = WHOLE_PICTURE
+
+    @property
+    def sharp_up_to_px(self) -> tuple[float, float]:
+        """Blur from one sample to the next at which the sharp layer begins to fade, and at which it is empty."""
+        return min(1.0, FADE_FROM_PX / self.samples_across), min(2.0, FADE_TO_PX / self.samples_across)
+
+    @property
+    def few_up_to_px(self) -> float:
+        """See FEW_UP_TO_PX, as blur from one sample to the next."""
+        return FEW_UP_TO_PX / self.samples_across
+
+    @property
+    def has_dolly(self) -> bool:
+        """Whether rays of different pixels cross the grid at different places."""
+        return self.dolly != (0.0, 0.0)
+
+    def barrel(self, aspect: float) -> tuple[float, float, float]:
+        """How far the barrel's opening moves across the picture (s, t), and its radius, view steps. aspect: H / W."""
+        radius = self.diameter / 2
+        across = 2 * self.shape.cat_eye * radius / math.hypot(1.0, aspect)
+        return across, across * aspect, radius
+
+    def eye_at(self, u: float, v: float) -> ViewOffset:
+        """Where the ray of the pixel at texture coordinates (u, v) crosses the grid."""
+        return ViewOffset(self.eye.t + self.dolly[1] * (v - 0.5), self.eye.s + self.dolly[0] * (u - 0.5))
+
+    def samples(
+        self,
+        grid: GridShape,
+        present: NDArray[np.bool_],
+        moved: ViewOffset = UNMOVED,
+        coarser: int = 1,
+        is_smoothed: bool = True,
+    ) -> list[ApertureSample]:
+        """Points of the lens and who answers; moved: the lattice; coarser: every so manieth of them.
+
+        is_smoothed: whether these are to leave room for the smoothing, if there is any.
+        """
+        stride, leaves_room = self.stride * coarser, is_smoothed and self.keeps_layers
+        return aperture_samples(self.eye, self.diameter, grid, present, self.shape, stride, moved, leaves_room)
+
+
+def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, prefilter: bool, haste: Haste = NO_HASTE) -> Lens:
+    """The lens for a picture of that width."""
+    diameter = max(optics.aperture_diameter, 0.0)
+    stride = min(haste.stride, max(int(diameter / LEAST_ACROSS), 1))
+    step = max(min(diameter, float(stride)), 1e-6)
+    blur_px = step * width_px / field.width if diameter > 0 else 0.0
+    samples_across = max(min(diameter, float(max(field.grid))) / step, 1.0)
+    beside = _most_beside_focus(optics, field.range_px)
+    knows_depth = bool(field.has_disparity[field.present].all())
+    keeps = prefilter and knows_depth and max(blur_px, blur_px * samples_across / FADE_FROM_PX) * beside > 1.0
+    return Lens(
+        eye=optics.eye,
+        diameter=diameter,
+        shape=optics.aperture_shape,
+        stride=stride,
+        dolly=(-2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width),
+        focus_disparity=optics.focus_disparity,
+        focus_tilt=optics.focus_tilt,
+        focus_range=max(optics.focus_range, 0.0),
+        aperture_share=min(max(diameter - 1.0, 0.0), 1.0),
+        blur_px=blur_px,
+        widest_blur_px=blur_px * beside,
+        samples_across=samples_across,
+        keeps_layers=keeps,
+        highlight_gain=0.0 if field.hdr else HIGHLIGHT_GAIN * optics.highlight_recovery * min(diameter, 1.0),
+        exposure=2.0**optics.exposure_stops,
+        most_sources=haste.sources,
+    )
+
+
+def _most_beside_focus(optics: Optics, range_px: tuple[float, float]) -> float:
+    tilt = sum(map(abs, optics.focus_tilt))
+    farthest = max(abs(edge - optics.focus_disparity) for edge in range_px) + tilt
+    return max(farthest - max(optics.focus_range, 0.0), 0.0)

@@ -1,0 +1,365 @@
+"""The passes over a light field: each sets its uniforms and draws one triangle into a target. What is drawn when, the
+renderer decides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from iibr_core.types import ViewOffset
+from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
+from viewer.gpu.programs import Program, ProgramCache
+from viewer.gpu.refocus.lens import WHOLE, WHOLE_PICTURE, Cell, Lens
+from viewer.gpu.refocus.view_sampling import (
+    MAX_SOURCES,
+    ApertureSample,
+    nearest_present,
+    pinhole_sources,
+    pinhole_weights,
+)
+from viewer.gpu.render_targets import Target, Targets
+
+MAX_SAMPLES = 512
+"""As in shaders/include/samples.glsl; larger apertures are summed in several draws."""
+
+MAX_SEARCH_STEPS = 96
+"""Of the pinhole pass: one per pixel of parallax as long as that suffices."""
+
+OFF_BORDER_PX = 1 / 256
+"""Halfway between views a look-up may hit the border between two texels: rounding must not decide which one is read."""
+
+TILE_PX = 16
+MAX_TILE_TAPS = 8
+
+UNITS = {"colors": 0, "disparities": 1, "tiles": 2, "stand_ins": 3, "blocks": 4}
+SPANS = "spans_of_0_and_1", "spans_of_2_and_3"
+
+
+class Passes:
+    """Draws parts of a picture. adaptive: whether tiles skip what they have no content for."""
+
+    def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
+        self._ctx = ctx
+        self._programs = programs
+        self._samples = ctx.buffer(reserve=2 * MAX_SAMPLES * 16)
+        self._stand_ins: moderngl.Texture | None = None
+        self.adaptive = True
+
+    def release(self) -> None:
+        """Free every GL object of its own."""
+        self._samples.release()
+        if self._stand_ins is not None:
+            self._stand_ins.release()
+
+    def draw_pinhole(
+        self, field: LightFieldTexture, lens: Lens, within_px: ViewOffset, target: Target, targets: Targets, layer: str
+    ) -> None:
+        """Add the share of the pinhole view. layer: "SHARP", "BLURRED", or "" for all light.
+
+        within_px: where in a pixel of the target it is asked which surface shows, from the middle.
+        """
+        kinds = ("FLAT", "EDGES") if self.adaptive and field.has_disparity.any() else ("",)
+        keeps, size_px = target.holds_sum, target.framebuffer.size
+        for cell in _cells(field, lens):
+            if "FLAT" in kinds:
+                self._find_spans(field, lens, cell, targets)
+            target.framebuffer.scissor = _pixels_of(lens.part.seen(cell), *size_px)
+            target.add(keeps)
+            for kind in kinds:
+                self._draw_pinhole_tiles(field, lens, cell, within_px, targets, layer, kind)
+        target.framebuffer.scissor = 0, 0, *size_px
+
+    def _draw_pinhole_tiles(
+        self,
+        field: LightFieldTexture,
+        lens: Lens,
+        cell: Cell,
+        within_px: ViewOffset,
+        targets: Targets,
+        layer: str,
+        kind: str,
+    ) -> None:
+        """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES"."""
+        program, quad = self._programs.get("pinhole.frag", _switches(lens, layer, lens.has_dolly and "DOLLY", kind))
+        target = targets.blurred if layer == "BLURRED" else targets.light
+        width, height = target.framebuffer.size
+        self._set_field(program, field, lens)
+        self._set_sources(program, field, lens, cell)
+        program.set_uniforms(share=1.0 - lens.aperture_share, nudge=_nudge(target, layer))
+        pixel_uv = lens.part.width / width, lens.part.height / height
+        within = (within_px.s + OFF_BORDER_PX) * pixel_uv[0], (within_px.t + OFF_BORDER_PX) * pixel_uv[1]
+        program.set_uniforms(within_pixel=within)
+        if kind:
+            for unit, (name, texture) in enumerate(zip(SPANS, targets.spans.textures), start=len(UNITS)):
+                texture.use(unit)
+                program.set_uniform(name, unit)
+        tiles = math.prod(targets.spans.framebuffer.size)
+        quad.render(moderngl.TRIANGLES, vertices=6 * tiles if kind else 3)
+
+    def _find_spans(self, field: LightFieldTexture, lens: Lens, cell: Cell, targets: Targets) -> None:
+        """Fill the tiles of a cell with the steps between which its searches end."""
+        program, quad = self._programs.get("search_spans.frag", _switches(lens, "", lens.has_dolly and "DOLLY"))
+        self._set_field(program, field, lens)
+        self._set_sources(program, field, lens, cell)
+        self._set_blocks(program, field, targets)
+        width, height = targets.blurred.framebuffer.size
+        program.set_uniforms(pixel_uv=(lens.part.width / width, lens.part.height / height))
+        target = targets.spans
+        target.framebuffer.scissor = _touched_by(lens.part.seen(cell), *target.framebuffer.size)
+        self._ctx.disable(moderngl.BLEND)
+        target.use()
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+    def _set_sources(self, program: Program, field: LightFieldTexture, lens: Lens, cell: Cell) -> None:
+        """The views that a cell of the picture is made of; with dolly, their weights at its corners."""
+        middle = lens.eye_at((cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2)
+        sources = pinhole_sources(middle, field.grid, field.present)[: lens.most_sources]
+        in_all = sum(source.weight for source in sources)
+        missing = MAX_SOURCES - len(sources)
+        rows, steps = [], []
+        for row, column, weight in sources:
+            there = field.grid.offset(row, column)
+            rows.append((there.s - lens.eye.s, there.t - lens.eye.t, float(field.layer(row, column)), weight / in_all))
+            steps.append(_search_steps(field, lens, there, cell) if field.has_disparity[row, column] else 0)
+        program.set_uniforms(
+            source_count=len(sources),
+            sources=[*rows, *[(0.0,) * 4] * missing],
+            search_steps=[*steps, *[0] * missing],
+        )
+        if "cell" in program.declared and lens.has_dolly:
+            corners = [lens.eye_at(u, v) for v in (cell.top, cell.bottom) for u in (cell.left, cell.right)]
+            weights = pinhole_weights(sources, corners, field.grid)
+            program.set_uniforms(
+                cell=tuple(cell), corner_weights=[*map(tuple, weights.tolist()), *[(0.0,) * 4] * missing]
+            )
+
+    def draw_aperture(
+        self,
+        field: LightFieldTexture,
+        lens: Lens,
+        samples: list[ApertureSample],
+        few: dict[ViewOffset, float],
+        target: Target,
+        targets: Targets,
+        layer: str,
+    ) -> None:
+        """Add samples of the lens, at most MAX_SAMPLES. layer: see `draw_pinhole`.
+
+        few: weights of the samples that suffice where all is sharp; those among `samples` must come first.
+        """
+        tiles = self.adaptive and bool(layer)
+        detours = _needs_detours(field, lens, samples)
+        program, quad = self._programs.get(
+            "aperture.frag",
+            _switches(lens, layer, tiles and "TILES", detours and "DETOURS", detours and lens.has_dolly and "DOLLY"),
+        )
+        self._set_field(program, field, lens)
+        self._set_samples(program, field, lens, samples, few)
+        program.set_uniforms(share=lens.aperture_share, nudge=_nudge(target, layer))
+        if tiles:
+            self._bind(targets.tiles.textures[0], "tiles")
+            few_count = sum(sample.wanted in few for sample in samples)
+            _set_declared(program, tiles=UNITS["tiles"], few_count=few_count, few_up_to_px=lens.few_up_to_px)
+        target.add()
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+    def find_defocus(
+        self, field: LightFieldTexture, lens: Lens, samples: list[ApertureSample], targets: Targets
+    ) -> None:
+        """Fill the tiles with the widest blur in each, and around each."""
+        self._ctx.disable(moderngl.BLEND)
+        direct = [sample for sample in samples if field.grid.offset(sample.row, sample.column) == sample.wanted]
+        samples = direct if 2 * len(direct) > len(samples) else samples
+        samples = samples[:: math.ceil(len(samples) / MAX_SAMPLES)]
+        detours = _needs_detours(field, lens, samples)
+        program, quad = self._programs.get(
+            "defocus_tiles.frag", _switches(lens, "", detours and "DETOURS", detours and lens.has_dolly and "DOLLY")
+        )
+        self._set_field(program, field, lens)
+        self._set_samples(program, field, lens, samples, {})
+        self._set_blocks(program, field, targets)
+        across, down = targets.tiles.framebuffer.size
+        tile_px = max(lens.part.width * field.width / across, lens.part.height * field.height / down)
+        taps = 1 + math.ceil(tile_px / BLOCK_PX)
+        program.set_uniforms(taps=min(taps, MAX_TILE_TAPS))
+        targets.tiles.use()
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+        program, quad = self._programs.get("widen_tiles.frag")
+        self._bind(targets.tiles.textures[0], "tiles")
+        reach = min(math.ceil((lens.widest_blur_px / 2 + TILE_PX / 2) / TILE_PX), 4)
+        program.set_uniforms(tiles=UNITS["tiles"], reach=reach)
+        targets.wide_tiles.use()
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+    def smooth(self, lens: Lens, targets: Targets, narrowing: float) -> None:
+        """Spread the blurred layers over what lies between samples. narrowing: of the blur that the tiles tell."""
+        self._ctx.disable(moderngl.BLEND)
+        program, quad = self._programs.get("smooth.frag")
+        targets.wide_tiles.textures[0].use(2)
+        program.set_uniforms(
+            front_layer=0, back_layer=1, tiles=2, narrowing=narrowing, empty_up_to_px=lens.sharp_up_to_px[0]
+        )
+        across = targets.blurred.textures[:2], targets.half_across, (1, 0)
+        down = targets.half_across.textures, targets.half_smooth, (0, 1)
+        for (front, back), target, direction in (across, down):
+            front.use(0)
+            back.use(1)
+            program.set_uniforms(direction=direction)
+            target.use()
+            quad.render(moderngl.TRIANGLES, vertices=3)
+
+    def present(self, lens: Lens, targets: Targets, is_linear: bool) -> None:
+        """The finished picture, into the framebuffer in use. is_linear: as light, unbounded, not sRGB-encoded."""
+        self._ctx.disable(moderngl.BLEND)
+        switches = lens.keeps_layers and "LAYERS", is_linear and "LINEAR"
+        program, quad = self._programs.get("present.frag", tuple(switch for switch in switches if switch))
+        targets.light.textures[0].use(0)
+        program.set_uniforms(focus_layer=0, exposure=lens.exposure)
+        if lens.keeps_layers:
+            for unit, texture in enumerate((targets.blurred.textures[2], *targets.half_smooth.textures), start=1):
+                texture.use(unit)
+            program.set_uniforms(weights=1, smooth_front=2, smooth_back=3)
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+    def update_stand_ins(self, field: LightFieldTexture) -> None:
+        """Tell the shaders which views are there; needed for dolly."""
+        rows, columns = field.grid
+        table = np.zeros((rows, columns, 4), np.float32)
+        nearest = nearest_present(field.present)
+        table[..., :2] = nearest[..., ::-1]
+        table[..., 2] = field.has_disparity[nearest[..., 0], nearest[..., 1]]
+        table[..., 3] = [[field.layer(int(row), int(column)) for row, column in line] for line in nearest]
+        if self._stand_ins is None or self._stand_ins.size != (columns, rows):
+            if self._stand_ins is not None:
+                self._stand_ins.release()
+            self._stand_ins = self._ctx.texture((columns, rows), 4, dtype="f4")
+        self._stand_ins.write(table.tobytes())
+
+    def _bind(self, texture: moderngl.Texture, name: str) -> None:
+        texture.use(UNITS[name])
+
+    def _set_field(self, program: Program, field: LightFieldTexture, lens: Lens) -> None:
+        field.colors.use(UNITS["colors"])
+        field.disparities.use(UNITS["disparities"])
+        far, near = field.range_px
+        _set_declared(
+            program,
+            colors=UNITS["colors"],
+            disparities=UNITS["disparities"],
+            view_size_px=(field.width, field.height),
+            nearest=near,
+            farthest=far,
+            focus_disparity=lens.focus_disparity,
+            focus_tilt=lens.focus_tilt,
+            focus_range=lens.focus_range,
+            dolly=lens.dolly,
+            highlight_gain=lens.highlight_gain,
+            blur_px=lens.blur_px,
+            sharp_up_to_px=lens.sharp_up_to_px,
+            barrel=lens.barrel(field.height / field.width),
+            part=lens.part,
+            sample_width=min(float(lens.stride), lens.diameter),
+        )
+
+    def _set_blocks(self, program: Program, field: LightFieldTexture, targets: Targets) -> None:
+        across, down = targets.tiles.framebuffer.size
+        field.blocks.use(UNITS["blocks"])
+        program.set_uniforms(blocks=UNITS["blocks"], block_px=float(BLOCK_PX), tile_uv=(1 / across, 1 / down))
+
+    def _set_samples(
+        self,
+        program: Program,
+        field: LightFieldTexture,
+        lens: Lens,
+        samples: list[ApertureSample],
+        few: dict[ViewOffset, float],
+    ) -> None:
+        table = np.zeros((2, MAX_SAMPLES, 4), np.float32)
+        for i, (wanted, row, column, weight) in enumerate(samples):
+            stored = field.grid.offset(row, column)
+            table[0, i] = wanted.s - lens.eye.s, wanted.t - lens.eye.t, field.layer(row, column), weight
+            detour = stored.s - wanted.s, stored.t - wanted.t
+            table[1, i] = (*detour, float(field.has_disparity[row, column]), few.get(wanted, 0.0))
+        self._samples.write(table.tobytes())
+        self._samples.bind_to_uniform_block(0)
+        program.bind_block("Samples", 0)
+        program.set_uniforms(sample_count=len(samples))
+        if lens.has_dolly and "stand_ins" in program.declared:
+            assert self._stand_ins is not None
+            self._bind(self._stand_ins, "stand_ins")
+            row, column = field.grid.centre
+            _set_declared(program, stand_ins=UNITS["stand_ins"], eye_in_grid=(column + lens.eye.s, row + lens.eye.t))
+
+
+def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
+    by_lens = (
+        "RANGE" if lens.focus_range > 0 else "",
+        "HIGHLIGHTS" if lens.highlight_gain > 0 else "",
+        "CAT_EYE" if lens.shape.kind == "cat_eye" else "",
+        "PART" if lens.part != WHOLE_PICTURE else "",
+    )
+    return tuple(str(name) for name in (*names, *by_lens) if name)
+
+
+def _nudge(target: Target, layer: str) -> tuple[float, float]:
+    """From the middle of the four pixels that one of half the size covers to the first; see shaders/fullscreen.vert."""
+    width, height = target.framebuffer.size
+    return (-0.25 / width, -0.25 / height) if layer == "BLURRED" else (0.0, 0.0)
+
+
+def _needs_detours(field: LightFieldTexture, lens: Lens, samples: list[ApertureSample]) -> bool:
+    if lens.has_dolly or lens.focus_range > 0:
+        return True
+    return any(field.grid.offset(sample.row, sample.column) != sample.wanted for sample in samples)
+
+
+def _set_declared(program: Program, **values: Any) -> None:
+    program.set_uniforms(**{name: value for name, value in values.items() if name in program.declared})
+
+
+def _search_steps(field: LightFieldTexture, lens: Lens, view: ViewOffset, cell: Cell) -> int:
+    """One per pixel of parallax, for the pixel of the cell whose ray crosses the grid farthest from the view."""
+    rays = [lens.eye_at(u, v) for u in (cell.left, cell.right) for v in (cell.top, cell.bottom)]
+    distance = max(math.hypot(view.s - ray.s, view.t - ray.t) for ray in rays)
+    parallax_px = distance * (field.range_px[1] - field.range_px[0])
+    return min(max(math.ceil(parallax_px), 2), MAX_SEARCH_STEPS)
+
+
+def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[Cell]:
+    """Parts of the picture whose rays cross one cell of the grid each; the whole picture without dolly."""
+    if not lens.has_dolly:
+        yield WHOLE
+        return
+    first, last = field.grid.offset(0, 0), field.grid.offset(field.grid.rows - 1, field.grid.columns - 1)
+    across = _crossings(lens.eye.s, lens.dolly[0], first.s, last.s)
+    down = _crossings(lens.eye.t, lens.dolly[1], first.t, last.t)
+    for top, bottom in pairwise(down):
+        for left, right in pairwise(across):
+            yield Cell(left, top, right, bottom)
+
+
+def _pixels_of(cell: Cell, width: int, height: int) -> tuple[int, int, int, int]:
+    """Scissor: (x, y, width, height) of the pixels whose cell this is."""
+    left, top = round(cell.left * width), round(cell.top * height)
+    return left, top, round(cell.right * width) - left, round(cell.bottom * height) - top
+
+
+def _touched_by(cell: Cell, width: int, height: int) -> tuple[int, int, int, int]:
+    """Scissor: (x, y, width, height) of all pixels (here: tiles) that the cell and its border pixels lie in."""
+    left, top = max(math.ceil(cell.left * width) - 1, 0), max(math.ceil(cell.top * height) - 1, 0)
+    right, bottom = min(math.floor(cell.right * width) + 1, width), min(math.floor(cell.bottom * height) + 1, height)
+    return left, top, right - left, bottom - top
+
+
+def _crossings(eye: float, dolly: float, first: float, last: float) -> list[float]:
+    """Texture coordinates along one axis where the ray passes a row or column of views, and the borders."""
+    lines = np.arange(first, last + 1)
+    places = 0.5 + (lines - eye) / dolly
+    return [0.0, *sorted(places[(places > 0) & (places < 1)].tolist()), 1.0]

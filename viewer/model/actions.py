@@ -1,0 +1,394 @@
+"""What the user and the worker can do to the state: typed records. `viewer.model.reducers` says what each changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from iibr_core.types import ViewOffset
+from viewer.model.lens.presets import PresetName
+from viewer.model.state.app_state import (
+    ApertureShape,
+    ChoiceOf,
+    DrawReport,
+    Hover,
+    LoopKind,
+    Notice,
+    Progress,
+    Prompt,
+    Saved,
+    SavedSettings,
+    Scene,
+    Section,
+    Source,
+    Task,
+    Theme,
+)
+from viewer.model.state.depth_editing import DepthEdit
+from viewer.model.state.inspection import InspectionEdit
+
+# The viewpoint
+
+
+@dataclass(frozen=True)
+class MoveEye:
+    """Put the viewpoint at this view offset (clamped to the grid and a margin beyond)."""
+
+    eye: ViewOffset
+
+
+@dataclass(frozen=True)
+class SetDolly:
+    """Step forward (positive) or back; see `Optics.dolly`."""
+
+    dolly: float
+
+
+@dataclass(frozen=True)
+class ReturnHome:
+    """Glide back to the middle viewpoint; the click that began the double click no longer counts."""
+
+
+@dataclass(frozen=True)
+class SetLoop:
+    """Move the viewpoint along this path, over and over; None stops it where it is."""
+
+    kind: LoopKind | None
+
+
+@dataclass(frozen=True)
+class SetSpeed:
+    """Speed of loops, turns per second."""
+
+    turns_per_second: float
+
+
+@dataclass(frozen=True)
+class PauseMotion:
+    """Hold the motion, or let it go on."""
+
+    is_paused: bool
+
+
+@dataclass(frozen=True)
+class Tick:
+    """The clock shows this many seconds: a motion goes on."""
+
+    now_s: float
+
+
+# Focus, aperture, light
+
+
+@dataclass(frozen=True)
+class SetFocus:
+    """Focus on this field disparity (px per view step), in the middle of the picture."""
+
+    disparity: float
+
+
+@dataclass(frozen=True)
+class FocusOn:
+    """What was clicked at this place (-1..1, see focal_plane) with this disparity becomes sharp."""
+
+    place: tuple[float, float]
+    disparity: float
+
+
+@dataclass(frozen=True)
+class SetFocusRange:
+    """Everything within this much disparity around the focus is sharp."""
+
+    disparity: float
+
+
+@dataclass(frozen=True)
+class SetTilt:
+    """Tilt the plane of focus; see `Optics.focus_tilt`."""
+
+    tilt: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ShowTiltHandles:
+    """Show or hide the two handles over the picture."""
+
+    is_shown: bool
+
+
+@dataclass(frozen=True)
+class MoveTiltHandle:
+    """Drag a handle (0 or 1) to this place, over this disparity; None where nothing is known there."""
+
+    index: int
+    place: tuple[float, float]
+    disparity: float | None
+
+
+@dataclass(frozen=True)
+class SetAperture:
+    """Open the aperture to this diameter in view steps."""
+
+    diameter: float
+
+
+@dataclass(frozen=True)
+class SetApertureShape:
+    """Give the opening this shape."""
+
+    shape: ApertureShape
+
+
+@dataclass(frozen=True)
+class SetHighlightRecovery:
+    """Let clipped pixels count for more: 0..1."""
+
+    amount: float
+
+
+@dataclass(frozen=True)
+class SetExposure:
+    """Brighten the picture by this many stops."""
+
+    stops: float
+
+
+@dataclass(frozen=True)
+class SetDepthStrength:
+    """Multiply the planned parallax; the field is generated anew once the edit is finished."""
+
+    strength: float
+    is_finished: bool
+
+
+@dataclass(frozen=True)
+class ApplyPreset:
+    """Set focus and aperture for a purpose."""
+
+    name: PresetName
+
+
+@dataclass(frozen=True)
+class ResetOptics:
+    """Back to the centre viewpoint, the planned focus plane, a pinhole and the photo's exposure."""
+
+
+@dataclass(frozen=True)
+class TakeSettings:
+    """Take over the settings a picture was saved with; they are made to fit the open scene."""
+
+    settings: SavedSettings
+
+
+@dataclass(frozen=True)
+class EndGesture:
+    """The pointer went down or up: the next edit is another one, for undo."""
+
+
+@dataclass(frozen=True)
+class Undo:
+    """Take the last edit back."""
+
+
+@dataclass(frozen=True)
+class Redo:
+    """Do again what was taken back last."""
+
+
+# Files and the worker
+
+
+@dataclass(frozen=True)
+class OpenPath:
+    """Open a photo or a light-field folder instead of the present scene."""
+
+    source: Source
+
+
+@dataclass(frozen=True)
+class StopWork:
+    """Make no more views; those that are there stay."""
+
+
+@dataclass(frozen=True)
+class ResumeWork:
+    """Make the views again that were stopped."""
+
+
+@dataclass(frozen=True)
+class SceneOpened:
+    """The worker has read and planned the scene of this generation; its views follow."""
+
+    generation: int
+    scene: Scene
+
+
+@dataclass(frozen=True)
+class ProgressMade:
+    """The worker of this generation came further. view: index (row, column) of the one just made."""
+
+    generation: int
+    progress: Progress
+    view: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class OpenFailed:
+    """The worker of this generation gave up; the message says why."""
+
+    generation: int
+    message: str
+
+
+@dataclass(frozen=True)
+class WorkerLost:
+    """The worker's thread ended unasked."""
+
+
+@dataclass(frozen=True)
+class DoTask:
+    """Ask this of the outside world."""
+
+    task: Task
+
+
+@dataclass(frozen=True)
+class TaskTaken:
+    """The loop has taken this task up."""
+
+    task: Task
+
+
+@dataclass(frozen=True)
+class PictureDrawn:
+    """The picture was drawn, and this is known of it."""
+
+    report: DrawReport
+
+
+# Prompts, notices, preferences
+
+
+@dataclass(frozen=True)
+class ShowPrompt:
+    """Show this prompt in place of any other, or as the user has edited it; None closes it."""
+
+    prompt: Prompt | None
+
+
+@dataclass(frozen=True)
+class AskForPath:
+    """Ask for a file in the window, for the system has no dialog."""
+
+    what: ChoiceOf
+
+
+@dataclass(frozen=True)
+class AskToSave:
+    """Ask where to save the picture, or its disparity map."""
+
+    what: Saved = "picture"
+
+
+@dataclass(frozen=True)
+class SetHover:
+    """The pointer is here in the picture; None where it is not in it."""
+
+    hover: Hover | None
+
+
+@dataclass(frozen=True)
+class Notify:
+    """Show a notice."""
+
+    notice: Notice
+
+
+@dataclass(frozen=True)
+class DismissNotice:
+    """Take this notice away."""
+
+    notice: Notice
+
+
+@dataclass(frozen=True)
+class SetTheme:
+    """Light or dark."""
+
+    theme: Theme
+
+
+@dataclass(frozen=True)
+class SetFontScale:
+    """Size of text and widgets, 1 = usual."""
+
+    scale: float
+
+
+@dataclass(frozen=True)
+class ToggleSection:
+    """Open or close a section of the panel."""
+
+    section: Section
+
+
+@dataclass(frozen=True)
+class PlaceWindow:
+    """The window is here: x, y, width, height in screen units."""
+
+    place: tuple[int, int, int, int]
+
+
+@dataclass(frozen=True)
+class Quit:
+    """Close the window."""
+
+
+OpticsEdit = (
+    MoveEye
+    | SetDolly
+    | SetFocus
+    | FocusOn
+    | SetFocusRange
+    | SetTilt
+    | MoveTiltHandle
+    | SetAperture
+    | SetApertureShape
+    | SetHighlightRecovery
+    | SetExposure
+    | ApplyPreset
+    | ResetOptics
+)
+"""Edits of the optics alone."""
+
+MotionEdit = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
+WorkerNews = SceneOpened | ProgressMade | OpenFailed
+SettingsEdit = SetTheme | SetFontScale | ToggleSection | PlaceWindow
+
+Action = (
+    OpticsEdit
+    | MotionEdit
+    | WorkerNews
+    | SettingsEdit
+    | InspectionEdit
+    | DepthEdit
+    | ShowTiltHandles
+    | SetDepthStrength
+    | TakeSettings
+    | EndGesture
+    | Undo
+    | Redo
+    | OpenPath
+    | StopWork
+    | ResumeWork
+    | WorkerLost
+    | PictureDrawn
+    | DoTask
+    | TaskTaken
+    | ShowPrompt
+    | AskForPath
+    | AskToSave
+    | SetHover
+    | Notify
+    | DismissNotice
+    | Quit
+)

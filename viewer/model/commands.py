@@ -1,0 +1,160 @@
+"""Everything that can be done by name or key: what the keyboard, the map on F1 and the command palette read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
+from viewer.model.actions import (
+    Action,
+    ApplyPreset,
+    AskToSave,
+    DoTask,
+    PauseMotion,
+    Quit,
+    Redo,
+    ResetOptics,
+    ReturnHome,
+    SetFontScale,
+    SetLoop,
+    SetTheme,
+    ShowPrompt,
+    ShowTiltHandles,
+    StopWork,
+    Undo,
+)
+from viewer.model.lens.presets import PRESETS
+from viewer.model.state.app_state import LOOPS, AppState, ChooseTask, LoopKind, PalettePrompt
+from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
+from viewer.model.state.inspection import (
+    COMPARISONS,
+    OVERLAYS,
+    Compare,
+    Comparison,
+    OverlayKind,
+    SetOverlay,
+    ShowEpis,
+    ShowGrid,
+    ShowValues,
+)
+
+FONT_STEP = 1.1
+COMPARE_WORDS: dict[Comparison, str] = {
+    "photo": "Compare photo and picture",
+    "quality": "Compare fast and exact",
+    "truth": "Compare with ground truth",
+}
+BRUSH_WORDS: dict[BrushTool, str] = {"nearer": "Nearer", "farther": "Farther", "smooth": "Smooth"}
+LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
+
+
+@dataclass(frozen=True)
+class Chord:
+    """A key by ImGui's name for it, and what is held down with it."""
+
+    key: str
+    ctrl: bool = False
+    shift: bool = False
+
+    @property
+    def words(self) -> str:
+        """As people write it: "Ctrl+Shift+Z"."""
+        key = {"equal": "+", "minus": "−", "_0": "0", "space": "Space"}.get(self.key, self.key.upper())
+        return "Ctrl+" * self.ctrl + "Shift+" * self.shift + key
+
+
+@dataclass(frozen=True)
+class Command:
+    """One thing that can be done. action: of the state in which it was asked for."""
+
+    name: str
+    action: Callable[[AppState], Action]
+    chords: tuple[Chord, ...] = ()
+
+
+def _always(action: Action) -> Callable[[AppState], Action]:
+    return lambda state: action
+
+
+def _scaled(factor: float) -> Callable[[AppState], Action]:
+    return lambda state: SetFontScale(state.preferences.font_scale * factor)
+
+
+def _help_toggled(state: AppState) -> Action:
+    return ShowPrompt(None if state.prompt == "help" else "help")
+
+
+def _palette_toggled(state: AppState) -> Action:
+    return ShowPrompt(None if isinstance(state.prompt, PalettePrompt) else PalettePrompt())
+
+
+def _overlay_toggled(kind: OverlayKind) -> Callable[[AppState], Action]:
+    return lambda state: SetOverlay(None if state.inspection.overlay == kind else kind)
+
+
+def _comparison_toggled(kind: Comparison) -> Callable[[AppState], Action]:
+    return lambda state: Compare(None if state.inspection.comparison == kind else kind)
+
+
+def _brush_toggled(state: AppState) -> Action:
+    return SetBrush(replace(state.brush, is_on=not state.brush.is_on))
+
+
+def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
+    return lambda state: SetBrush(replace(state.brush, tool=tool, is_on=True))
+
+
+def _inverted(state: AppState) -> Action:
+    edits = state.depth.edits
+    return SetTone(replace(edits, is_inverted=not edits.is_inverted), is_finished=True)
+
+
+COMMANDS: tuple[Command, ...] = (
+    Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
+    Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
+    Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
+    Command("Undo", _always(Undo()), (Chord("z", ctrl=True),)),
+    Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True))),
+    Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),
+    Command("Viewpoint back to the middle", _always(ReturnHome()), (Chord("c"),)),
+    *(Command(f"Preset: {name}", _always(ApplyPreset(name))) for name in PRESETS),
+    *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
+    Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
+    Command("Motion: stop", _always(SetLoop(None))),
+    Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
+    Command("Depth brush", _brush_toggled, (Chord("b"),)),
+    *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
+    Command("Invert depth", _inverted),
+    Command("Reset depth edits", _always(ResetDepth())),
+    Command("Open a depth map…", _always(DoTask(ChooseTask("map")))),
+    Command("Open a depth model…", _always(DoTask(ChooseTask("model")))),
+    Command("Save the depth map…", _always(AskToSave("map"))),
+    Command("EPI strips", lambda s: ShowEpis(not s.inspection.shows_epis), (Chord("e"),)),
+    Command("All views", lambda s: ShowGrid(not s.inspection.shows_grid), (Chord("g"),)),
+    Command("Values under the pointer", lambda s: ShowValues(not s.inspection.shows_values), (Chord("v"),)),
+    *(
+        Command(f"Overlay: {kind}", _overlay_toggled(kind), (Chord("d"),) if kind == "disparity" else ())
+        for kind in OVERLAYS
+    ),
+    *(
+        Command(COMPARE_WORDS[kind], _comparison_toggled(kind), (Chord("p"),) if kind == "photo" else ())
+        for kind in COMPARISONS
+    ),
+    Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
+    Command("Stop making views", _always(StopWork())),
+    Command("Light or dark", lambda s: SetTheme("dark" if s.preferences.theme == "light" else "light")),
+    Command("Larger text", _scaled(FONT_STEP), (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True))),
+    Command("Smaller text", _scaled(1 / FONT_STEP), (Chord("minus", ctrl=True),)),
+    Command("Usual text size", _always(SetFontScale(1.0)), (Chord("_0", ctrl=True),)),
+    Command("All commands", _palette_toggled, (Chord("p", ctrl=True),)),
+    Command("Mouse and keys", _help_toggled, (Chord("f1"),)),
+    Command("Quit", _always(Quit()), (Chord("q", ctrl=True),)),
+)
+BY_NAME = {command.name: command for command in COMMANDS}
+
+
+def commands_matching(text: str) -> tuple[Command, ...]:
+    """Commands whose names hold every word typed."""
+    words = text.lower().split()
+    return tuple(command for command in COMMANDS if all(word in command.name.lower() for word in words))

@@ -1,0 +1,1 @@
+"""What a lens does: its focal surface, its aperture, its limits, its units."""

@@ -1,0 +1,108 @@
+"""How far each quantity may go, for what is open. Sliders and clamps take their ends from here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from iibr_core.types import GridShape, ViewOffset
+from viewer.model.state.app_state import ApertureShape, Optics, Scene
+
+EYE_MARGIN_VIEWS = 0.5
+"""The viewpoint may leave the grid by at least this much."""
+
+EXPOSURE_LIMIT_STOPS = 6.0
+DEPTH_STRENGTH_LIMIT = 4.0
+SPEED_LIMITS = (0.05, 1.0)
+BLADES_LIMITS = (3, 11)
+RING_INNER_LIMIT = 0.95
+STEEPEST_TILT = 4.0
+"""In spans of the focus from the picture's middle to its border: for tilt handles that are close together."""
+
+FONT_SCALE_LIMITS = (0.6, 2.5)
+
+
+def clamped(value: float, low: float, high: float) -> float:
+    """The nearest value from low to high."""
+    return float(min(max(value, low), high))
+
+
+def eye_margin(views: int) -> float:
+    """How far the viewpoint may leave a row of views on each side, extrapolated: half the row's radius."""
+    return max(EYE_MARGIN_VIEWS, (views - 1) / 4)
+
+
+def eye_limits(views: int) -> tuple[float, float]:
+    """Least and greatest view offset along a row of views."""
+    first, last = -(views // 2), views - 1 - views // 2
+    return first - eye_margin(views), last + eye_margin(views)
+
+
+def clamped_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:
+    """The nearest viewpoint within the limits."""
+    return ViewOffset(*(clamped(x, *eye_limits(views)) for x, views in zip(eye, grid)))
+
+
+def is_extrapolated(eye: ViewOffset, grid: GridShape) -> bool:
+    """Whether the viewpoint lies outside the stored views."""
+    return any(not -(views // 2) <= x <= views - 1 - views // 2 for x, views in zip(eye, grid))
+
+
+def dolly_limit(grid: GridShape) -> float:
+    """How far forward or back the rays of the picture's borders still cross the stored views; 0 without any beside."""
+    return (grid.columns - 1) / 2
+
+
+def focus_limits(scene: Scene) -> tuple[float, float]:
+    """Least and greatest focus disparity worth setting: the scene's range and a tenth more on both sides."""
+    near_and_far = (*scene.disparity_range_px, 0.0)
+    margin = 0.1 * (max(near_and_far) - min(near_and_far)) or 0.1
+    return min(near_and_far) - margin, max(near_and_far) + margin
+
+
+def focus_span(scene: Scene) -> float:
+    """From the least focus disparity to the greatest: the most that focus range and tilt can use."""
+    low, high = focus_limits(scene)
+    return high - low
+
+
+def aperture_limit(grid: GridShape) -> float:
+    """The widest aperture in view steps: the whole grid; 0 where there is a single view."""
+    return float(max(grid) if max(grid) > 1 else 0)
+
+
+def is_finite(optics: Optics) -> bool:
+    """Whether every number of the optics is."""
+    shape = optics.aperture_shape
+    of_optics = (optics.dolly, optics.focus_disparity, optics.focus_range, optics.aperture_diameter)
+    of_light = (optics.highlight_recovery, optics.exposure_stops)
+    of_shape = (shape.blades, shape.rotation_deg, shape.ring_inner, shape.cat_eye)
+    return all(map(math.isfinite, (*of_optics, *of_light, *of_shape, *optics.eye, *optics.focus_tilt)))
+
+
+def clamped_optics(optics: Optics, scene: Scene) -> Optics:
+    """The nearest optics that this scene allows. All numbers must be finite."""
+    span = focus_span(scene)
+    tilt_x, tilt_y = (clamped(tilt, -STEEPEST_TILT * span, STEEPEST_TILT * span) for tilt in optics.focus_tilt)
+    return Optics(
+        eye=clamped_eye(optics.eye, scene.grid),
+        dolly=clamped(optics.dolly, -dolly_limit(scene.grid), dolly_limit(scene.grid)),
+        focus_disparity=clamped(optics.focus_disparity, *focus_limits(scene)),
+        focus_range=clamped(optics.focus_range, 0.0, span),
+        focus_tilt=(tilt_x, tilt_y),
+        aperture_diameter=clamped(optics.aperture_diameter, 0.0, aperture_limit(scene.grid)),
+        aperture_shape=_clamped_shape(optics.aperture_shape),
+        highlight_recovery=clamped(optics.highlight_recovery, 0.0, 1.0),
+        exposure_stops=clamped(optics.exposure_stops, -EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS),
+    )
+
+
+def _clamped_shape(shape: ApertureShape) -> ApertureShape:
+    return replace(
+        shape,
+        kind="disc" if shape.kind == "mask" and shape.mask is None else shape.kind,
+        blades=round(clamped(shape.blades, *BLADES_LIMITS)),
+        rotation_deg=shape.rotation_deg % 360.0 % 360.0,  # the first may round up to 360
+        ring_inner=clamped(shape.ring_inner, 0.0, RING_INNER_LIMIT),
+        cat_eye=clamped(shape.cat_eye, 0.0, 1.0),
+    )

@@ -1,0 +1,54 @@
+"""Disparity and aperture in a photographer's words: relative distance and f-number.
+
+Both need a photo whose focal length is known and whose given disparity is 0 at infinity. Distances count from 1 at the
+plane that stays still; one photo does not tell how far away that is in metres, so the f-number assumes a distance.
+"""
+
+from __future__ import annotations
+
+from viewer.model.state.app_state import Scene
+
+ASSUMED_DISTANCE_M = 2.0
+"""Of the plane that stays still; f-numbers are those of a lens on full frame focused there."""
+
+FULL_FRAME_WIDTH_M = 0.036
+
+
+def relative_distance(scene: Scene, disparity: float) -> float | None:
+    """Distance of a field disparity, 1 = the plane that stays still; None where not known or beyond infinity."""
+    given = _given(scene, disparity)
+    still = _given(scene, 0.0)
+    return still / given if given is not None and still is not None and given > 0 and still > 0 else None
+
+
+def disparity_at(scene: Scene, distance: float) -> float | None:
+    """The inverse of `relative_distance`."""
+    still = _given(scene, 0.0)
+    if still is None or scene.plan is None or still <= 0 or distance <= 0:
+        return None
+    return (still / distance - scene.plan.disparity_zero) * scene.plan.disparity_scale
+
+
+def distance_limits(scene: Scene) -> tuple[float, float] | None:
+    """Relative distance of the nearest and the farthest surface; None where either is not known."""
+    far, near = scene.disparity_range_px
+    ends = relative_distance(scene, near), relative_distance(scene, far)
+    return (ends[0], ends[1]) if ends[0] is not None and ends[1] is not None and ends[0] < ends[1] else None
+
+
+def f_number(scene: Scene, aperture_diameter: float) -> float | None:
+    """The f-number of an aperture in view steps; None where not known, and for a pinhole."""
+    still = _given(scene, 0.0)
+    if still is None or scene.plan is None or scene.focal_px is None or still <= 0 or aperture_diameter <= 0:
+        return None
+    view_step_m = abs(scene.plan.disparity_scale) * still * ASSUMED_DISTANCE_M / scene.focal_px
+    focal_m = scene.focal_px / scene.width * FULL_FRAME_WIDTH_M
+    return focal_m / (aperture_diameter * view_step_m)
+
+
+def _given(scene: Scene, disparity: float) -> float | None:
+    """The disparity as given, before the plan; None where that tells no distance."""
+    plan = scene.plan
+    if scene.focal_px is None or plan is None or plan.disparity_scale == 0:
+        return None
+    return disparity / plan.disparity_scale + plan.disparity_zero

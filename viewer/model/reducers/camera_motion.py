@@ -1,0 +1,68 @@
+"""Viewpoints that move by themselves: the glide home, and loops through the grid. A step is a pure function of time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from iibr_core.types import GridShape, ViewOffset
+from viewer.model.state.app_state import CENTRE, LoopKind, Motion, Optics
+
+HOME_S = 0.4
+LONGEST_STEP_S = 0.1
+"""After a hiccup the motion goes on from where it was, without a leap."""
+
+EASE_IN_TURNS = 0.2
+"""A loop leaves the viewpoint it began at over this part of its first turn."""
+
+LOOP_REACH = 0.8
+"""Of the grid's radius: the loops stay within what is stored."""
+
+
+def begun(motion: Motion, kind: LoopKind | None, optics: Optics) -> Motion:
+    """The motion that starts at the present viewpoint; None stops."""
+    return Motion(kind, start=optics.eye, start_dolly=optics.dolly, speed=motion.speed)
+
+
+def homeward(motion: Motion, optics: Optics) -> Motion:
+    """The glide to the middle viewpoint."""
+    return Motion("home", start=optics.eye, start_dolly=optics.dolly, speed=motion.speed)
+
+
+def stepped(motion: Motion, optics: Optics, grid: GridShape, now_s: float) -> tuple[Motion, Optics]:
+    """Motion and optics when the clock shows now_s. A glide that has arrived is over."""
+    if not motion.is_running or not math.isfinite(now_s):
+        return motion, optics
+    step_s = 0.0 if motion.ticked_s is None else min(max(now_s - motion.ticked_s, 0.0), LONGEST_STEP_S)
+    turns = motion.turns + step_s * (1 / HOME_S if motion.kind == "home" else motion.speed)
+    motion = replace(motion, turns=turns, ticked_s=now_s)
+    if motion.kind == "home":
+        left = 1 - eased(turns)
+        eye = ViewOffset(motion.start.t * left, motion.start.s * left)
+        there = replace(optics, eye=eye, dolly=motion.start_dolly * left)
+        return (replace(motion, kind=None), replace(there, eye=CENTRE, dolly=0.0)) if turns >= 1 else (motion, there)
+    share = eased(turns / EASE_IN_TURNS)
+    goal = on_path(motion.kind, turns, grid)
+    eye = ViewOffset(*(a + share * (b - a) for a, b in zip(motion.start, goal)))
+    return motion, replace(optics, eye=eye)
+
+
+def on_path(kind: LoopKind | None, turns: float, grid: GridShape) -> ViewOffset:
+    """The viewpoint on a loop after so many turns, in view steps from the middle of the grid's views."""
+    angle = 2 * math.pi * turns
+    match kind:
+        case "circle":
+            down, right = -math.cos(angle), math.sin(angle)
+        case "eight":
+            down, right = math.sin(2 * angle) / 2, math.sin(angle)
+        case _:
+            down, right = 0.0, math.sin(angle)
+    (rows, columns), (v, u) = grid, grid.centre
+    radius_t, radius_s = LOOP_REACH * (rows - 1) / 2, LOOP_REACH * (columns - 1) / 2
+    return ViewOffset((rows - 1) / 2 - v + down * radius_t, (columns - 1) / 2 - u + right * radius_s)
+
+
+def eased(share: float) -> float:
+    """0..1 to 0..1, slow at both ends."""
+    x = min(max(share, 0.0), 1.0)
+    return x * x * (3 - 2 * x)

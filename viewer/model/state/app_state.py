@@ -1,0 +1,392 @@
+"""The viewer's whole state, frozen. Everything the screen shows is a function of it.
+
+Comparing two records decides what an edit costs: a new `generation` restarts the worker, a new `Picture` draws anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from iibr_core.depth.choice import DepthOrigin, DepthStart
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
+from iibr_core.generation.plan import ScenePlan
+from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
+from viewer.model.state.depth_editing import Brush, DepthWork
+from viewer.model.state.inspection import Inspection
+
+CENTRE = ViewOffset(0.0, 0.0)
+AS_FOUND = DepthWork()
+
+
+ApertureKind = Literal["disc", "polygon", "ring", "cat_eye", "mask"]
+APERTURE_KINDS: tuple[ApertureKind, ...] = ("disc", "polygon", "ring", "cat_eye", "mask")
+
+
+@dataclass(frozen=True)
+class ApertureMask:
+    """A small grey image as aperture: rows x columns values of one byte each, row 0 on top, 255 = open."""
+
+    name: str
+    rows: int
+    columns: int
+    values: bytes
+
+
+@dataclass(frozen=True)
+class ApertureShape:
+    """The opening, within a circle of the aperture's diameter.
+
+    blades: corners of the polygon, 3 to 11. rotation_deg: turns polygon and mask clockwise. ring_inner: radius of the
+    ring's blocked middle as a share of the opening's. cat_eye: 0..1, how much of the opening the lens barrel cuts off
+    in the picture's corners. mask: None unless kind is "mask".
+    """
+
+    kind: ApertureKind = "disc"
+    blades: int = 6
+    rotation_deg: float = 0.0
+    ring_inner: float = 0.5
+    cat_eye: float = 0.5
+    mask: ApertureMask | None = None
+
+
+@dataclass(frozen=True)
+class Optics:
+    """What the virtual camera does.
+
+    eye: viewpoint in view steps (t down, s right). dolly: how far forward, as the view steps by which the rays at the
+    left and right border of the picture then cross the grid farther out. focus_disparity: the field disparity that is
+    sharp in the middle of the picture (px per view step). focus_range: everything within this much disparity around it
+    is sharp. focus_tilt: change of the sharp disparity from the picture's middle to its right and to its lower border.
+    aperture_diameter: in view steps, 0 = pinhole. highlight_recovery: 0..1, how much brighter than white clipped
+    pixels count. exposure_stops: brightness as a power of two.
+    """
+
+    eye: ViewOffset = CENTRE
+    dolly: float = 0.0
+    focus_disparity: float = 0.0
+    focus_range: float = 0.0
+    focus_tilt: tuple[float, float] = (0.0, 0.0)
+    aperture_diameter: float = 0.0
+    aperture_shape: ApertureShape = ApertureShape()
+    highlight_recovery: float = 0.0
+    exposure_stops: float = 0.0
+
+
+@dataclass(frozen=True)
+class Source:
+    """What to open and what the user decided about it; None leaves the choice to the program.
+
+    path: a photo or a light-field folder. disparity_path, disparity_scale, depth_start, depth_model, refine: see
+    `iibr_core.depth.choice.DepthChoice`. focus_disparity: in the units of the given disparity. quality: where the ray
+    transformer runs.
+    """
+
+    path: str
+    disparity_path: str | None = None
+    disparity_scale: float = 1.0
+    grid: GridShape | None = None
+    focus_disparity: float | None = None
+    max_pixels: int | None = None
+    memory_bytes: int | None = None
+    quality: Quality = DEFAULT_QUALITY
+    depth_start: DepthStart = "auto"
+    depth_model: str | None = None
+    refine: float = 1.0
+
+
+def source_beside(source: Source | None, path: str) -> Source:
+    """To open another file: what was decided about the one before counts, but for what belongs to its depth map."""
+    base = source or Source("")
+    return replace(base, path=path, disparity_path=None, disparity_scale=1.0, focus_disparity=None)
+
+
+def source_with_map(source: Source, path: str) -> Source:
+    """The same photo with this disparity map."""
+    return replace(source, disparity_path=path, disparity_scale=1.0, focus_disparity=None, depth_start="auto")
+
+
+def source_with_depth(source: Source, start: DepthStart, model: str | None = None) -> Source:
+    """The same photo, its depth looked for from here on; model: a name or a folder."""
+    without_map = replace(source, disparity_path=None, disparity_scale=1.0, focus_disparity=None)
+    return replace(without_map, depth_start=start, depth_model=model or source.depth_model)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is open: a photo with its plan, or a light field from disk (plan None).
+
+    depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
+    has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
+    not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
+    file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
+    view step as given. depth_models: names of those on this machine.
+    """
+
+    source: Source
+    name: str
+    width: int
+    height: int
+    grid: GridShape
+    disparity_range_px: tuple[float, float]
+    depth_source: str
+    is_hdr: bool = False
+    has_view_disparity: bool = True
+    plan: ScenePlan | None = None
+    notes: tuple[str, ...] = ()
+    focal_px: float | None = None
+    subject_disparity_px: float = 0.0
+    settings: str = ""
+    depth_origin: DepthOrigin | None = None
+    levels: Levels | None = None
+    depth_models: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the worker is: views done of total, in seconds; doing says what in words when no views are counted."""
+
+    done: int = 0
+    total: int = 0
+    seconds: float = 0.0
+    doing: str = ""
+
+
+@dataclass(frozen=True)
+class SavedSettings:
+    """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
+
+    depth_edits: of the photo's disparity.
+    """
+
+    optics: Optics
+    depth_strength: float
+    source: Source
+    size_px: tuple[int, int]
+    depth_edits: DepthEdits = UNEDITED
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A message the user can dismiss. offer: settings that a button beside it takes over."""
+
+    text: str
+    is_error: bool = False
+    offer: SavedSettings | None = None
+
+
+LoopKind = Literal["circle", "eight", "swing"]
+LOOPS: tuple[LoopKind, ...] = ("circle", "eight", "swing")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A viewpoint that moves by itself; `viewer.model.reducers.camera_motion` says along which path.
+
+    kind: None at rest. turns: of the path since it began at the viewpoint `start` (and its dolly). ticked_s: clock of
+    the last step, None before the first. speed, in turns per second, and is_paused outlast a change of kind.
+    """
+
+    kind: LoopKind | Literal["home"] | None = None
+    turns: float = 0.0
+    ticked_s: float | None = None
+    start: ViewOffset = CENTRE
+    start_dolly: float = 0.0
+    speed: float = 0.25
+    is_paused: bool = False
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the picture changes without anybody touching it."""
+        return self.kind is not None and not self.is_paused
+
+
+@dataclass(frozen=True)
+class Edit:
+    """What undo brings back."""
+
+    optics: Optics
+    depth_strength: float
+    depth: DepthWork = AS_FOUND
+
+
+@dataclass(frozen=True)
+class History:
+    """Edits to go back to (the latest last) and forth to (the nearest first), in the units of the open scene.
+
+    last: the kind of the latest edit. gesture: that kind too while it is under way, "" after: more of the same belongs
+    to it until the pointer goes down or up.
+    """
+
+    past: tuple[Edit, ...] = ()
+    future: tuple[Edit, ...] = ()
+    last: str = ""
+    gesture: str = ""
+
+
+@dataclass(frozen=True)
+class Hover:
+    """Where the pointer is in the picture: pixels of it, and the disparity seen there (None where not known)."""
+
+    x_px: float
+    y_px: float
+    disparity: float | None
+
+
+@dataclass(frozen=True)
+class TiltHandles:
+    """Two places that the sharp plane is laid through, (x, y) from -1 to 1 across the picture, y down.
+
+    taken: which of them is being dragged.
+    """
+
+    first: tuple[float, float] = (-0.5, 0.4)
+    second: tuple[float, float] = (0.5, -0.4)
+    taken: int | None = None
+
+
+ChoiceOf = Literal["photo", "folder", "mask", "truth", "map", "model"]
+"""map: a disparity map for the photo that is open; model: the folder of a depth model."""
+
+
+@dataclass(frozen=True)
+class PathPrompt:
+    """The question for a file, where the system has no file dialog."""
+
+    what: ChoiceOf
+    path: str = ""
+
+
+Saved = Literal["picture", "map"]
+
+
+@dataclass(frozen=True)
+class SavePrompt:
+    """The question where to save the picture, and how large, or its disparity map. already_there: there is one."""
+
+    path: str
+    size_px: tuple[int, int]
+    already_there: bool = False
+    what: Saved = "picture"
+
+
+@dataclass(frozen=True)
+class PalettePrompt:
+    """The list of commands, narrowed down by what was typed."""
+
+    text: str = ""
+
+
+Prompt = PathPrompt | SavePrompt | PalettePrompt | Literal["help"]
+
+
+@dataclass(frozen=True)
+class ChooseTask:
+    """Let the user choose in the system's dialog."""
+
+    what: ChoiceOf
+
+
+@dataclass(frozen=True)
+class SaveTask:
+    """Write the picture, or its disparity map. size_px: (width, height)."""
+
+    path: str
+    size_px: tuple[int, int]
+    may_replace: bool = False
+    what: Saved = "picture"
+
+
+@dataclass(frozen=True)
+class ReadMaskTask:
+    """Read an aperture mask."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class ReadTruthTask:
+    """Look what light field this folder holds, to compare with; once a scene is open."""
+
+    path: str
+
+
+Task = ChooseTask | SaveTask | ReadMaskTask | ReadTruthTask
+"""What the state asks of the outside world; the loop does it and says what came of it by an action."""
+
+Theme = Literal["dark", "light"]
+Section = Literal["view", "focus", "aperture", "light", "depth", "inspect", "scene"]
+SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "depth", "inspect", "scene")
+
+
+@dataclass(frozen=True)
+class Preferences:
+    """What outlasts the program. window: x, y, width, height in screen units, None before the first."""
+
+    theme: Theme = "dark"
+    font_scale: float = 1.0
+    open_sections: tuple[Section, ...] = ("view", "focus", "aperture", "light")
+    window: tuple[int, int, int, int] | None = None
+
+
+@dataclass(frozen=True)
+class DrawReport:
+    """What is known of the picture drawn last.
+
+    samples: drawn so far, of samples_converged. draw_ms: what the last drawing took. error: estimated root mean square
+    difference to the converged picture, 1 = white; None where it is not known.
+    """
+
+    samples: int = 0
+    samples_converged: int = 0
+    draw_ms: float = 0.0
+    error: float | None = None
+
+
+@dataclass(frozen=True)
+class AppState:
+    """Everything. source is what was asked for last, scene what is open; generation numbers the worker's jobs.
+
+    views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
+    they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
+    depth: what is made of the scene's depth; stroke: of the brush, while it is drawn.
+    """
+
+    optics: Optics = field(default_factory=Optics)
+    source: Source | None = None
+    scene: Scene | None = None
+    progress: Progress = field(default_factory=Progress)
+    notices: tuple[Notice, ...] = ()
+    depth_strength: float = 1.0
+    generation: int = 0
+    should_quit: bool = False
+    views_there: frozenset[tuple[int, int]] = frozenset()
+    stopped: int | None = None
+    motion: Motion = Motion()
+    history: History = History()
+    hover: Hover | None = None
+    tilt_handles: TiltHandles | None = None
+    prompt: Prompt | None = None
+    tasks: tuple[Task, ...] = ()
+    preferences: Preferences = Preferences()
+    recent: tuple[str, ...] = ()
+    report: DrawReport | None = None
+    inspection: Inspection = field(default_factory=Inspection)
+    depth: DepthWork = AS_FOUND
+    brush: Brush = field(default_factory=Brush)
+    stroke: Stroke | None = None
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Everything the picture depends on: the scene's generation, the views present, the optics, its size in pixels.
+
+    samples: how far it has come on its way to the converged picture. previews: of edited depth shown so far.
+    """
+
+    generation: int
+    views_present: int
+    optics: Optics
+    size_px: tuple[int, int]
+    samples: int = 0
+    previews: int = 0

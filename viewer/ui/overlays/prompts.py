@@ -1,0 +1,190 @@
+"""Small windows in the middle: where to save, which file to open, the commands by name, the map of mouse and keys."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from viewer.model.actions import Action, DoTask, ShowPrompt
+from viewer.model.commands import COMMANDS, commands_matching
+from viewer.model.layout import Layout
+from viewer.model.opening import chosen
+from viewer.model.state.app_state import AppState, PalettePrompt, PathPrompt, Prompt, SavePrompt, SaveTask
+from viewer.ui.style import palette_of
+from viewer.ui.widgets import button, gap, label, quiet
+
+PROMPT_WIDTH = 460.0
+MOST_SHOWN = 12
+LARGEST_SIDE = 65536
+MOUSE = (
+    ("Drag", "Move the viewpoint"),
+    ("Click", "Focus there"),
+    ("Double click", "Viewpoint back to the middle"),
+    ("Wheel", "Focus nearer or farther"),
+    ("Arrow keys", "Move the viewpoint"),
+    ("Drop", "Open a photo, a folder, a disparity map"),
+    ("Ctrl+click a slider", "Type a value"),
+    ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
+    ("Esc", "Close, put the brush away, then quit"),
+)
+MAP_ENDINGS = "The name's ending decides: .pfm, .exr, .npy, or .png (16 bits, scaled)."
+PATH_WORDS = {
+    "photo": "Open a photo",
+    "folder": "Open a folder of views",
+    "mask": "Image for the aperture; white lets light through",
+    "truth": "Ground truth: a folder of views",
+    "map": "A disparity map for this photo",
+    "model": "The folder of a depth model",
+}
+_FLAGS = (
+    imgui.WindowFlags_.no_title_bar
+    | imgui.WindowFlags_.no_resize
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.always_auto_resize
+)
+
+
+def prompts(state: AppState, layout: Layout) -> list[Action]:
+    """Build the prompt that is asked for, if any."""
+    prompt = state.prompt
+    if prompt is None:
+        return []
+    width = min(PROMPT_WIDTH * layout.ui_scale, layout.window.width)
+    middle = imgui.ImVec2(max(layout.panel.x, width) / 2, layout.window.height / 2)
+    imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(imgui.ImVec2(width, 0))
+    imgui.begin(f"prompt {type(prompt).__name__}", None, _FLAGS)
+    # A field that is typed in takes Esc for itself; one Esc is to close all of it.
+    is_left = imgui.get_io().want_text_input and imgui.is_key_pressed(imgui.Key.escape, False)
+    actions = _contents(prompt, state, layout)
+    imgui.end()
+    if is_left:
+        return [ShowPrompt(None)]
+    return actions
+
+
+def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
+    match prompt:
+        case SavePrompt():
+            return _save(prompt, state, layout)
+        case PathPrompt():
+            return _path(prompt, state, layout)
+        case PalettePrompt():
+            return _palette(prompt, state, layout)
+        case _:
+            return _help(layout)
+
+
+def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
+    """File and size; the picture's shape is kept."""
+    is_map = prompt.what == "map"
+    imgui.text("Save the depth map" if is_map else "Save the picture")
+    gap(layout, 2)
+    _focus_on_appearing()
+    label("File", layout)
+    path, entered = _text_field("path", prompt.path)
+    edited = replace(prompt, path=path, already_there=prompt.already_there and path == prompt.path)
+    edited = edited if is_map else _resized(edited, state, layout)
+    gap(layout, 2)
+    quiet(MAP_ENDINGS if is_map else "The name's ending decides: .png, or .exr in linear light.")
+    if prompt.already_there:
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
+        imgui.text_wrapped("There is a file of this name already.")
+        imgui.pop_style_color()
+    pressed, closed = _buttons("Replace" if prompt.already_there else "Save", layout)
+    if pressed or entered:
+        task = SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what)
+        return [DoTask(task), ShowPrompt(None)]
+    return _closed_or_edited(closed, edited, prompt)
+
+
+def _resized(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
+    """Rows for width and height."""
+    label("Width", layout, "Pixels; the height follows.")
+    changed, width = imgui.input_int("##width", prompt.size_px[0], 0, 0)
+    if changed and state.scene is not None:
+        width = min(max(width, 1), LARGEST_SIDE)
+        prompt = replace(prompt, size_px=(width, max(round(width * state.scene.height / state.scene.width), 1)))
+    label("Height", layout)
+    imgui.align_text_to_frame_padding()
+    imgui.text(str(prompt.size_px[1]))
+    return prompt
+
+
+def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
+    imgui.text(PATH_WORDS[prompt.what])
+    gap(layout, 2)
+    _focus_on_appearing()
+    label("Path", layout)
+    path, entered = _text_field("path", prompt.path)
+    quiet("This system has no file dialog (zenity or kdialog): type a path, or drop a file on the window.")
+    pressed, closed = _buttons("Open", layout)
+    if (pressed or entered) and path.strip():
+        return [ShowPrompt(None), chosen(prompt.what, path.strip(), state)]
+    return _closed_or_edited(closed, replace(prompt, path=path), prompt)
+
+
+def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
+    """Commands that match what was typed; Enter takes the first."""
+    _focus_on_appearing()
+    imgui.set_next_item_width(-1)
+    text, entered = _text_field("command", prompt.text, "Type a command")
+    matching = commands_matching(text)
+    chosen = matching[0] if entered and matching else None
+    room = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
+    for command in matching[:MOST_SHOWN]:
+        pressed, _ = imgui.selectable(command.name, False)
+        if command.chords:
+            words = command.chords[0].words
+            imgui.same_line(room - imgui.calc_text_size(words).x)
+            imgui.text_disabled(words)
+        chosen = command if pressed else chosen
+    if not matching:
+        quiet("No command of that name.")
+    if chosen is not None:
+        return [ShowPrompt(None), chosen.action(replace(state, prompt=None))]
+    return _closed_or_edited(False, PalettePrompt(text), prompt)
+
+
+def _help(layout: Layout) -> list[Action]:
+    imgui.text("Mouse and keys")
+    gap(layout, 2)
+    keys = [(c.chords[0].words, c.name) for c in COMMANDS if c.chords]
+    if imgui.begin_table("keys", 2, imgui.TableFlags_.sizing_fixed_fit):
+        for what, meaning in (*MOUSE, *keys):
+            imgui.table_next_column()
+            imgui.text_disabled(what)
+            imgui.table_next_column()
+            imgui.text(meaning.rstrip("…"))
+        imgui.end_table()
+    gap(layout, 2)
+    return [ShowPrompt(None)] if button("Close", layout) else []
+
+
+def _closed_or_edited(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:
+    if closed:
+        return [ShowPrompt(None)]
+    return [ShowPrompt(edited)] if edited != prompt else []
+
+
+def _buttons(word: str, layout: Layout) -> tuple[bool, bool]:
+    """(pressed, cancelled)."""
+    gap(layout, 2)
+    pressed = button(word, layout)
+    imgui.same_line()
+    return pressed, button("Cancel", layout)
+
+
+def _text_field(name: str, text: str, hint: str = "") -> tuple[str, bool]:
+    """The text, and whether Enter was pressed in it."""
+    _, new = imgui.input_text_with_hint(f"##{name}", hint, text)
+    is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
+    return new, bool(imgui.is_item_deactivated() and is_enter)
+
+
+def _focus_on_appearing() -> None:
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here(0)

@@ -1,0 +1,180 @@
+"""The panel's section for depth: where it came from, how much of it, what was done to it, and the brush."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from iibr_core.depth.choice import DepthStart
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
+from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthStrength
+from viewer.model.commands import BRUSH_WORDS
+from viewer.model.layout import Layout
+from viewer.model.lens.limits import DEPTH_STRENGTH_LIMIT
+from viewer.model.state.app_state import AppState, ChooseTask, Scene, source_with_depth
+from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetRefine, SetTone
+from viewer.model.state.inspection import SetOverlay
+from viewer.ui.sections.depth_histogram import depth_histogram
+from viewer.ui.widgets import button, checkbox, choice, gap, label, quiet, slider, tooltip
+
+START_WORDS: dict[DepthStart, str] = {
+    "auto": "The best there is",
+    "embedded": "The photo's own",
+    "model": "A depth model",
+    "rough": "A rough guess",
+    "flat": "None: flat",
+}
+STRENGTH_TIP = "Multiplies the parallax the plan chose. The views are made anew when you let go."
+REFINE_TIP = "How far soft edges of the depth are drawn to the photo's edges. Exact maps stay as they are."
+FAR_TIP = "What is farther than this is put here. Drag the left handle above, too."
+NEAR_TIP = "What is nearer than this is put here. Drag the right handle above, too."
+GAMMA_TIP = "Above 1 gives more of the depth to what is near, below 1 to what is far."
+INVERT_TIP = "Near becomes far: for maps that mean it the other way round."
+BRUSH_TIPS: dict[BrushTool, str] = {
+    "nearer": "Drag over the picture to bring it nearer; strokes end at the photo's edges (B puts the brush away).",
+    "farther": "Drag over the picture to push it away; strokes end at the photo's edges (B puts the brush away).",
+    "smooth": "Drag over the picture to smooth its depth, along the photo's edges (B puts the brush away).",
+}
+
+
+def depth_line(scene: Scene, layout: Layout) -> None:
+    """Where depth came from, in one line; how to get better depth and what failed come up over it."""
+    origin = scene.depth_origin
+    quiet(origin.line if origin is not None else f"Depth: {scene.depth_source}.")
+    if origin is not None:
+        tooltip("\n".join((*origin.failures, origin.advice)).strip(), layout)
+
+
+def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Build the section. Edits tell when they end, because they cost a new light field; before they are previewed."""
+    if scene.plan is None:
+        quiet("A light field from disk: its depth cannot be changed.")
+        return []
+    actions = _origin(state, scene, layout)
+    actions += _strengths(state, layout)
+    gap(layout, 2)
+    actions += depth_histogram(state, scene, layout)
+    actions += _tone(state, layout)
+    gap(layout, 2)
+    actions += _brush(state, layout)
+    gap(layout, 2)
+    return actions + _files(state, layout)
+
+
+def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Which source of depth is asked for, with the models that are here; advice where it is poor."""
+    origin = scene.depth_origin
+    if origin is not None and origin.advice:
+        quiet(origin.advice)
+    for failure in origin.failures if origin is not None else ():
+        imgui.bullet()
+        quiet(failure)
+    source = state.source
+    if source is None:
+        return []
+    wanted = _choice_words(source.depth_start, source.depth_model, source.disparity_path)
+    ways: list[tuple[DepthStart, str | None]] = [("auto", None), ("embedded", None)]
+    ways += [("model", name) for name in _models(scene, source.depth_model)] + [("rough", None), ("flat", None)]
+    actions: list[Action] = []
+    label("From", layout, "Where depth is looked for. The photo is opened anew.")
+    if imgui.begin_combo("##depth from", wanted):
+        for start, model in ways:
+            words = _choice_words(start, model, None)
+            if imgui.selectable(words, words == wanted)[0]:
+                actions.append(OpenPath(source_with_depth(source, start, model)))
+        imgui.end_combo()
+    tooltip("Where depth is looked for. The photo is opened anew.", layout)
+    return actions
+
+
+def _models(scene: Scene, chosen: str | None) -> list[str]:
+    return list(dict.fromkeys([*([chosen] if chosen else []), *scene.depth_models]))
+
+
+def _choice_words(start: DepthStart, model: str | None, path: str | None) -> str:
+    if path is not None:
+        return _last_part(path)
+    return _last_part(model) if start == "model" and model else START_WORDS[start]
+
+
+def _last_part(path: str) -> str:
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or path
+
+
+def _strengths(state: AppState, layout: Layout) -> list[Action]:
+    actions: list[Action] = []
+    limits = (0.0, DEPTH_STRENGTH_LIMIT)
+    strength = slider("Parallax", state.depth_strength, limits, "× %.2f", layout, STRENGTH_TIP)
+    is_finished = imgui.is_item_deactivated_after_edit()
+    if strength is not None or is_finished:
+        actions.append(SetDepthStrength(state.depth_strength if strength is None else strength, is_finished))
+    form = "off" if state.depth.refine == 0 else "%.0f %%"
+    percent = slider("Refine", 100 * state.depth.refine, (0.0, 100.0), form, layout, REFINE_TIP)
+    is_finished = imgui.is_item_deactivated_after_edit()
+    if percent is not None or is_finished:
+        actions.append(SetRefine(state.depth.refine if percent is None else percent / 100, is_finished))
+    return actions
+
+
+def _tone(state: AppState, layout: Layout) -> list[Action]:
+    edits = state.depth.edits
+    actions: list[Action] = []
+
+    def edit(value: float | None, name: str) -> None:
+        is_finished = imgui.is_item_deactivated_after_edit()
+        if value is not None or is_finished:
+            changed: DepthEdits = edits if value is None else replace(edits, **{name: value})  # type: ignore[arg-type]
+            actions.append(SetTone(changed, is_finished))
+
+    far_form = "off" if edits.far_clip == 0 else "%.2f"
+    edit(slider("Far clip", edits.far_clip, (0.0, 1.0), far_form, layout, FAR_TIP), "far_clip")
+    near_form = "off" if edits.near_clip == 1 else "%.2f"
+    edit(slider("Near clip", edits.near_clip, (0.0, 1.0), near_form, layout, NEAR_TIP), "near_clip")
+    edit(slider("Gamma", edits.gamma, GAMMA_LIMITS, "%.2f", layout, GAMMA_TIP, is_logarithmic=True), "gamma")
+    inverted = checkbox("Invert", edits.is_inverted, layout, INVERT_TIP)
+    if inverted is not None:
+        actions.append(SetTone(replace(edits, is_inverted=inverted), is_finished=True))
+    imgui.same_line()
+    shows = state.inspection.overlay == "disparity"
+    shown = checkbox("Show as colours", shows, layout, "The disparity over the picture (D), see Inspect.")
+    if shown is not None:
+        actions.append(SetOverlay("disparity" if shown else None))
+    return actions
+
+
+def _brush(state: AppState, layout: Layout) -> list[Action]:
+    """A button each tool; the one in hand is lit, and pressing it again puts the brush away."""
+    brush = state.brush
+    actions: list[Action] = []
+    imgui.text("Brush")
+    spacing = 4 * layout.ui_scale
+    width = (imgui.get_content_region_avail().x - spacing * (len(BRUSH_TOOLS) - 1)) / len(BRUSH_TOOLS)
+    for i, tool in enumerate(BRUSH_TOOLS):
+        if i:
+            imgui.same_line(0, spacing)
+        is_in_hand = brush.is_on and brush.tool == tool
+        if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), BRUSH_TIPS[tool]):
+            actions.append(SetBrush(replace(brush, tool=tool, is_on=not is_in_hand)))
+    if brush.is_on:
+        limits = (100 * RADIUS_LIMITS[0], 100 * RADIUS_LIMITS[1])
+        tip = "Radius, of the photo's width (wheel over the picture)."
+        size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, tip, is_logarithmic=True)
+        actions += [] if size is None else [SetBrush(replace(brush, radius=size / 100))]
+        percent = slider("Strength", 100 * brush.strength, (0.0, 100.0), "%.0f %%", layout, "Of one stroke.")
+        actions += [] if percent is None else [SetBrush(replace(brush, strength=percent / 100))]
+    return actions
+
+
+def _files(state: AppState, layout: Layout) -> list[Action]:
+    actions: list[Action] = []
+    if button("Open map…", layout, "A disparity map for this photo: PFM, EXR, NPY or 16-bit PNG."):
+        actions.append(DoTask(ChooseTask("map")))
+    imgui.same_line(0, 4 * layout.ui_scale)
+    if button("Save map…", layout, "The disparity with all edits, to be opened again with --disparity."):
+        actions.append(AskToSave("map"))
+    imgui.same_line(0, 4 * layout.ui_scale)
+    is_edited = state.source is not None and state.depth.edits != DepthEdits()
+    if button("Reset", layout, "Depth as it was found: no edits, refined as at first.", is_edited):
+        actions.append(ResetDepth())
+    return actions

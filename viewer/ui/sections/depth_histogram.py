@@ -1,0 +1,107 @@
+"""How the disparity is spread, far left, near right, in the overlay's colours, with the clips to drag and the focus."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from iibr_core.depth.editing.edits import DepthEdits, Levels, share_before_tone, toned_share
+from viewer.model.actions import Action
+from viewer.model.colormap import mapped
+from viewer.model.layout import Layout
+from viewer.model.state.app_state import AppState, Scene
+from viewer.model.state.depth_editing import SetTone
+from viewer.ui.style import packed, palette_of
+from viewer.ui.widgets import tooltip
+
+HEIGHT = 56.0
+HANDLE_WIDTH = 12.0
+TIP = "How much of the picture lies how far: far left, near right. Drag the handles to clip; the line is the focus."
+
+
+def depth_histogram(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Build it; the places are those before clips and gamma, the colours those after."""
+    levels = scene.levels
+    if levels is None:
+        return []
+    edits, scale = state.depth.edits, layout.ui_scale
+    corner = imgui.get_cursor_screen_pos()
+    room = HANDLE_WIDTH * scale / 2
+    width, height = imgui.get_content_region_avail().x - 2 * room, HEIGHT * scale
+    left, top = corner.x + room, corner.y
+    _draw_bars(levels, edits, left, top, width, height)
+    _draw_focus(state, scene, levels, left, top, width, height, scale)
+    actions = _handle("far_clip", edits, left, top, width, height, state, layout)
+    actions += _handle("near_clip", edits, left, top, width, height, state, layout)
+    imgui.set_cursor_screen_pos(corner)
+    imgui.dummy(imgui.ImVec2(width + 2 * room, height + 4 * scale))
+    tooltip(TIP, layout)
+    return actions
+
+
+def bar_heights(levels: Levels, is_inverted: bool) -> list[float]:
+    """Of each bar, 0..1, far first. The root: a wall at one depth must not hide all the rest."""
+    counts = levels.counts[::-1] if is_inverted else levels.counts
+    most = max(counts, default=0) or 1
+    return [(count / most) ** 0.5 for count in counts]
+
+
+def focus_share(state: AppState, scene: Scene, levels: Levels) -> float | None:
+    """Where the focus is among the places of the histogram, 0..1; None where it lies outside."""
+    plan = scene.plan
+    if plan is None or not plan.disparity_scale:
+        return None
+    given = state.optics.focus_disparity / plan.disparity_scale + plan.disparity_zero
+    share = share_before_tone((given - levels.low) / (levels.high - levels.low), state.depth.edits)
+    return share if 0 <= share <= 1 else None
+
+
+def _draw_bars(levels: Levels, edits: DepthEdits, left: float, top: float, width: float, height: float) -> None:
+    draw, style = imgui.get_window_draw_list(), imgui.get_style()
+    far = imgui.ImVec2(left + width, top + height)
+    ground = imgui.get_color_u32(imgui.Col_.frame_bg)
+    draw.add_rect_filled(imgui.ImVec2(left, top), far, ground, style.frame_rounding)
+    heights = bar_heights(levels, edits.is_inverted)
+    step = width / len(heights)
+    tone = replace(edits, is_inverted=False)
+    for i, share in enumerate(heights):
+        place = (i + 0.5) / len(heights)
+        is_clipped = not edits.far_clip <= place <= edits.near_clip
+        color = packed((*mapped(toned_share(place, tone)), 1.0), 0.3 if is_clipped else 1.0)
+        corner = imgui.ImVec2(left + i * step, top + height * (1 - share))
+        draw.add_rect_filled(corner, imgui.ImVec2(left + (i + 1) * step, top + height), color)
+
+
+def _draw_focus(
+    state: AppState, scene: Scene, levels: Levels, left: float, top: float, width: float, height: float, scale: float
+) -> None:
+    share = focus_share(state, scene, levels)
+    if share is not None:
+        x, color = left + share * width, packed(palette_of(state.preferences.theme).accent)
+        draw = imgui.get_window_draw_list()
+        draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, top + height), color, 1.5 * scale)
+
+
+def _handle(
+    name: str, edits: DepthEdits, left: float, top: float, width: float, height: float, state: AppState, layout: Layout
+) -> list[Action]:
+    """One of the clips: a line over the bars with a grip below; it follows the pointer while it is held."""
+    scale, palette = layout.ui_scale, palette_of(state.preferences.theme)
+    x = left + getattr(edits, name) * width
+    grip = HANDLE_WIDTH * scale
+    imgui.set_cursor_screen_pos(imgui.ImVec2(x - grip / 2, top))
+    imgui.set_next_item_allow_overlap()
+    imgui.invisible_button(f"handle {name}", imgui.ImVec2(grip, height + 4 * scale))
+    is_held, is_released = imgui.is_item_active(), imgui.is_item_deactivated()
+    color = packed(palette.accent if is_held or imgui.is_item_hovered() else palette.text)
+    draw, bottom = imgui.get_window_draw_list(), top + height
+    draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, bottom), color, scale)
+    side, up = grip / 2, 7 * scale
+    corners = imgui.ImVec2(x - side, bottom + 4 * scale), imgui.ImVec2(x + side, bottom + 4 * scale)
+    draw.add_triangle_filled(imgui.ImVec2(x, bottom + 4 * scale - up), *corners, color)
+    if not (is_held or is_released):
+        return []
+    share = min(max((imgui.get_io().mouse_pos.x - left) / width, 0.0), 1.0)
+    changed: DepthEdits = replace(edits, **{name: share})  # type: ignore[arg-type]
+    return [SetTone(changed, is_finished=is_released)]

@@ -1,0 +1,124 @@
+"""The panel's section for looking into the light field: EPIs, views, values, overlays, comparisons and scores."""
+
+from __future__ import annotations
+
+import math
+
+from imgui_bundle import imgui
+
+from viewer.model.actions import Action, DoTask
+from viewer.model.inspection_request import compared_grid, compared_view, view_words
+from viewer.model.layout import Layout
+from viewer.model.reducers.inspection import obstacle_to_comparison, obstacle_to_overlay
+from viewer.model.state.app_state import AppState, ChooseTask, Scene
+from viewer.model.state.inspection import (
+    COMPARISONS,
+    OVERLAYS,
+    Compare,
+    Comparison,
+    OverlayKind,
+    SetOpacity,
+    SetOverlay,
+    ShowEpis,
+    ShowGrid,
+    ShowValues,
+)
+from viewer.ui.widgets import button, choice, quiet, slider
+
+OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "Disparity", "entropy": "Entropy", "inpainted": "Inpainted"}
+OVERLAY_TIPS: dict[OverlayKind, str] = {
+    "disparity": "How near everything is, in px per view step.",
+    "entropy": "How undecided the weights of the rays are: 1 where no ray of the photo shows anything.",
+    "inpainted": "What the photo never saw and had to be made up.",
+}
+COMPARISON_WORDS: dict[Comparison, str] = {"photo": "Photo", "quality": "Exact", "truth": "Truth"}
+COMPARISON_TIPS: dict[Comparison, str] = {
+    "photo": "The photo beside the picture.",
+    "quality": "The view nearest to the viewpoint, made fast and made exactly.",
+    "truth": "The view nearest to the viewpoint beside the same one of a light field on disk. Drop its folder on the "
+    "panel, or press again to choose another one.",
+}
+
+
+def inspect_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Build the section."""
+    return _toggles(state, layout) + _overlays(state, scene, layout) + _comparisons(state, scene, layout)
+
+
+def score_words(psnr_db: float | None, flip: float | None) -> str:
+    """PSNR and FLIP in one line: "41.2 dB PSNR, 0.031 FLIP"; "identical" where nothing differs."""
+    if psnr_db is None or flip is None:
+        return "PSNR and FLIP follow when all is still"
+    return "identical" if math.isinf(psnr_db) else f"{psnr_db:.2f} dB PSNR, {flip:.4f} FLIP"
+
+
+def _toggles(state: AppState, layout: Layout) -> list[Action]:
+    inspection = state.inspection
+    row = (
+        ("EPIs", inspection.shows_epis, ShowEpis, "Epipolar plane images through the pointer (E)"),
+        ("Views", inspection.shows_grid, ShowGrid, "All views; click one to go there (G)"),
+        ("Values", inspection.shows_values, ShowValues, "What is under the pointer, in a line below (V)"),
+    )
+    pressed = _choices([(word, is_on, tip, "") for word, is_on, _, tip in row], layout)
+    return [] if pressed is None else [row[pressed][2](not row[pressed][1])]
+
+
+def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    imgui.text("Over the picture")
+    chosen = state.inspection.overlay
+    row = [(OVERLAY_WORDS[k], chosen == k, OVERLAY_TIPS[k], obstacle_to_overlay(scene, k)) for k in OVERLAYS]
+    pressed = _choices(row, layout)
+    actions: list[Action] = []
+    if pressed is not None:
+        actions.append(SetOverlay(None if chosen == OVERLAYS[pressed] else OVERLAYS[pressed]))
+    if chosen is not None:
+        percent = slider("Opacity", 100 * state.inspection.opacity, (0.0, 100.0), "%.0f %%", layout)
+        actions += [] if percent is None else [SetOpacity(percent / 100)]
+    return actions
+
+
+def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    imgui.text("Compare with")
+    inspection = state.inspection
+    chosen = inspection.comparison
+    row = [
+        (COMPARISON_WORDS[k], chosen == k, COMPARISON_TIPS[k], obstacle_to_comparison(scene, k)) for k in COMPARISONS
+    ]
+    pressed = _choices(row, layout)
+    actions: list[Action] = []
+    if pressed is not None:
+        actions.append(Compare(None if chosen == COMPARISONS[pressed] else COMPARISONS[pressed]))
+    if inspection.truth is not None:
+        if button("Folder…", layout, inspection.truth.path):
+            actions.append(DoTask(ChooseTask("truth")))
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        quiet(inspection.truth.name)
+    if chosen in ("quality", "truth"):
+        quiet(pair_words(state, scene, chosen))
+    return actions
+
+
+def pair_words(state: AppState, scene: Scene, kind: Comparison) -> str:
+    """Which view is compared, and how far its two images are apart."""
+    truth, pair = state.inspection.truth, state.inspection.pair
+    grid, wanted = compared_grid(scene, kind, truth), compared_view(scene, state.optics.eye, kind, truth)
+    if pair is None or pair.view != wanted:
+        return f"Making the {view_words(wanted, grid)}…"
+    words = view_words(pair.view, grid)
+    return f"{words[0].upper()}{words[1:]}: {score_words(pair.psnr_db, pair.flip)}"
+
+
+def _choices(row: list[tuple[str, bool, str, str]], layout: Layout) -> int | None:
+    """A row of lit buttons (word, is lit, tip, why not) as wide as the panel; which was pressed."""
+    spacing = 4 * layout.ui_scale
+    width = (imgui.get_content_region_avail().x - spacing * (len(row) - 1)) / len(row)
+    pressed = None
+    for i, (word, is_on, tip, obstacle) in enumerate(row):
+        if i:
+            imgui.same_line(0, spacing)
+        imgui.begin_disabled(bool(obstacle))
+        if choice(word, is_on, layout, (width, 0), obstacle or tip):
+            pressed = i
+        imgui.end_disabled()
+    return pressed

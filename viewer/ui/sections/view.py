@@ -1,0 +1,70 @@
+"""The panel's section for the viewpoint: the pad, loops beside it, dolly below."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.model.actions import Action, PauseMotion, ReturnHome, SetDolly, SetLoop, SetSpeed
+from viewer.model.commands import LOOP_WORDS
+from viewer.model.layout import Layout
+from viewer.model.lens.limits import SPEED_LIMITS, dolly_limit, is_extrapolated
+from viewer.model.state.app_state import LOOPS, AppState, Scene
+from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
+from viewer.ui.style import Palette, packed
+from viewer.ui.widgets import button, choice, slider, tooltip
+
+PAD_TIP = "Drag to move the viewpoint. Dots are views, faint ones still to be made; beyond the light area is a guess."
+
+
+def view_section(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
+    """Build the section."""
+    actions = pad(state, scene, layout, palette)
+    if not state.motion.is_running:
+        tooltip("" if imgui.is_item_active() else PAD_TIP, layout)
+    imgui.same_line()
+    imgui.begin_group()
+    actions += _loops(state, layout)
+    _place(state, scene, palette)
+    imgui.end_group()
+    if state.motion.kind in LOOPS:
+        actions += _speed(state, layout)
+    if farthest := dolly_limit(scene.grid):
+        tip = "Step into the picture or back out of it, as far as the views allow."
+        dolly = slider("Dolly", state.optics.dolly, (-farthest, farthest), "%+.2f views", layout, tip)
+        actions += [] if dolly is None else [SetDolly(dolly)]
+    return actions
+
+
+def _loops(state: AppState, layout: Layout) -> list[Action]:
+    """One button a loop; the one that runs is lit, and pressing it again stops it."""
+    actions: list[Action] = []
+    width = imgui.get_content_region_avail().x
+    for kind in LOOPS:
+        is_chosen = state.motion.kind == kind
+        if choice(LOOP_WORDS[kind], is_chosen, layout, (width, 0)):
+            actions.append(SetLoop(None if is_chosen else kind))
+    if button("To the middle", layout, "Glide back to the photo's own viewpoint (double click)", width=width):
+        actions.append(ReturnHome())
+    return actions
+
+
+def _place(state: AppState, scene: Scene, palette: Palette) -> None:
+    """Where the viewpoint is, in one line that never wraps; amber where the picture is extrapolated."""
+    eye = state.optics.eye
+    outside = is_extrapolated(eye, scene.grid)
+    s, t = (round(value, 1) + 0.0 for value in (eye.s, eye.t))  # + 0.0 takes the sign of -0.0 away
+    words = f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}"
+    imgui.push_style_color(imgui.Col_.text, packed(palette.warning if outside else palette.quiet))
+    imgui.text(words)
+    imgui.pop_style_color()
+
+
+def _speed(state: AppState, layout: Layout) -> list[Action]:
+    actions: list[Action] = []
+    speed = slider("Speed", state.motion.speed, SPEED_LIMITS, "%.2f turns/s", layout, is_logarithmic=True)
+    if speed is not None:
+        actions.append(SetSpeed(speed))
+    word = "Go on" if state.motion.is_paused else "Pause"
+    if button(word, layout, "Space", width=PAD_SIDE * layout.ui_scale):
+        actions.append(PauseMotion(not state.motion.is_paused))
+    return actions

@@ -1,0 +1,111 @@
+"""The joystick: the grid of views from above, which of them are there, and the viewpoint to be dragged about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from iibr_core.types import GridShape, ViewOffset
+from viewer.model.actions import Action, MoveEye
+from viewer.model.layout import Layout, Rect
+from viewer.model.lens.limits import eye_limits, is_extrapolated
+from viewer.model.state.app_state import AppState, Scene
+from viewer.ui.style import Palette, packed
+
+PAD_SIDE = 136.0
+EDGE = 7.0
+MOST_ROUND_DOTS = 500
+
+
+@dataclass(frozen=True)
+class PadMap:
+    """Between view offsets and window units: the pad's middle, and units per view step."""
+
+    rect: Rect
+    middle: ViewOffset
+    units_per_view: float
+
+    def point(self, eye: ViewOffset) -> tuple[float, float]:
+        """Where a view offset lies on the pad."""
+        x = self.rect.x + self.rect.width / 2 + (eye.s - self.middle.s) * self.units_per_view
+        return x, self.rect.y + self.rect.height / 2 + (eye.t - self.middle.t) * self.units_per_view
+
+    def eye(self, x: float, y: float) -> ViewOffset:
+        """The inverse of `point`."""
+        s = self.middle.s + (x - self.rect.x - self.rect.width / 2) / self.units_per_view
+        return ViewOffset(self.middle.t + (y - self.rect.y - self.rect.height / 2) / self.units_per_view, s)
+
+
+def pad_map(rect: Rect, grid: GridShape, edge: float) -> PadMap:
+    """The map that lets every viewpoint allowed lie within the pad; square steps."""
+    (top, bottom), (left, right) = eye_limits(grid.rows), eye_limits(grid.columns)
+    widest = max(bottom - top, right - left)
+    return PadMap(rect, ViewOffset((top + bottom) / 2, (left + right) / 2), (rect.width - 2 * edge) / widest)
+
+
+def pad(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
+    """Build the pad; dragging in it moves the viewpoint."""
+    side = PAD_SIDE * layout.ui_scale
+    corner = imgui.get_cursor_screen_pos()
+    imgui.invisible_button("pad", imgui.ImVec2(side, side))
+    chart = pad_map(Rect(corner.x, corner.y, side, side), scene.grid, EDGE * layout.ui_scale)
+    _draw(state, scene.grid, chart, layout.ui_scale, palette)
+    if not imgui.is_item_active():
+        return []
+    mouse = imgui.get_io().mouse_pos
+    eye = chart.eye(mouse.x, mouse.y)
+    return [MoveEye(eye)] if eye != state.optics.eye else []
+
+
+def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float, palette: Palette) -> None:
+    draw, rect = imgui.get_window_draw_list(), chart.rect
+    corners = imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height)
+    draw.add_rect_filled(*corners, packed(palette.frame), 4 * scale)
+    draw.push_clip_rect(*corners, True)
+    _draw_stored(draw, grid, chart, scale, palette)
+    _draw_views(draw, state.views_there, grid, chart, scale, palette)
+    x, y = chart.point(state.optics.eye)
+    outside = is_extrapolated(state.optics.eye, grid)
+    color = palette.warning if outside else palette.accent
+    if outside:
+        inside = ViewOffset(*(_held(value, views) for value, views in zip(state.optics.eye, grid)))
+        draw.add_line(imgui.ImVec2(*chart.point(inside)), imgui.ImVec2(x, y), packed(color, 0.7), 1.5 * scale)
+    draw.add_circle_filled(imgui.ImVec2(x, y), 6 * scale, packed(color))
+    draw.add_circle(imgui.ImVec2(x, y), 6 * scale, packed(palette.panel), 0, 1.5 * scale)
+    draw.pop_clip_rect()
+
+
+def _draw_stored(draw: imgui.ImDrawList, grid: GridShape, chart: PadMap, scale: float, palette: Palette) -> None:
+    """The area between the outermost views: what lies beyond is extrapolated."""
+    left, top = chart.point(grid.offset(0, 0))
+    right, bottom = chart.point(grid.offset(grid.rows - 1, grid.columns - 1))
+    room = 4 * scale
+    corners = imgui.ImVec2(left - room, top - room), imgui.ImVec2(right + room, bottom + room)
+    draw.add_rect_filled(*corners, packed(palette.frame_hovered), 3 * scale)
+
+
+def _draw_views(
+    draw: imgui.ImDrawList,
+    there: frozenset[tuple[int, int]],
+    grid: GridShape,
+    chart: PadMap,
+    scale: float,
+    palette: Palette,
+) -> None:
+    """A dot for every view; faint where it has not come yet."""
+    radius = min(max(0.16 * chart.units_per_view, 0.75 * scale), 2.5 * scale)
+    known, missing = packed(palette.quiet), packed(palette.quiet, 0.28)
+    as_circles = grid.rows * grid.columns <= MOST_ROUND_DOTS
+    for row in range(grid.rows):
+        for column in range(grid.columns):
+            x, y = chart.point(grid.offset(row, column))
+            color = known if (row, column) in there else missing
+            if as_circles:
+                draw.add_circle_filled(imgui.ImVec2(x, y), radius, color, 8)
+            else:
+                draw.add_rect_filled(imgui.ImVec2(x - radius, y - radius), imgui.ImVec2(x + radius, y + radius), color)
+
+
+def _held(value: float, views: int) -> float:
+    return min(max(value, -(views // 2)), views - 1 - views // 2)
