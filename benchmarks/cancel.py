@@ -18,7 +18,7 @@ from itertools import islice
 
 import numpy as np
 
-from iibr_core.depth.pictorial_cues import estimate_offline
+from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import refine
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
@@ -64,7 +64,7 @@ def main() -> None:
     photo, disparity = scene(given.pixels)
     size = f"{photo.size[1]}x{photo.size[0]}"
     for quality in given.quality:
-        compiled(quality)
+        compile_all(quality)
         waits = np.sort([wait_ms(photo, disparity, quality, k / given.times) for k in range(given.times)])
         print(
             f"{quality:9} {size}: cancelled after {np.median(waits):.0f} ms (median), {waits[-1]:.0f} ms (longest of"
@@ -105,11 +105,11 @@ def depth_work(photo: Photo, disparity: Disparity) -> dict[str, Callable[[Should
     soft[np.random.default_rng(0).random(soft.shape) < 0.1] = np.nan
     return {
         "refine": lambda should_stop: refine(photo.pixels, soft, should_stop=should_stop),
-        "guess": lambda should_stop: estimate_offline(photo, should_stop),
+        "guess": lambda should_stop: estimate_from_cues(photo, should_stop),
     }
 
 
-def compiled(quality: Quality) -> None:
+def compile_all(quality: Quality) -> None:
     """Everything that is needed, on a small photo."""
     photo, disparity = scene(5_000)
     list(generate(photo, disparity, plan_literal(photo, disparity, GridShape(3, 3)), quality=quality))

@@ -19,17 +19,17 @@ import numpy as np
 
 from benchmarks.speed.variants import bench_scenes
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.pictorial_cues import estimate_offline
+from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import edge_blur_px, refine
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
-from iibr_core.inpainting.disparity_holes import fill_from_background
-from iibr_core.training.degradation import blurred
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes
+from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import Disparity, FloatImage, GridShape, Photo, ViewOffset
+from iibr_core.types import Disparity, FloatImage, GridShape, ImageSize, Photo, ViewOffset
 
 SOFT = {"antinous-blur1": 40.5, "antinous-blur2": 39.0, "antinous-blur4": 36.0, "antinous-half": 40.5}
 """Scenes with soft disparity, and the PSNR (dB) that refinement must reach."""
@@ -38,9 +38,9 @@ HELD_OUT = range(6, 14)
 """Procedural scenes that no choice was made by."""
 FAULTS: dict[str, Callable[[FloatImage], FloatImage]] = {
     "exact": lambda d: d,
-    "blurred by 1 px": lambda d: blurred(d, 1.0),
-    "by 2 px": lambda d: blurred(d, 2.0),
-    "by 4 px": lambda d: blurred(d, 4.0),
+    "blurred by 1 px": lambda d: blur(d, 1.0),
+    "by 2 px": lambda d: blur(d, 2.0),
+    "by 4 px": lambda d: blur(d, 4.0),
 }
 ONE_MEGAPIXEL = 1000, 1000
 REPEATS = 5
@@ -74,7 +74,7 @@ def report(data: Path, yardsticks: Path) -> Iterator[str]:
     yield from refinement(data, yardsticks)
     yield from procedural()
     yield from seconds()
-    yield from guessed(data)
+    yield from guess_table(data)
 
 
 def refinement(data: Path, yardsticks: Path) -> Iterator[str]:
@@ -101,9 +101,9 @@ def procedural() -> Iterator[str]:
     size, offsets = (240, 320), (ViewOffset(-4.0, -4.0), ViewOffset(0.0, 4.0))
     rows: dict[str, list[tuple[float, float]]] = {name: [] for name in FAULTS}
     for seed in HELD_OUT:
-        scene = random_scene(np.random.default_rng(20_000 + seed), size, 2.5)
-        colors, disparity = render(scene, size, ViewOffset(0.0, 0.0))
-        truth = {offset: render(scene, size, offset)[0] for offset in offsets}
+        scene = random_scene(np.random.default_rng(20_000 + seed), ImageSize(*size), 2.5)
+        colors, disparity = render(scene, ImageSize(*size), ViewOffset(0.0, 0.0))
+        truth = {offset: render(scene, ImageSize(*size), offset)[0] for offset in offsets}
         for name, spoil in FAULTS.items():
             soft = spoil(disparity)
             rows[name].append((views_psnr(colors, soft, truth, 9), views_psnr(colors, refine(colors, soft), truth, 9)))
@@ -135,11 +135,11 @@ def seconds() -> Iterator[str]:
     yield from ("Time of 1 MP, the least of several; CPU seconds are those of all threads together:", "")
     yield from ("| what | s | CPU s | figure | holds |", "| --- | --- | --- | --- | --- |")
     for sigma in (0.0, 1.0, 2.0, 4.0, 8.0):
-        soft = blurred(disparity, sigma)
+        soft = blur(disparity, sigma)
         wall, cpu = least_seconds(lambda soft=soft: refine(colors, soft))
         holds = yes(min(wall, cpu) <= 0.5)
         yield f"| refining edges blurred by {sigma:g} px | {wall:.2f} | {cpu:.2f} | <= 0.5 | {holds} |"
-    wall, cpu = least_seconds(lambda: estimate_offline(Photo(colors, 1000.0, "scene")))
+    wall, cpu = least_seconds(lambda: estimate_from_cues(Photo(colors, 1000.0, "scene")))
     yield f"| the guess without a model | {wall:.2f} | {cpu:.2f} | | |"
     yield ""
 
@@ -154,7 +154,7 @@ def least_seconds(work: Callable[[], object]) -> tuple[float, float]:
     return min(wall for wall, _ in times), min(cpu for _, cpu in times)
 
 
-def guessed(data: Path) -> Iterator[str]:
+def guess_table(data: Path) -> Iterator[str]:
     """The guess beside a ramp and a constant, on scenes whose disparity is known to be true."""
     yield from ("## The guess without a model", "")
     yield "Scale and shift are fitted to the true disparity by least squares, for the guess, for a ramp from top to"
@@ -167,9 +167,9 @@ def guessed(data: Path) -> Iterator[str]:
     for scene in (bench_scenes(one, DEFAULT_MAX_PIXELS, with_soft=False)[0] for one in known):
         true, truth, side = scene.disparity, scene.truth, 2 * scene.reach + 1
         photo = Photo(scene.photo, float(scene.photo.shape[1]), scene.name)
-        guess = estimate_offline(photo).values
+        guess = estimate_from_cues(photo).values
         maps = (refine(photo.pixels, guess), np.indices(true.shape, np.float32)[0], np.zeros_like(true))
-        fits = [fitted(candidate, true) for candidate in maps]
+        fits = [fit_to(candidate, true) for candidate in maps]
         errors = [float(np.sqrt(np.nanmean((fit - true) ** 2))) for fit in fits]
         ratios = [views_psnr(photo.pixels, fit, truth, side) for fit in fits]
         flat = float(np.mean([psnr(photo.pixels, view) for view in truth.values()]))
@@ -179,13 +179,13 @@ def guessed(data: Path) -> Iterator[str]:
     yield from ("", *NOTE)
 
 
-def fitted(values: FloatImage, true: FloatImage) -> FloatImage:
+def fit_to(values: FloatImage, true: FloatImage) -> FloatImage:
     """`values` * scale + shift, closest to the known true values; scale >= 0."""
     known = np.isfinite(true)
     x, y = values[known].astype(np.float64), true[known].astype(np.float64)
     spread = x.var()
     scale = max(float(np.mean((x - x.mean()) * (y - y.mean())) / spread), 0.0) if spread > 0 else 0.0
-    return fill_from_background(((values - x.mean()) * scale + y.mean()).astype(np.float32))
+    return fill_disparity_holes(((values - x.mean()) * scale + y.mean()).astype(np.float32))
 
 
 def yes(holds: bool) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
-from viewer.app.main_loop import App, opening
+from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import OpenPath, SetAperture
 from viewer.model.state.app_state import Source
 
@@ -56,20 +56,20 @@ def drag(app: App) -> Drag:
     frames, milliseconds, draws, turn = [], [], [], 0
     while hand.poll() is None:
         turn += 1
-        eye, drawn, start = app.state.optics.eye, app.stage.pictures_drawn, time.perf_counter()
+        eye, drawn, start = app.state.optics.eye, app.scene_view.pictures_drawn, time.perf_counter()
         app.step()
-        shown = app.stage.picture_drawn
+        shown = app.scene_view.picture_drawn
         if shown is not None and shown.optics.eye in waiting:
             since, read_at = waiting[shown.optics.eye]
             waiting = {other: read for other, read in waiting.items() if read[0] > since}
             frames.append(turn - since + 1)
             milliseconds.append((time.perf_counter() - read_at) * 1e3)
-        if app.stage.pictures_drawn > drawn:
-            draws.append(app.stage.report.draw_ms)
+        if app.scene_view.pictures_drawn > drawn:
+            draws.append(app.scene_view.report.draw_ms)
         if app.state.optics.eye != eye:
             waiting[app.state.optics.eye] = turn, start
     left_over = 0
-    while app.stage.picture_drawn is None or app.stage.picture_drawn.optics.eye != app.state.optics.eye:
+    while app.scene_view.picture_drawn is None or app.scene_view.picture_drawn.optics.eye != app.state.optics.eye:
         app.step()
         left_over += 1
     subprocess.run(["xdotool", "mouseup", "1"], check=True)
@@ -89,7 +89,7 @@ def main() -> None:
     args = parser.parse_args()
     photo = resource_folder("assets") / "motorcycle" / "motorcycle.png"
     with private_display():
-        app = App(opening(OpenPath(Source(str(photo)))))
+        app = App(initial_state(OpenPath(Source(str(photo)))))
         try:
             settle(app)
             for aperture in map(float, args.apertures.split(",")):

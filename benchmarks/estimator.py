@@ -17,11 +17,11 @@ import numpy as np
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import LocalModel
 from iibr_core.depth.models.transformers_models import estimate_with
-from iibr_core.depth.search import resized
+from iibr_core.depth.search import resize_estimate
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import Photo
+from iibr_core.types import ImageSize, Photo
 
-SIZE = (864, 1152)  # 1 MP
+SIZE = ImageSize(864, 1152)  # 1 MP
 GOAL_S = 3.0
 PREPROCESSOR = (
     '{"size": {"height": 518, "width": 518}, "keep_aspect_ratio": true, "ensure_multiple_of": 14,'
@@ -45,7 +45,7 @@ def model_in(folder: Path) -> LocalModel:
     return LocalModel("Depth Anything V2 Small (random weights)", folder)
 
 
-def timed(what: str, run: Callable[[], object], rounds: int) -> float:
+def time_rounds(what: str, run: Callable[[], object], rounds: int) -> float:
     """Best wall time of several rounds, printed with the processor time of that round."""
     best = (float("inf"), 0.0)
     for _ in range(rounds):
@@ -72,12 +72,16 @@ def main() -> None:
         def anew() -> object:
             for path in cache.glob("*"):
                 path.unlink()
-            return resized(estimate_with(model, photo), photo.size)
+            return resize_estimate(estimate_with(model, photo), photo.size)
 
         print(f"{photo.size[1]}x{photo.size[0]}, {model.title}, best of {arguments.rounds}")
         anew()  # imports and compiles
-        seconds = timed("photo to depth at the photo's size", anew, arguments.rounds)
-        timed("the same from the cache", lambda: resized(estimate_with(model, photo), photo.size), arguments.rounds)
+        seconds = time_rounds("photo to depth at the photo's size", anew, arguments.rounds)
+        time_rounds(
+            "the same from the cache",
+            lambda: resize_estimate(estimate_with(model, photo), photo.size),
+            arguments.rounds,
+        )
         print(f"goal: {GOAL_S:g} s, {'met' if seconds <= GOAL_S else 'missed'}")
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import fuzz_seeds as seeds
-from benchmarks.fuzz_damage import Seed, damaged, mended_png
+from benchmarks.fuzz_damage import Seed, damaged, repair_png
 from iibr_core.types import InputError
 
 MAX_PIXELS = 100_000
@@ -59,10 +59,10 @@ def _open_with_depth(path: Path) -> None:
 
 def _read_field(path: Path) -> None:
     from iibr_core.formats.light_fields.hci import read_light_field
-    from iibr_core.formats.light_fields.numbered_grid import read_grid_folder
+    from iibr_core.formats.light_fields.numbered_grid import read_numbered_grid
 
     refused = None
-    for read in (read_light_field, read_grid_folder):
+    for read in (read_light_field, read_numbered_grid):
         try:
             found = read(path.parent)
             if isinstance(found, tuple):
@@ -106,9 +106,9 @@ def _view_and_lens(folder: Path) -> None:
 
 def _read_lens_picture(path: Path) -> None:
     from iibr_core.evaluation.lens_picture import read_lens_picture
-    from iibr_core.formats.light_fields.numbered_grid import read_grid_folder
+    from iibr_core.formats.light_fields.numbered_grid import read_numbered_grid
 
-    scene = read_grid_folder(path.parent)
+    scene = read_numbered_grid(path.parent)
     assert scene is not None
     found = read_lens_picture(scene, MAX_PIXELS)
     assert found is not None
@@ -116,10 +116,10 @@ def _read_lens_picture(path: Path) -> None:
 
 
 def _read_preferences(path: Path) -> None:
-    from viewer.app.preferences_store import with_kept
+    from viewer.app.preferences_store import load_preferences
     from viewer.model.state.app_state import AppState
 
-    if with_kept(AppState(), path.parent).notices:
+    if load_preferences(AppState(), path.parent).notices:
         raise InputError("told in a notice")
 
 
@@ -156,7 +156,7 @@ READERS: dict[str, Reader] = {
     "embedded": Reader(seeds.photos_with_depth, _open_with_depth),
     "pfm": Reader(seeds.pfms, _read_map),
     "npy": Reader(seeds.npys, _read_map),
-    "map-png": Reader(lambda: [Seed("a_depth.png", seeds.by_pillow("PNG", "L"), mended_png)], _read_map),
+    "map-png": Reader(lambda: [Seed("a_depth.png", seeds.by_pillow("PNG", "L"), repair_png)], _read_map),
     "cfg": Reader(seeds.cfgs, _read_field, _four_views),
     "poses": Reader(seeds.poses, _read_poses, _four_views),
     "lens": Reader(seeds.lens_pictures, _read_lens_picture, _view_and_lens),

@@ -36,7 +36,7 @@ def damaged(seeds: list[Seed], rng: Rng) -> tuple[str, bytes]:
         return chosen.name, data  # not even a file can be made of it
 
 
-def mended_png(data: bytes) -> bytes:
+def repair_png(data: bytes) -> bytes:
     """The same chunks with lengths and checksums that are right, so that damage gets past the first look."""
     at, chunks = 8, [data[:8]]
     while at + 8 <= len(data):

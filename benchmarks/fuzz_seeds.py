@@ -12,7 +12,7 @@ import numpy as np
 import OpenImageIO as oiio
 from PIL import Image, PngImagePlugin
 
-from benchmarks.fuzz_damage import Seed, mended_png
+from benchmarks.fuzz_damage import Seed, repair_png
 from tests.iibr_core import embedded_files as embedded
 
 SIZE = 17, 23
@@ -62,7 +62,7 @@ def jpegs() -> list[Seed]:
 def pngs() -> list[Seed]:
     kinds = [by_pillow("PNG", mode) for mode in ("RGB", "RGBA", "L", "P", "1")]
     kinds.append(written("png", sample(4, np.uint16) * np.uint16(257), "uint16"))
-    return [Seed("a.png", data, file_of) for data in kinds for file_of in (bytes, mended_png)]
+    return [Seed("a.png", data, file_of) for data in kinds for file_of in (bytes, repair_png)]
 
 
 def tiffs() -> list[Seed]:
@@ -180,7 +180,7 @@ def saved_settings() -> list[Seed]:
     def in_exr(damaged: bytes) -> bytes:
         return written("exr", sample(3, np.float32), "half", iibr__settings=damaged.decode("latin-1"))
 
-    whole = [Seed("a.png", in_png(text), mended_png), Seed("a.exr", in_exr(text))]
+    whole = [Seed("a.png", in_png(text), repair_png), Seed("a.exr", in_exr(text))]
     return [Seed("a.png", text, in_png), Seed("a.png", text, in_png), Seed("a.exr", text, in_exr), *whole]
 
 

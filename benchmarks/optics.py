@@ -1,4 +1,4 @@
-"""Figures of the optics: speed against error for every haste, bokeh from few samples, aliasing,
+"""Figures of the optics: speed against error for every level, bokeh from few samples, aliasing,
 pinhole, the field while it fills, dragging, memory.
 
     python -m benchmarks.optics --data FOLDER [--out docs/optics.md] [--rounds 5] [--switches 1000]
@@ -26,12 +26,13 @@ from numpy.typing import NDArray
 
 from benchmarks.light_fields import StoredField, read_field
 from benchmarks.refocus import plain_pass
-from benchmarks.speed.rendering import DrawVariant, draw, drawing_cost, sheared_light
+from benchmarks.speed.rendering import DrawVariant, draw, drawing_cost, shear_light
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.generation.cost_model import CORES
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.context import GLContext, create_headless
-from viewer.gpu.refocus.frame_budget import HASTES, stretched
+from viewer.gpu.context import GLContext
+from viewer.gpu.headless_context import create_headless
+from viewer.gpu.refocus.frame_budget import QUALITY_LEVELS, stretch_image
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
 from viewer.model.state.app_state import Optics
@@ -45,8 +46,8 @@ EVERY_SECOND = tuple((v, u) for v in range(0, 9, 2) for u in range(0, 9, 2))
 
 
 PLAIN = DrawVariant("every view of the aperture")
-HASTE_APERTURES = 0.0, 4.0, 8.0
-"""View steps: a drag chooses another haste for each."""
+LEVEL_APERTURES = 0.0, 4.0, 8.0
+"""View steps: a drag chooses another level for each."""
 
 
 def psnr_db(image: NDArray[np.float64] | Image, reference: NDArray[np.float64] | Image, border: int = 0) -> float:
@@ -65,7 +66,7 @@ def mean_flip(reference: Image, image: Image) -> float:
 def drawn(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: DrawVariant) -> Image:
     """The picture of a variant whose views are uploaded."""
     draw(renderer, optics, size_px, variant)
-    return stretched(renderer.read_image(), size_px)
+    return stretch_image(renderer.read_image(), size_px)
 
 
 class Stopwatch:
@@ -86,16 +87,16 @@ class Stopwatch:
         return 1e3 * float(np.median(own)), float(np.median(own) / np.median(plain))
 
 
-def haste_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
-    """Rows of speed against error, one a haste; for each aperture milliseconds and FLIP."""
+def quality_level_table(gl: GLContext, field: StoredField, optics: Optics, rounds: int) -> Iterator[str]:
+    """Rows of speed against error, one a level; for each aperture milliseconds and FLIP."""
     renderer, watch = Renderer(gl), Stopwatch(gl, field, optics, rounds)
     field.upload(renderer, field.every)
-    chosen = [replace(optics, eye=BETWEEN, aperture_diameter=diameter) for diameter in HASTE_APERTURES]
+    chosen = [replace(optics, eye=BETWEEN, aperture_diameter=diameter) for diameter in LEVEL_APERTURES]
     references = [drawn(renderer, each, SIZE_PX, replace(PLAIN, is_converged=True)) for each in chosen]
-    for haste in HASTES:
-        row = f"| {haste.stride} | {haste.sources} | {haste.scale:g} |"
+    for level in QUALITY_LEVELS:
+        row = f"| {level.stride} | {level.sources} | {level.scale:g} |"
         for each, reference in zip(chosen, references):
-            variant = DrawVariant("", haste)
+            variant = DrawVariant("", level)
             image = drawn(renderer, each, SIZE_PX, variant)
             own, _ = watch.milliseconds(partial(draw, renderer, each, SIZE_PX, variant))
             row += f" {own:.0f} | {mean_flip(reference, image):.4f} |"
@@ -173,7 +174,7 @@ def numpy_refocus(field: StoredField, optics: Optics) -> NDArray[np.float64]:
     total = np.zeros(field.views.shape[2:])
     for wanted, row, column, weight in samples:
         by_px = optics.focus_disparity * (wanted.t - optics.eye.t), optics.focus_disparity * (wanted.s - optics.eye.s)
-        total += weight * sheared_light(encoded_from_stored(field.views[row, column]), by_px)
+        total += weight * shear_light(encoded_from_stored(field.views[row, column]), by_px)
     return np.clip(srgb_from_linear(total / sum(sample.weight for sample in samples)), 0, 1) * 255.0
 
 
@@ -223,12 +224,12 @@ def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[st
     yield f"{shop.name} is drawn with {SIZE_PX[0]}x{SIZE_PX[1]} pixels, focus at 4.8 px. Times are medians; on software"
     yield "GL, processor time over the number of cores. Errors are against the converged picture of all 81 views."
     yield "Single switches are in [speed.md](speed.md)."
-    yield "\n## Haste\n\nWhat a drag leaves out, from the best picture to the quickest: view steps between samples,"
+    yield "\n## Quality levels\n\nWhat a drag leaves out, best to quickest: view steps between samples,"
     yield "stored views that a pinhole view is made of, scale of the picture. Milliseconds and FLIP for an eye between"
     yield "views and apertures of 0, 4 and 8 view steps.\n"
     yield "| stride | sources | scale | 0: ms | FLIP | 4: ms | FLIP | 8: ms | FLIP |"
     yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
-    yield from haste_table(gl, shop, bokeh[shop.name], rounds)
+    yield from quality_level_table(gl, shop, bokeh[shop.name], rounds)
     yield "\n## Figures\n\n| what | figure | measured |\n| --- | --- | --- |"
     yield from refocus_figures(gl, shop, bokeh[shop.name], rounds)
     for field in (antinous, shop):

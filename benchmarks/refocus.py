@@ -23,7 +23,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.context import create_headless
+from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.state.app_state import Optics
 

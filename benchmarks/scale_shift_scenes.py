@@ -16,14 +16,14 @@ from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.depth.scaling import disparity_from
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.inpainting.disparity_holes import fill_from_background
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.training.batches import PARALLAX_PX
 from iibr_core.training.batches import SIZE as TRAINING_SIZE
-from iibr_core.training.degradation import blurred, noisy
+from iibr_core.training.degradation import add_noise, blur
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import FloatImage, GridShape, ViewOffset
+from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset
 
-SIZE = 56, 64
+SIZE = ImageSize(56, 64)
 PERCENTILES = 1.0, 99.0
 FIRST_SEED = 70_000
 FLAT_SHARE = 0.05
@@ -63,11 +63,15 @@ def same_picture(count: int = 100) -> Iterator[str]:
     counts, size, here = {11.0: 0, 1.0001: 0}, SIZE, ViewOffset(0.0, 0.0)
     moved = 0
     for seed in range(count):
-        scene = random_scene(np.random.default_rng(seed), size, 1.0)
-        photo, _ = render(scene, size, here)
-        moved += not np.array_equal(photo, render(replace(scene, infinity_px=scene.infinity_px + 5), size, here)[0])
+        scene = random_scene(np.random.default_rng(seed), ImageSize(*size), 1.0)
+        photo, _ = render(scene, ImageSize(*size), here)
+        moved += not np.array_equal(
+            photo, render(replace(scene, infinity_px=scene.infinity_px + 5), ImageSize(*size), here)[0]
+        )
         for farther in counts:
-            other, _ = render(random_scene(np.random.default_rng(seed), size, farther), size, here)
+            other, _ = render(
+                random_scene(np.random.default_rng(seed), ImageSize(*size), farther), ImageSize(*size), here
+            )
             counts[farther] += bool(np.abs(photo - other).mean() < 0.1 / 255)
     yield f"The same {count} scenes with cameras 11 times as far apart: {counts[11.0]} photos stay the same, to 0.1"
     yield f"of 255 grey levels on average. With cameras 1.0001 times as far apart {counts[1.0001]} do: patterns of the"
@@ -98,7 +102,7 @@ def procedural(seed: int) -> tuple[FloatImage | tuple[float, float], ...]:
     colors, disparity = render(scene, SIZE, ViewOffset(0.0, 0.0))
     view, _ = render(scene, SIZE, ViewOffset(0.0, 1.0))
     exact, alpha, beta = normalised(disparity * np.float32(percent))
-    relative = noisy(blurred(exact, float(rng.uniform(0.0, 1.0))), rng, float(rng.uniform(0.0, 0.03)), 1.0)
+    relative = add_noise(blur(exact, float(rng.uniform(0.0, 1.0))), rng, float(rng.uniform(0.0, 0.03)), 1.0)
     near, far = (scene.focal_px / z - scene.infinity_px for z in scene.depths)
     span, place = (near - far) * percent, far / (near - far)
     geometry = alpha / span, (beta - far * percent) / span
@@ -123,7 +127,7 @@ def real_scene(data: Path, name: str) -> Scenes:
     photo = read_photo(next((data / folder / "views").glob(f"{view}.*")), SIZE[0] * SIZE[1])
     disparity = np.load(data / folder / disparity_file).astype(np.float32)
     relative, alpha, beta = normalised(disparity * np.float32(100 * radius / disparity.shape[1]))
-    relative = fill_from_background(resample_surfaces(relative, photo.size))
+    relative = fill_disparity_holes(resample_surfaces(relative, photo.size))
     picture = channels_first(np.concatenate([photo.pixels, relative[..., None]], axis=2)[None])
     truth, rule = tensor([(np.log2(alpha), beta / alpha)]), tensor([by_rule(relative)])
     return Scenes(picture, picture[:, :3], truth, rule, truth)

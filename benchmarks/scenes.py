@@ -11,7 +11,7 @@ import time
 import numpy as np
 
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import ViewOffset
+from iibr_core.types import ImageSize, ViewOffset
 
 OFFSETS = (ViewOffset(0.0, 0.0), ViewOffset(-4.0, 4.0))
 
@@ -24,13 +24,13 @@ def main() -> None:
     args = parser.parse_args()
     width, height = map(int, args.size.split("x"))
     rng = np.random.default_rng(0)
-    render(random_scene(rng, (16, 16), 1.0), (16, 16), OFFSETS[0])  # compiles
+    render(random_scene(rng, ImageSize(16, 16), 1.0), ImageSize(16, 16), OFFSETS[0])  # compiles
     rates = []
     for _ in range(args.scenes):
-        scene = random_scene(rng, (height, width), float(np.exp(rng.uniform(np.log(0.25), np.log(3.75)))))
+        scene = random_scene(rng, ImageSize(height, width), float(np.exp(rng.uniform(np.log(0.25), np.log(3.75)))))
         start = time.perf_counter()
         for offset in OFFSETS:
-            render(scene, (height, width), offset, args.samples)
+            render(scene, ImageSize(height, width), offset, args.samples)
         rays = len(OFFSETS) * height * width * args.samples**2
         rates.append(rays / (time.perf_counter() - start) / 1e6)
     print(f"{args.scenes} scenes of {args.size}, {args.samples} x {args.samples} rays a pixel: million rays a second")

@@ -49,7 +49,7 @@ class ThinLens:
 
 
 @dataclass(frozen=True)
-class Scene:
+class LensScene:
     """shapes: makes Mitsuba's descriptions of everything but lights and camera, which looks along -z from 0."""
 
     name: str
@@ -152,8 +152,8 @@ def fence(mi: Any) -> Shapes:
 
 
 SCENES = (
-    Scene("shelf", ThinLens(focus_disparity=0.4, radius_views=2.0), shelf),
-    Scene("fence", ThinLens(focus_disparity=-0.3, radius_views=2.0), fence),
+    LensScene("shelf", ThinLens(focus_disparity=0.4, radius_views=2.0), shelf),
+    LensScene("fence", ThinLens(focus_disparity=-0.3, radius_views=2.0), fence),
 )
 
 
@@ -217,7 +217,7 @@ def write(mi: Any, path: Path, linear: Image, bits: int) -> None:
     mi.Bitmap(whole, mi.Bitmap.PixelFormat.RGB).write(str(path))
 
 
-def make(mi: Any, scene: Scene, folder: Path, view_samples: int, lens_samples: int) -> None:
+def make(mi: Any, scene: LensScene, folder: Path, view_samples: int, lens_samples: int) -> None:
     """Write views/, gt_disp, lens.png and lens.json of a scene."""
     shapes = scene.shapes(mi)
     lit = []

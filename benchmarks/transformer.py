@@ -24,30 +24,30 @@ from iibr_core.evaluation.metrics import psnr
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.generation.light_field import transformer_for
 from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import PLAIN, SHARE, Contested
+from iibr_core.rendering.ambiguous_rays import PLAIN, SHARE, AmbiguousRays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.occlusion import entropy, occlusion_mask
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training import degradation as faults
-from iibr_core.training.batches import AS_RENDERED, RayChoice, contested_rays, training_batch
-from iibr_core.training.losses import LossWeights, color_loss, perceived, total_loss
-from iibr_core.training.scenes.random_scene import random_scene, render, seen_from
+from iibr_core.training.batches import AS_RENDERED, RayChoice, ambiguous_rays_of_view, training_batch
+from iibr_core.training.losses import LossWeights, color_loss, to_perceptual, total_loss
+from iibr_core.training.scenes.random_scene import is_visible_from, random_scene, render
 from iibr_core.training.trainer import Batch
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.types import FloatImage, ImageSize, ViewOffset
 from viewer.cli.train import LAMBDAS
 
 HELD_OUT_SEED = 1_000_003
 HELD_OUT = 40
 LEARNING_RATE = 3e-3
 COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
-"""The features of `contested._describe` that know nothing of disparity."""
-MASK_SIZE = 160, 192
+"""The features of `ambiguous._describe` that know nothing of disparity."""
+MASK_SIZE = ImageSize(160, 192)
 MASK_SCENES = 24
 THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
-Weigh = Callable[[Contested], FloatImage]
+Weigh = Callable[[AmbiguousRays], FloatImage]
 
 
 @dataclass(frozen=True)
@@ -59,29 +59,29 @@ class Ablation:
     lambdas: LossWeights = LAMBDAS
 
 
-def without_disparity(rays: RaySet, contested: Contested) -> Contested:
+def without_disparity(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
     """The features without those made of disparity."""
-    features = np.zeros_like(contested.features)
-    features[..., COORDINATES_ONLY] = contested.features[..., COORDINATES_ONLY]
-    return replace(contested, features=features)
+    features = np.zeros_like(ambiguous.features)
+    features[..., COORDINATES_ONLY] = ambiguous.features[..., COORDINATES_ONLY]
+    return replace(ambiguous, features=features)
 
 
-def raw_coordinates(rays: RaySet, contested: Contested) -> Contested:
+def raw_coordinates(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
     """The paper's features: Pluecker coordinates of target and source ray, and disparity; lengths in widths."""
     height, width = rays.size
-    offsets = rays.arrays[0][np.where(contested.mask, contested.source % PLAIN, 0)]
-    d = np.where(contested.mask, contested.disparity, 0)
-    moved = np.array(contested.offset) - offsets
-    y, x = (contested.pixel[:, i, None] for i in (0, 1))
+    offsets = rays.arrays[0][np.where(ambiguous.mask, ambiguous.source % PLAIN, 0)]
+    d = np.where(ambiguous.mask, ambiguous.disparity, 0)
+    moved = np.array(ambiguous.offset) - offsets
+    y, x = (ambiguous.pixel[:, i, None] for i in (0, 1))
     x, y = np.broadcast_to(x - width / 2, d.shape), np.broadcast_to(y - height / 2, d.shape)
-    target = plucker.line_of_pixel(x, y, contested.offset)
+    target = plucker.line_of_pixel(x, y, ambiguous.offset)
     eye = np.stack([offsets[..., 1], offsets[..., 0], np.zeros_like(d)], -1) * plucker.VIEW_STEP_PX
     pixel = np.stack([x + d * moved[..., 1], y + d * moved[..., 0], np.ones_like(d)], -1)
     source = plucker.line_of(eye, pixel - eye)
     scale = np.r_[1, 1, 1, np.full(3, 1 / width)]
-    features = np.zeros_like(contested.features)
+    features = np.zeros_like(ambiguous.features)
     features[..., SHARE + 1 : SHARE + 14] = np.concatenate([target * scale, source * scale, d[..., None]], -1)
-    return replace(contested, features=features)
+    return replace(ambiguous, features=features)
 
 
 ABLATIONS = [
@@ -124,7 +124,7 @@ def judges(data: Path) -> list[BenchScene]:
 
 
 def ablations(truths: Sequence[BenchScene], scenes: int, steps: int) -> list[str]:
-    """The table of variants: gain over the closed form on held-out contested rays, PSNR on ground truth."""
+    """The table of variants: gain over the closed form on held-out ambiguous rays, PSNR on ground truth."""
     cached: dict[RayChoice, tuple[list[Batch], list[Batch]]] = {}
     rows = [("closed form", 0.0, [scene_psnr(truth, None, AS_RENDERED) for truth in truths])]
     for variant in ABLATIONS:
@@ -132,7 +132,7 @@ def ablations(truths: Sequence[BenchScene], scenes: int, steps: int) -> list[str
             cached.clear()  # variants of one choice stand together, but for the shipped one's
             cached[variant.choice] = batches_of(variant.choice, scenes)
         train_on, held_out = cached[variant.choice]
-        model = trained(train_on, variant.lambdas, steps)
+        model = train_ablation(train_on, variant.lambdas, steps)
         weigh = weigher(model)
         rows.append(
             (variant.name, held_out_gain(model, held_out), [scene_psnr(t, weigh, variant.choice) for t in truths])
@@ -141,7 +141,7 @@ def ablations(truths: Sequence[BenchScene], scenes: int, steps: int) -> list[str
     return [
         "## Ablations",
         "",
-        "Held out: gain over the closed form, dB, mean over procedural scenes, contested rays only. Others: full",
+        "Held out: gain over the closed form, dB, mean over procedural scenes, ambiguous rays only. Others: full",
         "frame, PSNR in dB, mean over at most 12 views spread over the grid.",
         "",
         "| variant | held out | " + " | ".join(truth.name for truth in truths) + " |",
@@ -157,7 +157,7 @@ def batches_of(choice: RayChoice, scenes: int) -> tuple[list[Batch], list[Batch]
     return train_on, [training_batch(step, HELD_OUT_SEED, choice) for step in range(HELD_OUT)]
 
 
-def trained(batches: Sequence[Batch], lambdas: LossWeights, steps: int) -> RayTransformer:
+def train_ablation(batches: Sequence[Batch], lambdas: LossWeights, steps: int) -> RayTransformer:
     """A model after `steps` steps on random ones of these batches."""
     torch.manual_seed(0)
     model = RayTransformer()
@@ -167,7 +167,7 @@ def trained(batches: Sequence[Batch], lambdas: LossWeights, steps: int) -> RayTr
         batch = batches[index]
         weights = model(batch.features, batch.mask)
         gained = replace(lambdas, color=lambdas.color * batch.color_gain)
-        shown, truth = perceived((weights[..., None] * batch.colors).sum(dim=1)), perceived(batch.truth)
+        shown, truth = to_perceptual((weights[..., None] * batch.colors).sum(dim=1)), to_perceptual(batch.truth)
         optimizer.zero_grad()
         total_loss(shown, truth, weights, batch.epi_shape, gained).total.backward()
         optimizer.step()
@@ -182,7 +182,7 @@ def held_out_gain(model: RayTransformer, batches: Sequence[Batch]) -> float:
     for batch in batches:
         closed = (batch.features[..., SHARE] + 1e-6) * batch.mask
         errors = [
-            color_loss(perceived((weights[..., None] * batch.colors).sum(dim=1)), perceived(batch.truth))
+            color_loss(to_perceptual((weights[..., None] * batch.colors).sum(dim=1)), to_perceptual(batch.truth))
             for weights in (closed / closed.sum(dim=1, keepdim=True), model(batch.features, batch.mask))
         ]
         gains.append(10 * float(torch.log10(errors[0] / errors[1])))
@@ -193,10 +193,10 @@ def weigher(model: RayTransformer) -> Weigh:
     """The model as ViewSynthesis calls it."""
 
     @torch.no_grad()
-    def weigh(contested: Contested) -> FloatImage:
-        if not len(contested.pixel):
-            return contested.mask.astype(np.float32)
-        weights: FloatImage = model(torch.from_numpy(contested.features), torch.from_numpy(contested.mask)).numpy()
+    def weigh(ambiguous: AmbiguousRays) -> FloatImage:
+        if not len(ambiguous.pixel):
+            return ambiguous.mask.astype(np.float32)
+        weights: FloatImage = model(torch.from_numpy(ambiguous.features), torch.from_numpy(ambiguous.mask)).numpy()
         return weights
 
     return weigh
@@ -210,7 +210,7 @@ def scene_psnr(truth: BenchScene, weigh: Weigh | None, choice: RayChoice) -> flo
         for offset in offsets if choice.inpainted else []:
             view = synthesis.render(rays, offset)
             rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
-    described = None if weigh is None else lambda contested: weigh(choice.described(rays, contested))
+    described = None if weigh is None else lambda ambiguous: weigh(choice.described(rays, ambiguous))
     with ViewSynthesis(transformer=described, hypotheses=choice.hypotheses) as synthesis:
         views = ((synthesis.render(rays, at).colors, image) for at, image in truth.truth.items())
         return float(np.mean([psnr(colors, image) for colors, image in views]))
@@ -254,19 +254,19 @@ def mask_rays(degraded: bool) -> list[NDArray[np.float32]]:
     for _ in range(MASK_SCENES):
         scene = random_scene(rng, MASK_SIZE, 2.0)
         colors, exact = render(scene, MASK_SIZE, ViewOffset(0.0, 0.0))
-        given = faults.noisy(faults.blurred(exact, 1.0), rng, 0.05) if degraded else exact
+        given = faults.add_noise(faults.blur(exact, 1.0), rng, 0.05) if degraded else exact
         rays = rays_of_photo(colors, given, 4, 0)
         offset = ViewOffset(*(float(v) for v in rng.choice([-4, 4], 2)))
-        weights = closed_form_weights(find_candidates(rays, offset, (0, MASK_SIZE[0])))
+        weights = visibility_weights(find_candidates(rays, offset, (0, MASK_SIZE[0])))
         closed = entropy(weights)
-        contested = contested_rays(rays, offset, (0, MASK_SIZE[0]), False)
+        ambiguous = ambiguous_rays_of_view(rays, offset, (0, MASK_SIZE[0]), False)
         learned = closed.copy()
-        learned[contested.pixel[:, 0], contested.pixel[:, 1]] = normalised_entropy(weigh(contested), contested.mask)
+        learned[ambiguous.pixel[:, 0], ambiguous.pixel[:, 1]] = normalised_entropy(weigh(ambiguous), ambiguous.mask)
         y, x = np.indices(MASK_SIZE)
         true = render(scene, MASK_SIZE, offset)[1]
         source_x, source_y = x + true * offset.s, y + true * offset.t
         inside = (source_x >= 0) & (source_x < MASK_SIZE[1]) & (source_y >= 0) & (source_y < MASK_SIZE[0])
-        seen = seen_from(scene, x.ravel(), y.ravel(), true.ravel(), offset).reshape(MASK_SIZE)
+        seen = is_visible_from(scene, x.ravel(), y.ravel(), true.ravel(), offset).reshape(MASK_SIZE)
         parts.append((closed, learned, occlusion_mask(weights), ~(inside & seen)))
     return [np.concatenate(part) for part in zip(*parts)]
 

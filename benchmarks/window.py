@@ -12,8 +12,9 @@ import psutil
 
 from iibr_core.runtime.resources import resource_folder
 from tests.xvfb import private_display
-from viewer.app.main_loop import App, opening
+from viewer.app.main_loop import App, initial_state
 from viewer.background import scene_worker
+from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.actions import OpenPath
 from viewer.model.state.app_state import Source
 
@@ -22,20 +23,20 @@ IDLE_S = 5.0
 
 def main() -> None:
     read_at: list[float] = []
-    load = scene_worker.load
+    load = scene_worker.load_photo
 
-    def timed_load(source: Source) -> scene_worker.Loaded:
+    def timed_load(source: Source) -> LoadedPhoto:
         loaded = load(source)
         read_at.append(time.perf_counter())
         return loaded
 
-    scene_worker.load = timed_load
+    scene_worker.load_photo = timed_load
     photo = resource_folder("assets") / "motorcycle" / "motorcycle.png"
     with private_display():
         started = time.perf_counter()
-        app = App(opening(OpenPath(Source(str(photo)))))
+        app = App(initial_state(OpenPath(Source(str(photo)))))
         try:
-            while app.stage.pictures_drawn == 0:
+            while app.scene_view.pictures_drawn == 0:
                 app.step()
             shown = time.perf_counter()
             print(
@@ -53,7 +54,7 @@ def main() -> None:
 def all_views(app: App, since: float) -> None:
     """Turn the loop until every view is on the screen and nothing is left to do."""
     while not (
-        0 < app.state.progress.total == app.state.progress.done and app.wait_s > 0 and app.stage.shows_all_views()
+        0 < app.state.progress.total == app.state.progress.done and app.wait_s > 0 and app.scene_view.shows_all_views()
     ):
         app.step()
     frames, total = app.frames_shown, app.state.progress.total

@@ -14,7 +14,7 @@ light are
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ StoredColors = NDArray[np.uint8] | NDArray[np.float16]
 
 
 Quality = Literal["fast", "balanced", "exact"]
-"""Where the ray transformer runs: nowhere, on contested rays, everywhere."""
+"""Where the ray transformer runs: nowhere, on ambiguous rays, everywhere."""
 
 DEFAULT_QUALITY: Quality = "balanced"
 
@@ -41,6 +41,17 @@ class ViewOffset(NamedTuple):
 
     t: float
     s: float
+
+
+class ImageSize(NamedTuple):
+    """Height and width of an image in pixels: the order of an array's shape, in every module."""
+
+    height: int
+    width: int
+
+    def __str__(self) -> str:
+        """In the order people say it: "640x480" is 640 wide."""
+        return f"{self.width}x{self.height}"
 
 
 class GridShape(NamedTuple):
@@ -58,6 +69,11 @@ class GridShape(NamedTuple):
         """View offset of the view at index (row, column)."""
         v, u = self.centre
         return ViewOffset(float(row - v), float(column - u))
+
+
+def image_size(pixels: NDArray[Any]) -> ImageSize:
+    """The size of an image (H, W) or (H, W, C)."""
+    return ImageSize(pixels.shape[0], pixels.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +96,9 @@ class Photo:
             raise InputError(f"{self.name}: holds colours that are NaN or infinite; give finite ones")
 
     @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) in pixels."""
-        return self.pixels.shape[0], self.pixels.shape[1]
+    def size(self) -> ImageSize:
+        """Of the pixels."""
+        return image_size(self.pixels)
 
 
 @dataclass(frozen=True, eq=False)

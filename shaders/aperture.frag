@@ -1,6 +1,6 @@
 #version 330 core
 // Light through the aperture: the weighted sum over its samples, each sheared to the focus plane.
-// DETOURS: other views stand in for those wanted. TILES: tiles without a layer's content skip it, and where all is
+// REPROJECT: other views stand in for those wanted. TILES: tiles without a layer's content skip it, and where all is
 // sharp few samples suffice.
 #include "samples.glsl"
 #include "layers.glsl"
@@ -9,8 +9,8 @@ uniform float share;     // of this pass in the picture; the rest comes from the
 #ifdef TILES
 uniform sampler2D tiles; // see defocus_tiles.frag
 #ifndef BLURRED
-uniform int few_count;   // the first samples that suffice where all is sharp
-uniform float few_up_to_px;
+uniform int sparse_count;   // the first samples that suffice where all is sharp
+uniform float sparse_up_to_px;
 #endif
 #endif
 
@@ -20,14 +20,14 @@ in vec2 uv, target_uv;
 vec3 place_of(int i, float focus, inout float weight) {
     vec4 wanted = samples[i];
     vec3 place = vec3(uv - focus * wanted.xy / view_size_px, wanted.z);
-#ifdef DETOURS
-    Answer answer = answer_of(i, uv);
-    vec3 found = detoured(uv, wanted.xy, answer, focus);
-    place = vec3(found.xy, answer.layer);
+#ifdef REPROJECT
+    FallbackView fallback = fallback_view_of(i, uv);
+    vec3 found = reprojected_place(uv, wanted.xy, fallback, focus);
+    place = vec3(found.xy, fallback.layer);
     weight *= found.z;
 #endif
     weight *= in_picture(place.xy) * barrel_share(wanted.xy, uv);
-#ifdef DETOURS
+#ifdef REPROJECT
     place.xy = mirrored(place.xy);
 #endif
     return place;
@@ -69,8 +69,8 @@ void main() {
     int count = sample_count;
 #ifdef TILES
     vec3 tile = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xyz;
-    bool few = max(tile.x, tile.y) < few_up_to_px;
-    if (few) count = few_count;
+    bool is_sparse = max(tile.x, tile.y) < sparse_up_to_px;
+    if (is_sparse) count = sparse_count;
     if (tile.z >= sharp_up_to_px.y) count = 0;
 #endif
 #ifdef SHARP
@@ -80,7 +80,7 @@ void main() {
     for (int i = 0; i < count; i++) {
         float weight = samples[i].w;
 #ifdef TILES
-        if (few) weight = detours[i].w;
+        if (is_sparse) weight = reprojections[i].w;
 #endif
         vec3 place = place_of(i, focus, weight);
         vec4 light = linear_from_stored(textureLod(colors, place, 0.0));

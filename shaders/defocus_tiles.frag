@@ -1,7 +1,7 @@
 #version 330 core
 // Per tile of the picture: the widest blur in front of the focus plane (x) and behind it (y), and the least of all (z),
 // in output px from one sample to the next.
-// DETOURS: see aperture.frag.
+// REPROJECT: see aperture.frag.
 #include "part.glsl"
 #include "samples.glsl"
 
@@ -15,9 +15,9 @@ out vec4 width_px;
 
 vec2 disparities_at(int i, vec2 place, float focus) {
     vec3 at = vec3(place - focus * samples[i].xy / view_size_px, samples[i].z);
-#ifdef DETOURS
-    Answer answer = answer_of(i, place);
-    at = vec3(detoured(place, samples[i].xy, answer, focus).xy, answer.layer);
+#ifdef REPROJECT
+    FallbackView fallback = fallback_view_of(i, place);
+    at = vec3(reprojected_place(place, samples[i].xy, fallback, focus).xy, fallback.layer);
 #endif
     ivec2 block = ivec2(at.xy * view_size_px / block_px);
     return texelFetch(blocks, ivec3(clamp(block, ivec2(0), textureSize(blocks, 0).xy - 1), at.z + 0.5), 0).rg;

@@ -1,6 +1,6 @@
 #version 330 core
 // What one stored view knows beside its colours, laid over the picture seen from the eye: a number at every pixel.
-#include "front_most.glsl"
+#include "first_hit.glsl"
 
 const int STOPS = 10;
 
@@ -25,7 +25,7 @@ vec3 mapped(float value) {
 
 void main() {
     vec2 delta = (to_view - dolly * (uv - 0.5)) / view_size_px;
-    Surface found = front_most(uv, layer, delta, search_steps, ivec2(0, search_steps));
+    Surface found = first_hit(uv, layer, delta, search_steps, ivec2(0, search_steps));
 #ifdef VALUES
     float value = textureLod(values, found.at, 0.0).r;
 #else

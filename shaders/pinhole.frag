@@ -4,13 +4,13 @@
 // FLAT: only tiles where all sources see one surface without edges. EDGES: only the others, and there only those steps of
 // the search that can find something.
 #include "sources.glsl"
-#include "front_most.glsl"
+#include "first_hit.glsl"
 #include "layers.glsl"
 
 uniform vec2 within_pixel;  // from its middle, texture coordinates
 #if defined(FLAT) || defined(EDGES)
 flat in ivec2 tile;
-uniform sampler2D spans_of_0_and_1, spans_of_2_and_3;  // see search_spans.frag
+uniform sampler2D intervals_of_0_and_1, intervals_of_2_and_3;  // see march_intervals.frag
 #endif
 #ifdef DOLLY
 uniform vec4 cell;                         // part of the picture that is drawn: left, top, right, bottom
@@ -31,9 +31,9 @@ float weight_of(int i) {
 }
 
 // First and last step of the search in a source; FLAT: about where the surface is, and -1.
-vec2 span_of(int i) {
+vec2 interval_of(int i) {
 #if defined(FLAT) || defined(EDGES)
-    vec4 spans = i < 2 ? texelFetch(spans_of_0_and_1, tile, 0) : texelFetch(spans_of_2_and_3, tile, 0);
+    vec4 spans = i < 2 ? texelFetch(intervals_of_0_and_1, tile, 0) : texelFetch(intervals_of_2_and_3, tile, 0);
     return i % 2 == 0 ? spans.xy : spans.zw;
 #else
     return vec2(0.0, search_steps[i]);
@@ -45,13 +45,13 @@ vec2 span_of(int i) {
 Surface surface_in(int i) {
     vec2 delta = delta_to(i, uv);
 #ifdef FLAT
-    float seen = disparity_at(uv - delta * span_of(i).x, sources[i].z);
+    float seen = disparity_at(uv - delta * interval_of(i).x, sources[i].z);
     vec2 at = uv - delta * disparity_at(uv - delta * seen, sources[i].z);
     return Surface(seen, at, in_picture(at) < 1.0);
 #else
     float focus = focus_at(uv);
     if (search_steps[i] == 0) return Surface(focus, uv - focus * delta, false);
-    Surface found = front_most(uv + within_pixel, sources[i].z, delta, search_steps[i], ivec2(span_of(i) + 0.5));
+    Surface found = first_hit(uv + within_pixel, sources[i].z, delta, search_steps[i], ivec2(interval_of(i) + 0.5));
     found.at -= within_pixel;
     return found;
 #endif

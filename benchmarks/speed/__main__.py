@@ -18,19 +18,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import GridShape, ImageSize, InputError
 from viewer.cli.options import MaxPixels
-from viewer.cli.terminal import progress_shown
+from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
     from benchmarks.speed.rendering_figures import DrawingFigures
     from benchmarks.speed.report import Bench
-    from benchmarks.speed.targets import Target
+    from benchmarks.speed.targets import SpeedTarget
     from benchmarks.speed.variants import BenchScene, Draw, Stored
     from iibr_core.types import FloatImage, Quality, ViewOffset
     from viewer.gpu.context import GLContext
 
-TARGET_SIZE = 512, 512
+TARGET_SIZE = ImageSize(512, 512)
 FIRST_FRAME_S = 1.5
 
 
@@ -61,16 +61,16 @@ def bench(
 
 def _measured(data: Path, repeats: int, max_pixels: int | None, quick: bool) -> Bench:
     from benchmarks.speed.figures import measure_scene
-    from benchmarks.speed.prediction import foretell, whole_field
+    from benchmarks.speed.prediction import predict, whole_field
     from benchmarks.speed.report import Bench
     from benchmarks.speed.scaling import growth, series
-    from benchmarks.speed.targets import field_targets, foretold_targets, front_targets
+    from benchmarks.speed.targets import field_targets, front_targets, prediction_targets
     from benchmarks.speed.variants import LEAST_STORED_SIDE, VARIANTS
 
     scenes = _scenes(data, max_pixels, with_soft=not quick)
     whole = [scene for scene in scenes if not scene.is_soft]
     drawings: tuple[DrawingFigures, ...] = ()
-    with headless() as gl, progress_shown("measuring") as show:
+    with headless() as gl, show_progress("measuring") as show:
         with drawing(gl) as draw:
             figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
         large = [scene for scene in whole if 2 * scene.reach + 1 >= LEAST_STORED_SIDE]
@@ -79,15 +79,15 @@ def _measured(data: Path, repeats: int, max_pixels: int | None, quick: bool) -> 
 
             drawings = tuple(f for scene in large for f in measure_drawing(gl, scene, repeats, show))
         qualities: tuple[Quality, ...] = ("fast", "balanced") if quick else ("fast", "balanced", "exact")
-        foretold = tuple(f for scene in whole for f in foretell([whole_field(scene)], qualities, repeats, show))
+        predicted = tuple(f for scene in whole for f in predict([whole_field(scene)], qualities, repeats, show))
         growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
-        targets = [*front_targets([f for f in figures if not f.is_soft]), *foretold_targets(foretold)]
+        targets = [*front_targets([f for f in figures if not f.is_soft]), *prediction_targets(predicted)]
         judged = next((s for s in whole if s.photo.shape[:2] == TARGET_SIZE and s.reach == 4), None)
         if judged is not None and not quick:
             targets = [*field_targets(judged, repeats, show), first_frame(judged), *targets]
     machine = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}" + (f", {gl.renderer}" if gl else "")
     command = shlex.join(["python", "-m", "benchmarks.speed", *sys.argv[1:]])
-    return Bench(figures, drawings, foretold, growths, tuple(targets), machine, command)
+    return Bench(figures, drawings, predicted, growths, tuple(targets), machine, command)
 
 
 def _scenes(data: Path, max_pixels: int | None, with_soft: bool) -> list[BenchScene]:
@@ -107,7 +107,7 @@ def _scenes(data: Path, max_pixels: int | None, with_soft: bool) -> list[BenchSc
 @contextmanager
 def headless() -> Iterator[GLContext | None]:
     """What draws without a display; None where there is no OpenGL."""
-    from viewer.gpu.context import create_headless
+    from viewer.gpu.headless_context import create_headless
 
     try:
         gl = create_headless()
@@ -156,13 +156,13 @@ def _drawn(renderer: Any, stored: Stored, offsets: Iterable[ViewOffset]) -> list
     return pictures
 
 
-def first_frame(scene: BenchScene) -> Target:
+def first_frame(scene: BenchScene) -> SpeedTarget:
     """From the start of a process to the first picture of the scene, drawn without a display."""
     import time
 
     import numpy as np
 
-    from benchmarks.speed.targets import Target
+    from benchmarks.speed.targets import SpeedTarget
     from iibr_core.formats.images.photo import write_image
 
     seconds = []
@@ -176,7 +176,7 @@ def first_frame(scene: BenchScene) -> Target:
             subprocess.run([sys.executable, "-m", "viewer", *words], check=True, capture_output=True)
             seconds.append(time.perf_counter() - start)
     said = f"{min(seconds):.2f} s, the least of {len(seconds)}"
-    return Target(
+    return SpeedTarget(
         "photo and disparity: process start to first picture", "<= 1.5 s", said, min(seconds) <= FIRST_FRAME_S
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.speed.measure import Cost, Tell, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
 from benchmarks.speed.prediction import whole_field
-from benchmarks.speed.variants import REFERENCE, BenchScene, Draw, Variant, field_cost, is_possible, judged_views
+from benchmarks.speed.variants import REFERENCE, BenchScene, Draw, Variant, evaluated_views, field_cost, is_possible
 from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, plan_for_viewing
 from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX
@@ -54,7 +54,7 @@ class SceneFigures:
 
 
 def measure_scene(
-    scene: BenchScene, variants: Sequence[Variant], repeats: int, tell: Tell, draw: Draw | None = None
+    scene: BenchScene, variants: Sequence[Variant], repeats: int, report_progress: Tell, draw: Draw | None = None
 ) -> SceneFigures:
     """Every possible variant on one scene, timed in turns. draw: what fills in where views are left out."""
     possible = [variant for variant in variants if is_possible(variant, scene, draw is not None)]
@@ -65,7 +65,7 @@ def measure_scene(
         return lambda: field_cost(variant, scene)
 
     def told(done: int, total: int, doing: str) -> None:
-        tell(done, total, f"{scene.name}: {doing}")
+        report_progress(done, total, f"{scene.name}: {doing}")
 
     errors = {}
     for k, variant in enumerate(possible):
@@ -78,19 +78,19 @@ def measure_scene(
         memory = peak_bytes(field_cost, variant, scene)
         measured.append(Measured(variant, median_cost(own), median_ratio(own, reference), memory, *errors[variant]))
     size = (scene.photo.shape[0], scene.photo.shape[1])
-    planned = _planned(scene, possible)
+    planned = _plan_choice(scene, possible)
     return SceneFigures(scene.name, size, len(scene.field), len(scene.truth), tuple(measured), planned, scene.is_soft)
 
 
 def _errors(variant: Variant, scene: BenchScene, draw: Draw | None) -> tuple[float, float]:
     """Mean PSNR and FLIP over the judged views."""
-    made = judged_views(variant, scene, draw)
+    made = evaluated_views(variant, scene, draw)
     errors = [(psnr(image, scene.truth[at]), flip(image, scene.truth[at])) for at, image in made.items()]
     mean_psnr, mean_flip = np.mean(errors, axis=0)
     return float(mean_psnr), float(mean_flip)
 
 
-def _planned(scene: BenchScene, variants: Sequence[Variant]) -> str:
+def _plan_choice(scene: BenchScene, variants: Sequence[Variant]) -> str:
     """The default quality with as few stored views as the plan finds enough for this parallax."""
     field, full = whole_field(scene), 2 * scene.reach
     low, high = (float(p) for p in np.percentile(scene.disparity, ROBUST_PERCENTILES))

@@ -48,12 +48,12 @@ def cost_of(work: Callable[[], object]) -> Cost:
     return Cost(time.perf_counter() - wall, time.process_time() - cpu)
 
 
-def in_turns(ways: Mapping[str, Callable[[], Cost]], repeats: int, tell: Tell) -> dict[str, list[Cost]]:
+def in_turns(ways: Mapping[str, Callable[[], Cost]], repeats: int, report_progress: Tell) -> dict[str, list[Cost]]:
     """The costs that each way tells of itself, one a round; every round goes through all ways."""
     found: dict[str, list[Cost]] = {name: [] for name in ways}
     for round_ in range(repeats):
         for k, (name, way) in enumerate(ways.items()):
-            tell(round_ * len(ways) + k, repeats * len(ways), name)
+            report_progress(round_ * len(ways) + k, repeats * len(ways), name)
             found[name].append(way())
     return found
 

@@ -36,7 +36,7 @@ class Panel:
     reference: str = "fast"
 
 
-def plotted(panels: Sequence[Panel], formats: Sequence[str]) -> list[bytes]:
+def plot_panels(panels: Sequence[Panel], formats: Sequence[str]) -> list[bytes]:
     """The panels as files of these formats ("svg", "png"), with a legend of the numbers beside them."""
     import matplotlib
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ def plotted(panels: Sequence[Panel], formats: Sequence[str]) -> list[bytes]:
         for axis in axes[len(panels) :]:
             axis.axis("off")
         _write_legend(legend, names)
-        return [_rendered(figure, kind) for kind in formats]
+        return [_render(figure, kind) for kind in formats]
 
 
 def _write_legend(legend: SubFigure, names: Sequence[str]) -> None:
@@ -91,7 +91,7 @@ def _draw_panel(axis: Axes, panel: Panel, names: Sequence[str]) -> None:
     axis.grid(alpha=0.25, which="both")
 
 
-def _rendered(figure: Figure, kind: str) -> bytes:
+def _render(figure: Figure, kind: str) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata={"Date": None} if kind == "svg" else None)
     return buffer.getvalue()

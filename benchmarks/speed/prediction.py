@@ -1,4 +1,4 @@
-"""What the plan foretells of a scene, beside what making it takes; and the plan's constants fitted to that."""
+"""What the plan predicts of a scene, beside what making it takes; and the plan's constants fitted to that."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ import numpy as np
 
 from benchmarks.speed.measure import Cost, Tell, cost_of, in_turns, median_cost, peak_bytes
 from benchmarks.speed.variants import BenchScene
-from iibr_core.generation.cost_model import CORES, NANOSECONDS, Work, outermost_of, relief_of, work_of
+from iibr_core.generation.cost_model import (
+    CORES,
+    NANOSECONDS,
+    Workload,
+    estimate_workload,
+    largest_offset,
+    measure_parallax,
+)
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import Disparity, FloatImage, GridShape, Photo, Quality, StoredColors
@@ -22,7 +29,7 @@ LEAST_S = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class BenchInput:
     """A scene to make: its field is the grid around the photo, at the disparity as it is."""
 
     name: str
@@ -31,82 +38,86 @@ class Given:
     grid: GridShape
 
 
-def whole_field(scene: BenchScene) -> Given:
+def whole_field(scene: BenchScene) -> BenchInput:
     """All views of a scene of the bench."""
     side = 2 * scene.reach + 1
     photo = Photo(scene.photo, float(scene.photo.shape[1]), scene.name)
-    return Given(scene.name, photo, Disparity(scene.disparity, "bench"), GridShape(side, side))
+    return BenchInput(scene.name, photo, Disparity(scene.disparity, "bench"), GridShape(side, side))
 
 
 @dataclass(frozen=True)
-class Foretold:
+class Prediction:
     """One scene in one quality. Bytes: of the views and of making them. seconds: processor time over all cores."""
 
     scene: str
     quality: Quality
-    foretold_s: float
+    predicted_s: float
     measured_s: float
-    foretold_bytes: float
+    predicted_bytes: float
     measured_bytes: float
-    work: Work
+    work: Workload
 
     @property
     def time_ratio(self) -> float:
-        """Foretold over measured."""
-        return self.foretold_s / self.measured_s if self.measured_s > 0 else math.nan
+        """Predicted over measured."""
+        return self.predicted_s / self.measured_s if self.measured_s > 0 else math.nan
 
     @property
     def memory_ratio(self) -> float:
-        """Foretold over measured; NaN where the system does not tell."""
-        return self.foretold_bytes / self.measured_bytes if self.measured_bytes > 0 else math.nan
+        """Predicted over measured; NaN where the system does not tell."""
+        return self.predicted_bytes / self.measured_bytes if self.measured_bytes > 0 else math.nan
 
 
 def is_near(ratio: float) -> bool | None:
-    """Whether a ratio of foretold to measured is within the set share; None where it is not known."""
+    """Whether a ratio of predicted to measured is within the set share; None where it is not known."""
     return 1 - WITHIN <= ratio <= 1 + WITHIN if math.isfinite(ratio) else None
 
 
-def make_field(given: Given, quality: Quality) -> list[tuple[StoredColors, FloatImage | None]]:
+def make_field(given: BenchInput, quality: Quality) -> list[tuple[StoredColors, FloatImage | None]]:
     """All views as they are kept: colours and disparity."""
     plan = plan_literal(given.photo, given.disparity, given.grid)
     updates = generate(given.photo, given.disparity, plan, quality=quality)
     return [(update.colors, update.disparity) for update in updates]
 
 
-def foretell(scenes: Sequence[Given], qualities: Sequence[Quality], repeats: int, tell: Tell) -> list[Foretold]:
+def predict(
+    scenes: Sequence[BenchInput], qualities: Sequence[Quality], repeats: int, report_progress: Tell
+) -> list[Prediction]:
     """Make every field in each quality, in turns, beside what the plan says of it."""
     pairs = [(given, quality) for given in scenes for quality in qualities]
     for given, quality in pairs:
         make_field(given, quality)  # compiles
 
-    def way(given: Given, quality: Quality) -> Callable[[], Cost]:
+    def way(given: BenchInput, quality: Quality) -> Callable[[], Cost]:
         return lambda: cost_of(lambda: make_field(given, quality))
 
-    costs = in_turns({f"{given.name}: {quality}": way(given, quality) for given, quality in pairs}, repeats, tell)
+    costs = in_turns(
+        {f"{given.name}: {quality}": way(given, quality) for given, quality in pairs}, repeats, report_progress
+    )
     seconds = [median_cost(found).cpu_s / CORES for found in costs.values()]
-    return [_foretold(given, quality, measured) for (given, quality), measured in zip(pairs, seconds)]
+    return [_predict_one(given, quality, measured) for (given, quality), measured in zip(pairs, seconds)]
 
 
-def _foretold(given: Given, quality: Quality, measured_s: float) -> Foretold:
+def _predict_one(given: BenchInput, quality: Quality, measured_s: float) -> Prediction:
     plan = plan_literal(given.photo, given.disparity, given.grid)
-    need, memory = plan.needs.of(quality), peak_bytes(make_field, given, quality)
-    work = work_of(relief_of(given.disparity.values, outermost_of(given.grid)), given.grid, quality)
-    return Foretold(given.name, quality, need.seconds, measured_s, plan.field_bytes + need.peak_bytes, memory, work)
+    need, memory = plan.costs.of(quality), peak_bytes(make_field, given, quality)
+    work = estimate_workload(measure_parallax(given.disparity.values, largest_offset(given.grid)), given.grid, quality)
+    return Prediction(given.name, quality, need.seconds, measured_s, plan.field_bytes + need.peak_bytes, memory, work)
 
 
-def fitted_nanoseconds(foretold: Sequence[Foretold]) -> Work:
+def fit_nanoseconds(predicted: Sequence[Prediction]) -> Workload:
     """cost.NANOSECONDS as these measurements would set it: least squares of relative errors, none negative.
 
     What no measurement contains keeps its value.
     """
     from scipy.optimize import nnls
 
-    long_enough = [f for f in foretold if f.measured_s >= LEAST_S]
+    long_enough = [f for f in predicted if f.measured_s >= LEAST_S]
     parts = np.array([np.array(f.work) * 1e-9 / CORES / f.measured_s for f in long_enough]).reshape(
-        -1, len(Work._fields)
+        -1, len(Workload._fields)
     )
     known = parts.any(axis=0)
     values = np.array(NANOSECONDS)
     if known.any():
         values[known] = nnls(parts[:, known], np.ones(len(parts)))[0]
-    return Work(*(float(value) for value in values))
+    return Workload(*(float(value) for value in values))

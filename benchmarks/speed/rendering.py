@@ -21,8 +21,8 @@ from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import Disparity, FloatImage, GridShape, ViewOffset
 from viewer.gpu.context import GLContext
-from viewer.gpu.refocus.frame_budget import NO_HASTE, Haste, stretched
-from viewer.gpu.refocus.renderer import Renderer, scaled
+from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, stretch_image
+from viewer.gpu.refocus.renderer import Renderer, scale_size
 from viewer.gpu.refocus.view_sampling import aperture_samples
 from viewer.model.state.app_state import Optics
 
@@ -40,7 +40,7 @@ class DrawVariant:
     """
 
     name: str
-    haste: Haste = NO_HASTE
+    level: QualityLevel = BEST_QUALITY
     prefilter: bool = True
     adaptive: bool = True
     every: int = 1
@@ -65,12 +65,12 @@ STORAGE = (
 APERTURE_VARIANTS = (
     REFERENCE,
     DrawVariant("until converged", is_converged=True),
-    DrawVariant("half the picture's width", Haste(scale=0.5)),
-    DrawVariant("every 2nd sample across and down", Haste(stride=2)),
-    DrawVariant("every 2nd sample, half width", Haste(stride=2, scale=0.5)),
-    DrawVariant("every 3rd sample, half width", Haste(stride=3, scale=0.5)),
+    DrawVariant("half the picture's width", QualityLevel(scale=0.5)),
+    DrawVariant("every 2nd sample across and down", QualityLevel(stride=2)),
+    DrawVariant("every 2nd sample, half width", QualityLevel(stride=2, scale=0.5)),
+    DrawVariant("every 3rd sample, half width", QualityLevel(stride=3, scale=0.5)),
     DrawVariant("no smoothing", prefilter=False),
-    DrawVariant("no smoothing, every 2nd sample", Haste(stride=2), prefilter=False),
+    DrawVariant("no smoothing, every 2nd sample", QualityLevel(stride=2), prefilter=False),
     DrawVariant("tiles skip nothing", adaptive=False),
     *STORAGE,
     DrawVariant("views without disparity", knows_disparity=False),
@@ -78,10 +78,10 @@ APERTURE_VARIANTS = (
 PINHOLE_VARIANTS = (
     REFERENCE,
     DrawVariant("until converged", is_converged=True),
-    DrawVariant("of 2 views", Haste(sources=2)),
-    DrawVariant("of 1 view", Haste(sources=1)),
-    DrawVariant("half the picture's width", Haste(scale=0.5)),
-    DrawVariant("of 1 view, half width", Haste(sources=1, scale=0.5)),
+    DrawVariant("of 2 views", QualityLevel(sources=2)),
+    DrawVariant("of 1 view", QualityLevel(sources=1)),
+    DrawVariant("half the picture's width", QualityLevel(scale=0.5)),
+    DrawVariant("of 1 view, half width", QualityLevel(sources=1, scale=0.5)),
     *STORAGE,
     DrawVariant("plain blending, no disparity", knows_disparity=False),
 )
@@ -90,7 +90,7 @@ PINHOLE_VARIANTS = (
 def draw(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: DrawVariant) -> None:
     """Draw a variant whose views are uploaded."""
     renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
-    renderer.render(optics, scaled(size_px, variant.haste.scale), haste=variant.haste)
+    renderer.render(optics, scale_size(size_px, variant.level.scale), level=variant.level)
     if variant.is_converged:
         renderer.refine()
 
@@ -109,7 +109,7 @@ def drawing_cost(gl: GLContext, draw_it: Callable[[], None]) -> Cost:
     return Cost(cost.wall_s, cost.cpu_s / CORES if gl.is_software else cost.wall_s)
 
 
-def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int, tell: Tell) -> list[DrawingFigures]:
+def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int, report_progress: Tell) -> list[DrawingFigures]:
     """A refocused picture, and one through a pinhole between the views, of a scene's field, drawn in every way."""
     focus, diameter = float(np.median(scene.disparity)), min(APERTURE_VIEWS, 2.0 * scene.reach)
     pictures = {
@@ -119,12 +119,12 @@ def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int, tell: Tell) 
         ),
         f"{scene.name}, pinhole between views": (Optics(eye=BETWEEN), PINHOLE_VARIANTS),
     }
-    tell(0, 1, f"{scene.name}: the best picture")
+    report_progress(0, 1, f"{scene.name}: the best picture")
     best = best_pictures(scene, [optics for optics, _ in pictures.values()])
     drawer = _Drawer(gl, scene)
     try:
         return [
-            _figures(drawer, what, optics, variants, truth, repeats, tell)
+            _figures(drawer, what, optics, variants, truth, repeats, report_progress)
             for truth, (what, (optics, variants)) in zip(best, pictures.items())
         ]
     finally:
@@ -138,7 +138,7 @@ def _figures(
     variants: Iterable[DrawVariant],
     truth: FloatImage,
     repeats: int,
-    tell: Tell,
+    report_progress: Tell,
 ) -> DrawingFigures:
     by_name = {variant.name: variant for variant in variants}
 
@@ -147,7 +147,7 @@ def _figures(
 
     ways = {name: way(variant) for name, variant in by_name.items()}
     errors = {name: drawer.errors(optics, variant, truth) for name, variant in by_name.items()}
-    costs = in_turns(ways, repeats, lambda done, total, name: tell(done, total, f"{what}: {name}"))
+    costs = in_turns(ways, repeats, lambda done, total, name: report_progress(done, total, f"{what}: {name}"))
     drawn = []
     for name in by_name:
         ratio = median_ratio(costs[name], costs[REFERENCE.name])
@@ -169,14 +169,14 @@ class _Drawer:
     def cost(self, optics: Optics, variant: DrawVariant) -> Cost:
         """Of one picture."""
         self._upload(variant)
-        self.renderer.render(optics, self._size_px, haste=variant.haste)  # what is uploaded has to arrive first
+        self.renderer.render(optics, self._size_px, level=variant.level)  # what is uploaded has to arrive first
         return drawing_cost(self.gl, lambda: draw(self.renderer, optics, self._size_px, variant))
 
     def errors(self, optics: Optics, variant: DrawVariant, truth: FloatImage) -> tuple[int, float, float]:
         """Samples drawn, PSNR and FLIP."""
         self._upload(variant)
         draw(self.renderer, optics, self._size_px, variant)
-        image = stretched(self.renderer.read_image(), self._size_px).astype(np.float32) / np.float32(255)
+        image = stretch_image(self.renderer.read_image(), self._size_px).astype(np.float32) / np.float32(255)
         return self.renderer.samples_drawn, psnr(image, truth), flip(image, truth)
 
     def _upload(self, variant: DrawVariant) -> None:
@@ -185,13 +185,13 @@ class _Drawer:
         is_half_float, knows_disparity = variant.is_half_float, variant.knows_disparity
         self.renderer.open_field(self._grid, *self._size_px, hdr=is_half_float, with_disparity=knows_disparity)
         for view in self._views:
-            if _is_stored(self._grid.offset(view.row, view.column), self._grid, variant.every):
+            if _is_kept(self._grid.offset(view.row, view.column), self._grid, variant.every):
                 colors = stored_from_encoded(encoded_from_stored(view.colors), True) if is_half_float else view.colors
                 self.renderer.upload_view(view.row, view.column, colors, view.disparity if knows_disparity else None)
         self._uploaded = variant.stored
 
 
-def _is_stored(at: ViewOffset, grid: GridShape, every: int) -> bool:
+def _is_kept(at: ViewOffset, grid: GridShape, every: int) -> bool:
     if every > 0:
         return at.t % every == 0 and at.s % every == 0
     return (abs(at.t) == grid.centre[0] and abs(at.s) == grid.centre[1]) or at == (0, 0)
@@ -210,7 +210,7 @@ def best_pictures(scene: BenchScene, wanted: list[Optics]) -> list[FloatImage]:
             if weight := of_views.get((view.row, view.column)):
                 focus = optics.focus_disparity / FINER
                 by_px = focus * (at.t - FINER * optics.eye.t), focus * (at.s - FINER * optics.eye.s)
-                total += weight * sheared_light(encoded_from_stored(view.colors), by_px)
+                total += weight * shear_light(encoded_from_stored(view.colors), by_px)
     return [np.clip(srgb_from_linear(total.astype(np.float32)), 0, 1) for total in light]
 
 
@@ -223,12 +223,12 @@ def _weights(optics: Optics, grid: GridShape) -> dict[tuple[int, int], float]:
     return {(sample.row, sample.column): sample.weight for sample in samples}
 
 
-def sheared_light(encoded: FloatImage, by_px: tuple[float, float]) -> FloatImage:
+def shear_light(encoded: FloatImage, by_px: tuple[float, float]) -> FloatImage:
     """Linear light of a view (H, W, 3), moved down and right by so many pixels."""
-    return shifted(shifted(linear_from_srgb(encoded), by_px[0], 0), by_px[1], 1)
+    return shift_image(shift_image(linear_from_srgb(encoded), by_px[0], 0), by_px[1], 1)
 
 
-def shifted(image: FloatImage, by_px: float, axis: int) -> FloatImage:
+def shift_image(image: FloatImage, by_px: float, axis: int) -> FloatImage:
     """The image moved along an axis by Catmull-Rom interpolation, borders repeated."""
     whole = int(np.floor(by_px))
     x = by_px - whole

@@ -11,15 +11,15 @@ import numpy as np
 
 from benchmarks.speed.figures import Measured, SceneFigures
 from benchmarks.speed.measure import on_the_front
-from benchmarks.speed.plot import Panel, plotted
-from benchmarks.speed.prediction import WITHIN, Foretold, is_near
+from benchmarks.speed.plot import Panel, plot_panels
+from benchmarks.speed.prediction import WITHIN, Prediction, is_near
 from benchmarks.speed.rendering_figures import DrawingFigures
 from benchmarks.speed.scaling import Growth
-from benchmarks.speed.targets import Target
+from benchmarks.speed.targets import SpeedTarget
 from benchmarks.speed.variants import REFERENCE
 from iibr_core.evaluation.report import markdown_table
 from iibr_core.evaluation.tables import NO_FIGURE, Table, number
-from iibr_core.formats.files import written_whole
+from iibr_core.formats.files import atomic_write
 
 MIB = 2**20
 FRONT_MARK = "●"
@@ -31,9 +31,9 @@ class Bench:
 
     scenes: tuple[SceneFigures, ...]
     drawings: tuple[DrawingFigures, ...]
-    foretold: tuple[Foretold, ...]
+    predicted: tuple[Prediction, ...]
     growths: tuple[Growth, ...]
-    targets: tuple[Target, ...]
+    targets: tuple[SpeedTarget, ...]
     machine: str
     command: str
 
@@ -54,10 +54,10 @@ def write_bench(folder: Path, bench: Bench) -> list[Path]:
 
     Raises InputError where that cannot be done.
     """
-    pictures = plotted(panels(bench), ("svg", "png"))
+    pictures = plot_panels(panels(bench), ("svg", "png"))
     paths = [folder / "speed.md", folder / "speed.svg", folder / "speed.png"]
     for path, content in zip(paths, (markdown_of(bench).encode(), *pictures)):
-        with written_whole(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_bytes(content)
     return paths
 
@@ -87,8 +87,8 @@ def markdown_of(bench: Bench) -> str:
     means_of_kinds = [(title, "", means_table(scenes)) for title, scenes in _kinds(bench.scenes)]
     sections = [*means_of_kinds, *_scene_sections(bench.scenes)]
     sections += [(f"Drawing: {figures.what}", DRAWING, drawing_table(figures)) for figures in bench.drawings]
-    if bench.foretold:
-        sections.append(("The plan beside what was measured", FORETOLD, foretold_table(bench.foretold)))
+    if bench.predicted:
+        sections.append(("The plan beside what was measured", PREDICTED, prediction_table(bench.predicted)))
     if bench.growths:
         sections.append(("Growth", GROWTH, growth_table(bench.growths)))
     if bench.targets:
@@ -112,7 +112,7 @@ DRAWING = (
     "Time of one picture against drawing it *at once*, what the viewer shows first; errors are against a float sum of\n"
     "four times as many views in numpy. What a drag leaves out is in [optics.md](optics.md)."
 )
-FORETOLD = f"Foretold over measured; good is within {WITHIN:.0%}. Time is processor time over all cores."
+PREDICTED = f"Predicted over measured; good is within {WITHIN:.0%}. Time is processor time over all cores."
 GROWTH = "Seconds and bytes grow like the varied quantity to these powers."
 
 
@@ -180,26 +180,26 @@ def drawing_table(figures: DrawingFigures) -> Table:
     return Table(("variant", "front", "time / at once", "ms", "samples", "PSNR dB", "FLIP"), rows)
 
 
-def foretold_table(foretold: Sequence[Foretold]) -> Table:
-    """Time and memory, foretold and measured."""
-    head = ("scene", "quality", "s foretold", "measured", "ratio", "", "MiB foretold", "measured", "ratio", "")
+def prediction_table(predicted: Sequence[Prediction]) -> Table:
+    """Time and memory, predicted and measured."""
+    head = ("scene", "quality", "s predicted", "measured", "ratio", "", "MiB predicted", "measured", "ratio", "")
     rows = tuple(
         (
             f.scene,
             f.quality,
-            number(f.foretold_s, 2),
+            number(f.predicted_s, 2),
             number(f.measured_s, 2),
-            *_judged(f.time_ratio),
-            _mib(f.foretold_bytes),
+            *_verdict(f.time_ratio),
+            _mib(f.predicted_bytes),
             _mib(f.measured_bytes),
-            *_judged(f.memory_ratio),
+            *_verdict(f.memory_ratio),
         )
-        for f in foretold
+        for f in predicted
     )
     return Table(head, rows)
 
 
-def _judged(ratio: float) -> tuple[str, str]:
+def _verdict(ratio: float) -> tuple[str, str]:
     return number(ratio, 2), {True: "", False: "off", None: ""}[is_near(ratio)]
 
 
@@ -217,7 +217,7 @@ def growth_table(growths: Sequence[Growth]) -> Table:
     return Table(("varied", "time", "memory", "processor seconds and peak memory"), rows)
 
 
-def targets_table(targets: Sequence[Target]) -> Table:
+def targets_table(targets: Sequence[SpeedTarget]) -> Table:
     """Figures with their targets."""
     words = {True: "met", False: "missed", None: "not known here"}
     return Table(

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.speed.measure import Cost, Tell, cost_of, exponent, in_turns, median_cost, peak_bytes
-from benchmarks.speed.prediction import Given, make_field
+from benchmarks.speed.prediction import BenchInput, make_field
 from iibr_core.generation.plan import plan_literal
-from iibr_core.training.degradation import blurred
+from iibr_core.training.degradation import blur
 from iibr_core.types import Disparity, GridShape, Photo, Quality
 
 TEXTURE_PX = 1.5
@@ -44,10 +44,10 @@ class Growth:
     memory_exponent: float
 
 
-def made_up(side: int, range_px: float, squares: int, seed: int = 0) -> tuple[Photo, Disparity]:
+def made_up_scene(side: int, range_px: float, squares: int, seed: int = 0) -> tuple[Photo, Disparity]:
     """A photo of side x side px and its disparity: a wall at 0, squares anywhere before it at range_px / 2 and more."""
     rng = np.random.default_rng(seed)
-    pixels = np.stack([blurred(rng.random((side, side)).astype(np.float32), TEXTURE_PX) for _ in range(3)], axis=-1)
+    pixels = np.stack([blur(rng.random((side, side)).astype(np.float32), TEXTURE_PX) for _ in range(3)], axis=-1)
     pixels = np.clip(0.5 + 2 * (pixels - 0.5), 0, 1).astype(np.float32)
     disparity = np.zeros((side, side), np.float32)
     length = max(round(SQUARE_SHARE * side), 1)
@@ -84,22 +84,22 @@ def edges_of(side: int, grid: int, squares: int) -> float:
     return plan_literal(given.photo, given.disparity, given.grid).edge_fraction
 
 
-def growth(name: str, points: list[Point], repeats: int, tell: Tell) -> Growth:
+def growth(name: str, points: list[Point], repeats: int, report_progress: Tell) -> Growth:
     """Measure a series, its scenes in turns."""
     scenes = [made_up_field(point) for point in points]
     make_field(scenes[0], points[0].quality)  # compiles
 
-    def way(given: Given, quality: Quality) -> Callable[[], Cost]:
+    def way(given: BenchInput, quality: Quality) -> Callable[[], Cost]:
         return lambda: cost_of(lambda: make_field(given, quality))
 
     ways = {f"{name}: {point.x:g}": way(given, point.quality) for given, point in zip(scenes, points)}
-    seconds = [median_cost(costs).cpu_s for costs in in_turns(ways, repeats, tell).values()]
+    seconds = [median_cost(costs).cpu_s for costs in in_turns(ways, repeats, report_progress).values()]
     memory = [peak_bytes(make_field, given, point.quality) for given, point in zip(scenes, points)]
     x = [point.x for point in points]
     return Growth(name, tuple(zip(x, seconds, memory)), exponent(x, seconds), exponent(x, memory))
 
 
-def made_up_field(point: Point) -> Given:
+def made_up_field(point: Point) -> BenchInput:
     """The scene of a point."""
-    photo, disparity = made_up(point.side, point.range_px, point.squares)
-    return Given("made up", photo, disparity, GridShape(point.grid, point.grid))
+    photo, disparity = made_up_scene(point.side, point.range_px, point.squares)
+    return BenchInput("made up", photo, disparity, GridShape(point.grid, point.grid))

@@ -10,8 +10,8 @@ import numpy as np
 
 from benchmarks.speed.figures import SceneFigures
 from benchmarks.speed.measure import Cost, Tell, cost_of, in_turns, median_cost, peak_bytes
-from benchmarks.speed.prediction import WITHIN, Foretold, Given, is_near, make_field, whole_field
-from benchmarks.speed.scaling import made_up
+from benchmarks.speed.prediction import WITHIN, BenchInput, Prediction, is_near, make_field, whole_field
+from benchmarks.speed.scaling import made_up_scene
 from benchmarks.speed.variants import BenchScene
 from iibr_core.generation.cost_model import CORES
 from iibr_core.generation.light_field import generate
@@ -28,7 +28,7 @@ TIMED: tuple[Quality, ...] = ("fast", "balanced")
 
 
 @dataclass(frozen=True)
-class Target:
+class SpeedTarget:
     """One figure with its target, in words. is_met: None where this system cannot tell."""
 
     what: str
@@ -37,17 +37,17 @@ class Target:
     is_met: bool | None
 
 
-def field_targets(scene: BenchScene, repeats: int, tell: Tell) -> Iterator[Target]:
+def field_targets(scene: BenchScene, repeats: int, report_progress: Tell) -> Iterator[SpeedTarget]:
     """Of a real field, which should be 9x9 of 512x512, of a made-up one of 1 MP, and of a flat photo."""
     real = whole_field(scene)
-    large = Given("9x9 of 1 MP", *made_up(MEGAPIXEL_SIDE, 2.0, SQUARES), GridShape(9, 9))
+    large = BenchInput("9x9 of 1 MP", *made_up_scene(MEGAPIXEL_SIDE, 2.0, SQUARES), GridShape(9, 9))
     ways = {
         (given.name, quality): (lambda given=given, quality=quality: cost_of(lambda: make_field(given, quality)))
         for given in (real, large)
         for quality in TIMED
     }
     in_words = {f"{name}, {quality}": way for (name, quality), way in ways.items()}
-    costs = dict(zip(ways, map(median_cost, in_turns(in_words, repeats, tell).values())))
+    costs = dict(zip(ways, map(median_cost, in_turns(in_words, repeats, report_progress).values())))
     size = f"{real.grid.columns}x{real.grid.rows} of {scene.photo.shape[1]}x{scene.photo.shape[0]}"
     for given, words, most_s in ((real, f"{size}, {real.name}", FIELD_S), (large, large.name, MEGAPIXEL_S)):
         for quality in TIMED:
@@ -56,45 +56,47 @@ def field_targets(scene: BenchScene, repeats: int, tell: Tell) -> Iterator[Targe
     yield _flat_target(real, costs[real.name, "fast"].cpu_s, 5 * repeats)
 
 
-def front_targets(scenes: Sequence[SceneFigures]) -> Iterator[Target]:
+def front_targets(scenes: Sequence[SceneFigures]) -> Iterator[SpeedTarget]:
     """How far the plan's choice is behind the best variant that takes no longer, on each scene."""
     for scene in scenes:
         behind = scene.behind_front_db
         what = f"the plan's default against the front at equal time, {scene.name}"
         measured = f"{behind:.2f} dB (*{scene.planned}*)"
-        yield Target(what, f"<= {BEHIND_FRONT_DB:g} dB behind", measured, behind <= BEHIND_FRONT_DB)
+        yield SpeedTarget(what, f"<= {BEHIND_FRONT_DB:g} dB behind", measured, behind <= BEHIND_FRONT_DB)
 
 
-def foretold_targets(foretold: Sequence[Foretold]) -> Iterator[Target]:
+def prediction_targets(predicted: Sequence[Prediction]) -> Iterator[SpeedTarget]:
     """How many of the plan's predictions are as near as they should be."""
-    ratios = {"time": [f.time_ratio for f in foretold], "peak memory": [f.memory_ratio for f in foretold]}
+    ratios = {"time": [f.time_ratio for f in predicted], "peak memory": [f.memory_ratio for f in predicted]}
     for what, found in ratios.items():
         known = [ratio for ratio in found if math.isfinite(ratio)]
         if known:
             near = sum(map(bool, map(is_near, known)))
-            said = f"{near} of {len(known)}; foretold / measured {min(known):.2f} to {max(known):.2f}"
-            yield Target(f"the plan's {what}", f"within {WITHIN:.0%}", said, near == len(known))
+            said = f"{near} of {len(known)}; predicted / measured {min(known):.2f} to {max(known):.2f}"
+            yield SpeedTarget(f"the plan's {what}", f"within {WITHIN:.0%}", said, near == len(known))
 
 
-def _time_target(what: str, cost: Cost, most_s: float) -> Target:
+def _time_target(what: str, cost: Cost, most_s: float) -> SpeedTarget:
     """Judged by processor time over all cores: what the wall clock shows on a machine that does nothing else."""
     alone = cost.cpu_s / CORES
     said = f"{alone:.2f} s of processor time over {CORES} cores ({cost.wall_s:.2f} s by the clock)"
-    return Target(what, f"<= {most_s:g} s", said, alone <= most_s)
+    return SpeedTarget(what, f"<= {most_s:g} s", said, alone <= most_s)
 
 
-def _memory_target(given: Given) -> Target:
+def _memory_target(given: BenchInput) -> SpeedTarget:
     field_bytes = plan_literal(given.photo, given.disparity, given.grid).field_bytes
     ratio = peak_bytes(make_field, given, "balanced") / field_bytes
     is_met = ratio <= MOST_MEMORY if math.isfinite(ratio) else None
-    return Target(f"{given.name}, peak memory over the light field's", f"<= {MOST_MEMORY:g}", f"{ratio:.2f}", is_met)
+    return SpeedTarget(
+        f"{given.name}, peak memory over the light field's", f"<= {MOST_MEMORY:g}", f"{ratio:.2f}", is_met
+    )
 
 
-def _flat_target(real: Given, real_s: float, repeats: int) -> Target:
+def _flat_target(real: BenchInput, real_s: float, repeats: int) -> SpeedTarget:
     """The same photo without depth; its plan is the viewer's, which decides that one view is enough."""
     flat = Disparity(np.zeros_like(real.disparity.values), "flat")
     plan = plan_for_viewing(real.photo, flat)
     flat_s = median_cost([cost_of(lambda: list(generate(real.photo, flat, plan))) for _ in range(repeats)]).cpu_s
     cheaper = real_s / max(flat_s, 1e-6)
     what = f"a flat photo against {real.name}"
-    return Target(what, f">= {FLAT_CHEAPER} times cheaper", f"{cheaper:.0f} times", cheaper >= FLAT_CHEAPER)
+    return SpeedTarget(what, f">= {FLAT_CHEAPER} times cheaper", f"{cheaper:.0f} times", cheaper >= FLAT_CHEAPER)

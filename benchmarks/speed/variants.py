@@ -14,13 +14,13 @@ from benchmarks.speed.measure import Cost, cost_of
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.datasets import read_view
-from iibr_core.evaluation.trials import Trial, given_of, trials_of
+from iibr_core.evaluation.trials import Trial, trial_input, trials_of
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.training.degradation import blurred
-from iibr_core.types import FloatImage, Quality, StoredColors, ViewOffset
+from iibr_core.training.degradation import blur
+from iibr_core.types import FloatImage, ImageSize, Quality, StoredColors, ViewOffset
 
 MOST_JUDGED = 12
 SOFT_PX = 2.0
@@ -96,18 +96,18 @@ def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> l
     from iibr_core.depth.choice import DepthChoice
 
     trial = trials_of(scene, "auto", None)[0]
-    given = given_of(trial, "auto", DepthChoice(), max_pixels)
+    given = trial_input(trial, "auto", DepthChoice(), max_pixels)
     offsets = {index: trial.offset(index) for index in trial.judged}
     reach = max(round(max(abs(part) for part in at)) for at in offsets.values())
     field = tuple(ViewOffset(float(t), float(s)) for t in range(-reach, reach + 1) for s in range(-reach, reach + 1))
-    judged = _spread_out(trial)
+    judged = _evenly_spaced(trial)
     truth = {offsets[k]: read_view(scene.views[k], max_pixels)[0] for k in judged}
     own = BenchScene(scene.name, given.photo, given.maps[0].values, truth, field)
-    soft = replace(own, name=f"{scene.name}, soft map", disparity=blurred(own.disparity, SOFT_PX), is_soft=True)
+    soft = replace(own, name=f"{scene.name}, soft map", disparity=blur(own.disparity, SOFT_PX), is_soft=True)
     return [own, soft] if with_soft else [own]
 
 
-def _spread_out(trial: Trial) -> list[int]:
+def _evenly_spaced(trial: Trial) -> list[int]:
     """Judged views: the corners, and eight between that fields with views left out do not store; all of few."""
     if len(trial.judged) <= MOST_JUDGED:
         return list(trial.judged)
@@ -145,52 +145,52 @@ def field_cost(variant: Variant, scene: BenchScene) -> Cost:
         rest = [at for at in stored_offsets(variant, scene) if at not in outer]
         sample = [rest[round(k)] for k in np.linspace(0, len(rest) - 1, min(len(rest), MOST_JUDGED))]
         if sample:
-            rendering = cost_of(lambda: [_stored(v.colors, variant) for v in maker.views(variant.quality, sample)])
+            rendering = cost_of(lambda: [_to_stored(v.colors, variant) for v in maker.views(variant.quality, sample)])
             cost += rendering.times(len(rest) / len(sample))
     return cost
 
 
-def judged_views(variant: Variant, scene: BenchScene, draw: Draw | None) -> dict[ViewOffset, FloatImage]:
+def evaluated_views(variant: Variant, scene: BenchScene, draw: Draw | None) -> dict[ViewOffset, FloatImage]:
     """The judged views of a variant, sRGB-encoded, at the scene's size."""
     wanted = list(scene.truth)
     with _maker(variant, scene.photo, scene.disparity, scene) as maker:
         if variant.every == 1:
-            made = [encoded_from_stored(_stored(maker.view(variant.quality, at).colors, variant)) for at in wanted]
+            made = [encoded_from_stored(_to_stored(maker.view(variant.quality, at).colors, variant)) for at in wanted]
         else:
             assert draw is not None
             offsets = stored_offsets(variant, scene)
             stored: dict[ViewOffset, tuple[StoredColors, FloatImage]] = {
-                at: (_stored(view.colors, variant), view.disparity)
+                at: (_to_stored(view.colors, variant), view.disparity)
                 for at, view in zip(offsets, maker.views(variant.quality, offsets))
             }
             stored[ViewOffset(0.0, 0.0)] = (
-                _stored(scene.photo, variant),
-                _refined(variant, scene.photo, scene.disparity),
+                _to_stored(scene.photo, variant),
+                _refine(variant, scene.photo, scene.disparity),
             )
             made = draw(stored, wanted)
-    return {at: _resized(image, scene.photo.shape[:2]) for at, image in zip(wanted, made)}
+    return {at: _resize(image, scene.photo.shape[:2]) for at, image in zip(wanted, made)}
 
 
 def _maker(variant: Variant, photo: FloatImage, disparity: FloatImage, scene: BenchScene) -> ViewMaker:
     if variant.shrink > 1:
         size = (max(photo.shape[0] // variant.shrink, 1), max(photo.shape[1] // variant.shrink, 1))
         ratio = np.float32(size[1] / photo.shape[1])
-        photo, disparity = _resized(photo, size), resample_surfaces(disparity, size) * ratio
-    disparity = _refined(variant, photo, disparity)
+        photo, disparity = _resize(photo, size), resample_surfaces(disparity, ImageSize(*size)) * ratio
+    disparity = _refine(variant, photo, disparity)
     return ViewMaker(
         photo, disparity, scene.field, (variant.quality,), slots=variant.slots, hypotheses=variant.hypotheses
     )
 
 
-def _refined(variant: Variant, photo: FloatImage, disparity: FloatImage) -> FloatImage:
+def _refine(variant: Variant, photo: FloatImage, disparity: FloatImage) -> FloatImage:
     return refine(photo, disparity, variant.refined) if variant.refined > 0 else disparity
 
 
-def _stored(colors: FloatImage, variant: Variant) -> StoredColors:
+def _to_stored(colors: FloatImage, variant: Variant) -> StoredColors:
     return stored_from_encoded(colors, variant.is_half_float)
 
 
-def _resized(image: FloatImage, size: tuple[int, ...]) -> FloatImage:
+def _resize(image: FloatImage, size: tuple[int, ...]) -> FloatImage:
     """The picture (H, W, 3) at another (height, width): Lanczos, over areas where it gets smaller."""
     if image.shape[:2] == tuple(size[:2]):
         return image

@@ -16,8 +16,8 @@ import OpenImageIO as oiio
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, go_on, in_bands, never
-from iibr_core.types import FloatImage, Photo
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.types import FloatImage, ImageSize, Photo, image_size
 
 LONGEST_PX = 400
 """Depth is guessed on a picture so large."""
@@ -35,30 +35,30 @@ GUIDE_CONTRAST = 0.03
 """Brightness that varies by less than this (standard deviation) draws no edge of depth."""
 
 
-def estimate_offline(photo: Photo, should_stop: ShouldStop = never) -> RelativeInverseDepth:
+def estimate_from_cues(photo: Photo, should_stop: ShouldStop = never) -> RelativeInverseDepth:
     """Rough inverse depth (H, W) of a photo, finite; 0 everywhere where the picture gives no hint (one row of pixels).
 
     On teddy, moebius, motorcycle and antinous its correlation with the true disparity is 0.5 to 0.86 (docs/depth.md).
     Raises Cancelled once should_stop is true.
     """
     pixels = np.clip(photo.pixels, 0, 1)
-    small = _resized(pixels, _small_size(photo.size), "box", should_stop)
+    small = _resize(pixels, _small_size(photo.size), "box", should_stop)
     smooth = small
     for _ in range(3):
-        smooth = _averaged(smooth, DETAIL_PX)
-    go_on(should_stop)
+        smooth = _box_filter(smooth, DETAIL_PX)
+    raise_if_stopped(should_stop)
     way = _way_from_top(smooth)
-    go_on(should_stop)
-    depth = _standardised(np.indices(way.shape, np.float32)[0]) + WAY_SHARE * _standardised(way)
-    return RelativeInverseDepth(_guided(depth, small.mean(axis=2), pixels, should_stop))
+    raise_if_stopped(should_stop)
+    depth = _standardise(np.indices(way.shape, np.float32)[0]) + WAY_SHARE * _standardise(way)
+    return RelativeInverseDepth(_guided_upsample(depth, small.mean(axis=2), pixels, should_stop))
 
 
-def _small_size(size: tuple[int, int]) -> tuple[int, int]:
+def _small_size(size: ImageSize) -> ImageSize:
     ratio = min(1.0, LONGEST_PX / max(size))
-    return max(round(size[0] * ratio), 1), max(round(size[1] * ratio), 1)
+    return ImageSize(max(round(size.height * ratio), 1), max(round(size.width * ratio), 1))
 
 
-def _resized(image: FloatImage, size: tuple[int, int], filter_name: str, should_stop: ShouldStop) -> FloatImage:
+def _resize(image: FloatImage, size: ImageSize, filter_name: str, should_stop: ShouldStop) -> FloatImage:
     """(H, W, C) at another (height, width)."""
     if image.shape[:2] == size:
         return image
@@ -70,12 +70,12 @@ def _resized(image: FloatImage, size: tuple[int, int], filter_name: str, should_
         source.set_pixels(rows, np.ascontiguousarray(image[first:last], np.float32))
 
     def resize(first: int, last: int) -> None:
-        rows = oiio.ROI(0, size[1], first, last, 0, 1, 0, channels)
+        rows = oiio.ROI(0, size.width, first, last, 0, 1, 0, channels)
         oiio.ImageBufAlgo.resize(resized, source, filtername=filter_name, roi=rows)
 
     # OpenImageIO has threads of its own. A pixel of a smaller picture takes as long as all that it is the mean of.
-    in_bands(put, (image.shape[0], image.shape[1]), should_stop, threads=1)
-    shrinkage = max(image.shape[0] * image.shape[1] / (size[0] * size[1]), 1.0)
+    in_bands(put, image_size(image), should_stop, threads=1)
+    shrinkage = max(image.shape[0] * image.shape[1] / (size.height * size.width), 1.0)
     in_bands(resize, size, should_stop, threads=1, most_pixels=int(tiling.MOST_BAND_PIXELS / shrinkage))
     return np.asarray(resized.get_pixels(oiio.FLOAT), np.float32).reshape(*size, channels)
 
@@ -88,7 +88,7 @@ def _way_from_top(image: FloatImage) -> FloatImage:
     return way
 
 
-def _averaged(image: FloatImage, radius: int) -> FloatImage:
+def _box_filter(image: FloatImage, radius: int) -> FloatImage:
     """Means over squares, (H, W, ...); at the frame over what of them lies inside."""
     for axis in (0, 1):
         count = image.shape[axis]
@@ -99,29 +99,31 @@ def _averaged(image: FloatImage, radius: int) -> FloatImage:
     return image
 
 
-def _standardised(values: FloatImage) -> FloatImage:
+def _standardise(values: FloatImage) -> FloatImage:
     """Mean 0, standard deviation 1; 0 where all are equal."""
     spread = float(values.std())
     return (values - values.mean()) / np.float32(spread) if spread > 1e-9 else np.zeros_like(values)
 
 
-def _guided(values: FloatImage, guide: FloatImage, pixels: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
+def _guided_upsample(
+    values: FloatImage, guide: FloatImage, pixels: FloatImage, should_stop: ShouldStop = never
+) -> FloatImage:
     """The map (h, w), guided by a picture (h, w), at the size of the photo (H, W, 3), which guides it there.
 
     He et al., Guided Image Filtering, PAMI 2013, in its fast form: the linear model is enlarged, not the map.
     """
     products = np.stack([values, guide, guide * values, guide * guide], axis=2)
-    mean, guide_mean, product, square = np.moveaxis(_averaged(products, GUIDE_PX), 2, 0)
+    mean, guide_mean, product, square = np.moveaxis(_box_filter(products, GUIDE_PX), 2, 0)
     gain = (product - guide_mean * mean) / (square - guide_mean**2 + GUIDE_CONTRAST**2)
-    model = _averaged(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
-    model = _resized(model, pixels.shape[:2], "triangle", should_stop)
+    model = _box_filter(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
+    model = _resize(model, image_size(pixels), "triangle", should_stop)
     guided = np.empty(pixels.shape[:2], np.float32)
 
     def band(first: int, last: int) -> None:
         rows = slice(first, last)
         guided[rows] = model[rows, :, 0] * pixels[rows].mean(axis=2) + model[rows, :, 1]
 
-    in_bands(band, (pixels.shape[0], pixels.shape[1]), should_stop)
+    in_bands(band, image_size(pixels), should_stop)
     return guided
 
 

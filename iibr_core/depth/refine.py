@@ -11,10 +11,10 @@ from math import ceil, floor, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.disparity_holes import fill_from_background
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.types import FloatImage, InputError
+from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 SHARP_PX = 0.65
 """Edges blurred by less (sigma) count as exact: a step between two pixels measures 0.4, one pixel between them 0.8."""
@@ -65,7 +65,7 @@ def refine(
         raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
     if not 0 <= strength <= 1:
         raise InputError(f"refinement strength {strength}: give a number from 0 (off) to 1")
-    values = _known_everywhere(disparity, should_stop)
+    values = _fill_unknown(disparity, should_stop)
     sigma = edge_blur_px(values, should_stop) if strength > 0 else 0.0
     if sigma < SHARP_PX:
         return values
@@ -76,7 +76,7 @@ def refine(
     def band(first: int, last: int) -> None:
         _refine(values, colors, least_edge, sigma, softness, first, last, refined)
 
-    in_bands(band, (values.shape[0], values.shape[1]), should_stop)
+    in_bands(band, image_size(values), should_stop)
     return refined
 
 
@@ -98,7 +98,7 @@ def edge_blur_px(disparity: FloatImage, should_stop: ShouldStop = never) -> floa
         measured = len(sigmas) and sigma < MEASURING_REACH_PX / 5 * 2**coarser
         if measured or min(disparity.shape) < 4 * MEASURING_REACH_PX:
             return min(sigma, WIDEST_SIGMA_PX)
-        disparity = _halved(disparity)
+        disparity = _downsample(disparity)
         coarser += 1
 
 
@@ -112,14 +112,14 @@ def _edges(disparity: FloatImage, least_edge: float, should_stop: ShouldStop) ->
         count = _measure_edges(disparity, least_edge, MEASURING_REACH_PX, step, first, last, *found)
         return found[:, :count].copy()
 
-    return np.concatenate(in_bands(band, (height, width), should_stop), axis=1)
+    return np.concatenate(in_bands(band, ImageSize(height, width), should_stop), axis=1)
 
 
-def _known_everywhere(disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
+def _fill_unknown(disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
     known = np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32)
     if known.size and np.isnan(known).all():
         raise InputError("refining depth edges: no disparity is known; give another map")
-    return fill_from_background(known, should_stop) if np.isnan(known).any() else known
+    return fill_disparity_holes(known, should_stop) if np.isnan(known).any() else known
 
 
 def _extent(disparity: FloatImage) -> float:
@@ -137,7 +137,7 @@ def _weighted_median(values: FloatImage, weights: FloatImage) -> float:
     return float(values[order][np.searchsorted(share, share[-1] / 2)])
 
 
-def _halved(values: FloatImage) -> FloatImage:
+def _downsample(values: FloatImage) -> FloatImage:
     height, width = values.shape[0] // 2 * 2, values.shape[1] // 2 * 2
     return np.ascontiguousarray(values[:height, :width].reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3)))
 
@@ -155,7 +155,7 @@ def _at(values, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _uphill(values, x, y):  # type: ignore[no-untyped-def]
+def _steepest_direction(values, x, y):  # type: ignore[no-untyped-def]
     """Gradient (x, y) of the map about a pixel, over 5 x 5."""
     height, width = values.shape
     across = down = 0.0
@@ -203,7 +203,7 @@ def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights
     for row in range(first, last):
         y = row * step
         for x in range(width):
-            across, down = _uphill(values, x, y)
+            across, down = _steepest_direction(values, x, y)
             slope = sqrt(across * across + down * down)
             if not slope * 2 * reach > least_edge:
                 continue
@@ -248,7 +248,7 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
         for x in range(width):
             here = values[y, x]
             refined[y, x] = here
-            across, down = _uphill(values, x, y)
+            across, down = _steepest_direction(values, x, y)
             slope = sqrt(across * across + down * down)
             if not slope * 4 * reach * pace > least_edge:
                 continue

@@ -41,12 +41,12 @@ def disparity_from(
         case MetricDepth(metres, focal_px) if baseline_m is not None and focal_px is not None:
             return _true_disparity(_inverse(metres), focal_px, baseline_m, focus_m)
         case MetricDepth(metres):
-            return _spread(_inverse(metres), grid)
+            return _scale_to_viewing_range(_inverse(metres), grid)
         case RelativeInverseDepth(values):
-            return _spread(_known(values), grid)
+            return _scale_to_viewing_range(_finite_or_nan(values), grid)
 
 
-def _known(values: NDArray[Any]) -> DoubleImage:
+def _finite_or_nan(values: NDArray[Any]) -> DoubleImage:
     """Values, NaN where they are not finite."""
     known = np.where(np.isfinite(values), values, np.nan).astype(np.float64)
     if np.isnan(known).all():
@@ -58,7 +58,7 @@ def _inverse(metres: FloatImage) -> DoubleImage:
     """1 / metres; infinitely far is known to be 0."""
     depth = metres.astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return _known(np.where(depth > 0, 1 / depth, np.nan))
+        return _finite_or_nan(np.where(depth > 0, 1 / depth, np.nan))
 
 
 def _true_disparity(inverse: DoubleImage, focal_px: float, baseline_m: float, focus_m: float) -> FloatImage:
@@ -72,10 +72,10 @@ def _true_disparity(inverse: DoubleImage, focal_px: float, baseline_m: float, fo
 def _not_absurd(disparity: DoubleImage) -> FloatImage:
     """The disparity, NaN where it is larger than any can be."""
     limit = MAX_DISPARITY_WIDTHS * disparity.shape[1]
-    return _known(np.where(np.abs(disparity) > limit, np.nan, disparity)).astype(np.float32)
+    return _finite_or_nan(np.where(np.abs(disparity) > limit, np.nan, disparity)).astype(np.float32)
 
 
-def _spread(inverse: DoubleImage, grid: GridShape) -> FloatImage:
+def _scale_to_viewing_range(inverse: DoubleImage, grid: GridShape) -> FloatImage:
     """Inverse depth as disparity with the range that viewing plans for; 0 everywhere if it is flat."""
     known = inverse[~np.isnan(inverse)]
     low = high = 0.0

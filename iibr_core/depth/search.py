@@ -14,7 +14,7 @@ from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOri
 from iibr_core.depth.embedded.images import picture_file
 from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.pictorial_cues import estimate_offline
+from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import refine
 from iibr_core.depth.scaling import disparity_from
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity
@@ -22,9 +22,9 @@ from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo, upright
 from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.inpainting.disparity_holes import fill_from_background
-from iibr_core.runtime.tiling import ShouldStop, go_on, never
-from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.types import Disparity, FloatImage, GridShape, ImageSize, InputError, Photo
 
 USUAL_GRID = GridShape(9, 9)
 """What estimates without a scale are made to suit where the grid is not yet known."""
@@ -47,7 +47,7 @@ class PhotoWithDepth:
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class _FoundDepth:
     """What one source gave: an estimate of any kind and size, or disparity that counts as it is (from a file).
 
     photo: the one to show with it.
@@ -64,7 +64,7 @@ def open_with_depth(
     max_pixels: int = DEFAULT_MAX_PIXELS,
     grid: GridShape | None = None,
     should_stop: ShouldStop = never,
-    tell: Tell = lambda doing, share: None,
+    report_progress: Tell = lambda doing, share: None,
 ) -> PhotoWithDepth:
     """Read a photo and find its disparity; every photo gets one.
 
@@ -73,23 +73,23 @@ def open_with_depth(
     """
     choice, path = choice or DepthChoice(), Path(path)
     photo = read_photo(path, max_pixels)
-    search = _Search(path, photo, choice, max_pixels, should_stop, tell)
+    search = _DepthSearch(path, photo, choice, max_pixels, should_stop, report_progress)
     if choice.file is not None:
-        return _finished(search.of_file(Path(choice.file)), choice, grid, should_stop)
+        return _finish(search.of_file(Path(choice.file)), choice, grid, should_stop)
     failures: tuple[str, ...] = ()
     for kind, find in search.sources():
         try:
             found = find()
             if found is not None:
                 found = replace(found, origin=replace(found.origin, failures=failures))
-                return _finished(found, choice, grid, should_stop)
+                return _finish(found, choice, grid, should_stop)
         except InputError as error:
             failures += (f"{NOT_USED[kind]}: {error}",)
     return _flat(photo, failures)
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class _DepthSearch:
     """One photo on its way to its depth. The methods give None where there is nothing to read."""
 
     path: Path
@@ -97,10 +97,10 @@ class _Search:
     choice: DepthChoice
     max_pixels: int
     should_stop: ShouldStop
-    tell: Tell
+    report_progress: Tell
 
-    def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _Found | None]]]:
-        ways: dict[DepthKind, Callable[[], _Found | None]] = {
+    def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _FoundDepth | None]]]:
+        ways: dict[DepthKind, Callable[[], _FoundDepth | None]] = {
             "file": self.sidecar,
             "embedded": self.embedded,
             "model": self.model,
@@ -113,28 +113,28 @@ class _Search:
 
     def go_on(self) -> None:
         """Asked before work that takes long."""
-        go_on(self.should_stop)
+        raise_if_stopped(self.should_stop)
 
-    def of_file(self, path: Path) -> _Found:
+    def of_file(self, path: Path) -> _FoundDepth:
         disparity = read_disparity(path, self.photo.size, self.choice.file_scale)
-        return _Found(self.photo, DepthOrigin("file", disparity.source), disparity)
+        return _FoundDepth(self.photo, DepthOrigin("file", disparity.source), disparity)
 
-    def sidecar(self) -> _Found | None:
+    def sidecar(self) -> _FoundDepth | None:
         path = find_sidecar(self.path)
         return self.of_file(path) if path is not None else None
 
-    def embedded(self) -> _Found | None:
+    def embedded(self) -> _FoundDepth | None:
         embedded = read_embedded(self.path)
         if embedded is None:
             return None
         orientation = read_orientation(self.path)
         photo = self.photo
         if embedded.all_in_focus is not None:
-            photo = _sharp_photo(photo, embedded.all_in_focus, orientation, self.max_pixels)
+            photo = _all_in_focus_photo(photo, embedded.all_in_focus, orientation, self.max_pixels)
         origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
-        return _Found(photo, origin, _turned(embedded.estimate, photo.size, orientation))
+        return _FoundDepth(photo, origin, _rotate(embedded.estimate, photo.size, orientation))
 
-    def model(self) -> _Found | None:
+    def model(self) -> _FoundDepth | None:
         from iibr_core.depth.models.catalog import model_to_use
 
         model = model_to_use(self.choice.model)
@@ -143,27 +143,27 @@ class _Search:
         from iibr_core.depth.models.transformers_models import estimate_with
 
         self.go_on()
-        estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.tell)
-        return _Found(self.photo, DepthOrigin("model", f"estimated by {model.title}"), estimate)
+        estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)
+        return _FoundDepth(self.photo, DepthOrigin("model", f"estimated by {model.title}"), estimate)
 
-    def rough(self) -> _Found:
+    def rough(self) -> _FoundDepth:
         self.go_on()
-        self.tell("guessing depth", 0.0)
+        self.report_progress("guessing depth", 0.0)
         origin = DepthOrigin("rough", "rough, guessed without a model", advice=BETTER_WAYS)
-        return _Found(self.photo, origin, estimate_offline(self.photo, self.should_stop))
+        return _FoundDepth(self.photo, origin, estimate_from_cues(self.photo, self.should_stop))
 
 
-def _finished(found: _Found, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
+def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
     """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
     photo, origin = found.photo, found.origin
     notes = origin.failures + ((f"{origin.line} {origin.advice}",) if origin.advice else ())
     if isinstance(found.depth, Disparity):
         values, notes = found.depth.values, found.depth.notes + notes
     else:
-        values = disparity_from(resized(found.depth, photo.size), grid or USUAL_GRID)
+        values = disparity_from(resize_estimate(found.depth, photo.size), grid or USUAL_GRID)
         if np.isnan(values).all():
             raise InputError("it knows no depth anywhere")
-        values = fill_from_background(values, should_stop)
+        values = fill_disparity_holes(values, should_stop)
     if choice.refine > 0:
         values = refine(photo.pixels, values, choice.refine, should_stop)
     return PhotoWithDepth(photo, Disparity(values, origin.words, notes), origin)
@@ -175,7 +175,7 @@ def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:
     return PhotoWithDepth(photo, replace(flat, notes=flat.notes + failures), origin)
 
 
-def _sharp_photo(photo: Photo, data: bytes, orientation: int, max_pixels: int) -> Photo:
+def _all_in_focus_photo(photo: Photo, data: bytes, orientation: int, max_pixels: int) -> Photo:
     """The all-in-focus picture as the photo, turned like it; the photo itself where that is damaged or another one."""
     try:
         with picture_file(data, "the all-in-focus picture") as path:
@@ -185,12 +185,12 @@ def _sharp_photo(photo: Photo, data: bytes, orientation: int, max_pixels: int) -
         return replace(photo, notes=(*photo.notes, f"The blurred picture is shown: {error}"))
     if not _is_alike(pixels.shape[:2], photo.size):
         return replace(photo, notes=(*photo.notes, "The blurred picture is shown: the sharp one has another shape."))
-    focal_px = photo.focal_px * pixels.shape[1] / photo.size[1]
+    focal_px = photo.focal_px * pixels.shape[1] / photo.size.width
     note = "The sharp picture that the file holds is shown, not the blurred one."
     return replace(photo, pixels=pixels, focal_px=focal_px, notes=(*photo.notes, note))
 
 
-def _turned(estimate: Estimate, size: tuple[int, int], orientation: int) -> Estimate:
+def _rotate(estimate: Estimate, size: ImageSize, orientation: int) -> Estimate:
     """The estimate, turned upright as the photo was. Some writers turn the map already; others' maps fit no way."""
     values = _values(estimate)
     for candidate in (upright(values, orientation), values):
@@ -200,11 +200,11 @@ def _turned(estimate: Estimate, size: tuple[int, int], orientation: int) -> Esti
     raise InputError(f"its {shape} pixels have another shape than the photo, {photo_shape}")
 
 
-def resized(estimate: Estimate, size: tuple[int, int]) -> Estimate:
+def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
     """The estimate for a picture of another (height, width), surface by surface; lengths in pixels are scaled along."""
     if _values(estimate).shape == size:
         return estimate
-    ratio = size[1] / _values(estimate).shape[1]
+    ratio = size.width / _values(estimate).shape[1]
     match estimate:
         case RelativeInverseDepth(values):
             return RelativeInverseDepth(resample_surfaces(values, size))
@@ -232,6 +232,6 @@ def _with_values(estimate: Estimate, values: FloatImage) -> Estimate:
             return DisparityMap(values)
 
 
-def _is_alike(shape: tuple[int, ...], size: tuple[int, int]) -> bool:
+def _is_alike(shape: tuple[int, ...], size: ImageSize) -> bool:
     """Whether two (height, width) have nearly the same aspect ratio."""
-    return abs(shape[1] * size[0] / (shape[0] * size[1]) - 1) <= MAX_ASPECT_DIFFERENCE
+    return abs(shape[1] * size.height / (shape[0] * size.width) - 1) <= MAX_ASPECT_DIFFERENCE

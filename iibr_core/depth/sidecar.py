@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.types import Disparity
+from iibr_core.types import Disparity, ImageSize
 
 SIDECAR_KINDS = ("_disparity", "_depth")
 SIDECAR_EXTENSIONS = (".pfm", ".exr", ".npy", ".png")
@@ -26,7 +26,7 @@ def find_sidecar(photo_path: Path) -> Path | None:
     return None
 
 
-def flat_disparity(size: tuple[int, int]) -> Disparity:
+def flat_disparity(size: ImageSize) -> Disparity:
     """Disparity 0 everywhere, for a photo of (height, width) that comes without any."""
     note = (
         "No depth: the photo opens flat. Give a map with --disparity FILE, or put one beside the photo, "

@@ -91,7 +91,7 @@ def disagreement(
     y, x, d, there = y[inside], x[inside], d[inside], there[:, inside]
     pixel = tuple(np.rint(there).astype(int))
     same = _inside_a_surface(other.disparity, tolerance)[pixel] & (np.abs(other.disparity[pixel] - d) < tolerance)
-    in_hole = _eroded(one.inpainted)[y, x] & _eroded(other.inpainted)[pixel]
+    in_hole = _erode(one.inpainted)[y, x] & _erode(other.inpainted)[pixel]
     same &= in_hole | ~(one.inpainted[y, x] | other.inpainted[pixel])
     warped = np.stack([map_coordinates(other.colors[..., c], there[:, same], order=3) for c in range(3)], axis=-1)
     return 255 * (warped - one.colors[y[same], x[same]]).astype(np.float64), in_hole[same]
@@ -127,7 +127,7 @@ def _inside_a_surface(disparity: FloatImage, tolerance: float) -> NDArray[np.boo
     return np.asarray(maximum_filter(disparity, 3) - minimum_filter(disparity, 3) < tolerance)
 
 
-def _eroded(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _erode(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(minimum_filter(mask, 3))
 
 

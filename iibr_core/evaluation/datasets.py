@@ -13,15 +13,15 @@ from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.llff import read_llff
 from iibr_core.formats.light_fields.middlebury import read_middlebury
-from iibr_core.formats.light_fields.numbered_grid import read_grid_folder
+from iibr_core.formats.light_fields.numbered_grid import read_numbered_grid
 from iibr_core.formats.light_fields.scene import KnownDisparity, KnownView, MultiView, with_equal_sizes
 from iibr_core.formats.light_fields.stanford import read_stanford
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import Disparity, FloatImage, InputError
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError
 
 Reader = Callable[[Path], MultiView | None]
 """Gives the scene of a folder, None where the folder is laid out otherwise; InputError where it is damaged."""
-READERS: tuple[Reader, ...] = (read_llff, read_stanford, read_middlebury, read_grid_folder)
+READERS: tuple[Reader, ...] = (read_llff, read_stanford, read_middlebury, read_numbered_grid)
 LAYOUTS = "HCI, Stanford archive, Heber, LLFF, Middlebury, or views/v00_u00.png ..."
 
 
@@ -49,7 +49,7 @@ def find_scenes(folder: Path) -> Iterator[MultiView]:
     yield from found
 
 
-def read_known_disparity(known: KnownDisparity, size: tuple[int, int]) -> Disparity:
+def read_known_disparity(known: KnownDisparity, size: ImageSize) -> Disparity:
     """The map for a picture of (height, width), px per view step, what is unknown filled. Raises InputError."""
     return read_disparity(known.path, size, known.scale)
 
@@ -66,10 +66,10 @@ def read_view(view: KnownView, max_pixels: int) -> tuple[FloatImage, NDArray[np.
     for axis, (stored, now) in enumerate(zip(read_size(view.path)[::-1], pixels.shape[1::-1])):
         smaller[axis, axis] = now / stored
         smaller[axis, 2] = 0.5 * now / stored - 0.5
-    return turned_back(pixels, smaller @ view.turned @ np.linalg.inv(smaller))
+    return undo_rotation(pixels, smaller @ view.turned @ np.linalg.inv(smaller))
 
 
-def turned_back(pixels: FloatImage, turned: NDArray[np.float64]) -> tuple[FloatImage, NDArray[np.bool_]]:
+def undo_rotation(pixels: FloatImage, turned: NDArray[np.float64]) -> tuple[FloatImage, NDArray[np.bool_]]:
     """The picture (H, W, 3) as an equal camera at its place would see it that looks as the given one does, and where
     that is known. turned: see `KnownView`, for pictures of this size.
     """

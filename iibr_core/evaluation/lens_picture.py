@@ -40,11 +40,9 @@ def read_lens_picture(scene: MultiView, max_pixels: int) -> LensPicture | None:
         return None
     focus_disparity, radius_views = _numbers(folder / ABOUT)
     if (size := read_size(folder / PICTURE)) != (wanted := read_size(beside)):
-        raise InputError(
-            f"{folder / PICTURE}: is {size[1]}x{size[0]}, but {beside.name} is {wanted[1]}x{wanted[0]}; make them equal"
-        )
+        raise InputError(f"{folder / PICTURE}: is {size}, but {beside.name} is {wanted}; make them equal")
     picture = np.clip(read_photo(folder / PICTURE, max_pixels).pixels, 0, 1)
-    return LensPicture(picture, focus_disparity * picture.shape[1] / size[1], radius_views)
+    return LensPicture(picture, focus_disparity * picture.shape[1] / size.width, radius_views)
 
 
 def _numbers(path: Path) -> tuple[float, float]:

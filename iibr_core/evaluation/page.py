@@ -12,7 +12,7 @@ from PIL import Image
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.evaluation.metrics import flip_picture
-from iibr_core.evaluation.protocol import TRUTH, Bytes, Judgement
+from iibr_core.evaluation.protocol import TRUTH, Bytes, EvaluationResult
 from iibr_core.evaluation.refocus import LENS
 from iibr_core.evaluation.tables import (
     ABOUT_CONSISTENCY,
@@ -48,7 +48,7 @@ figure img { width: 100%; display: block; }
 """
 
 
-def page_of(judgements: Sequence[Judgement], command: str) -> str:
+def page_of(judgements: Sequence[EvaluationResult], command: str) -> str:
     """The page as text."""
     parts = [
         "<!doctype html>",
@@ -65,7 +65,7 @@ def page_of(judgements: Sequence[Judgement], command: str) -> str:
     return "\n".join([*parts, "</body></html>"]) + "\n"
 
 
-def _section(judgement: Judgement) -> Iterator[str]:
+def _section(judgement: EvaluationResult) -> Iterator[str]:
     yield f"<h2>{escape(heading(judgement))}</h2><p>{escape(about(judgement))}</p>"
     yield _table(figures_table(judgement))
     if judgement.consistency:

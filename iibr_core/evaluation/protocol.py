@@ -25,13 +25,13 @@ from iibr_core.evaluation.datasets import read_view
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
 from iibr_core.evaluation.metrics import Mask, flip, psnr, ssim
 from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
-from iibr_core.evaluation.refocus import FocalStack, Refocused, foci_of, lens_focus
-from iibr_core.evaluation.refocus import judged as refocus_judged
-from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Given, Trial, given_of, trials_of
+from iibr_core.evaluation.refocus import FocalStack, RefocusResult, foci_of, lens_focus
+from iibr_core.evaluation.refocus import score_methods as refocus_judged
+from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Trial, TrialInput, trial_input, trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.scene import MultiView
-from iibr_core.generation.view_maker import ViewMaker, as_stored
-from iibr_core.types import DEFAULT_QUALITY, Disparity, FloatImage, Quality, ViewOffset
+from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
+from iibr_core.types import DEFAULT_QUALITY, Disparity, FloatImage, ImageSize, Quality, ViewOffset, image_size
 
 if TYPE_CHECKING:
     from iibr_core.evaluation.lpips import Lpips
@@ -97,7 +97,7 @@ class Pictures:
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class EvaluationResult:
     """One trial with one disparity map. consistency: by quality, and of the truth's EPIs where it has a row of views.
 
     refocus: of grids, from the centre view. hole_share: of the pixels, mean over views. seconds: for everything.
@@ -107,11 +107,11 @@ class Judgement:
     layout: str
     trial: str
     given: str
-    size: tuple[int, int]
+    size: ImageSize
     disparity: str
     rows: tuple[Row, ...]
     consistency: Mapping[str, Consistency]
-    refocus: tuple[Refocused, ...]
+    refocus: tuple[RefocusResult, ...]
     pictures: Pictures
     hole_share: float
     notes: tuple[str, ...]
@@ -121,9 +121,9 @@ class Judgement:
 def evaluate(
     scene: MultiView,
     options: Options | None = None,
-    tell: Tell = lambda done, total, doing: None,
+    report_progress: Tell = lambda done, total, doing: None,
     should_stop: Callable[[], bool] = lambda: False,
-) -> list[Judgement]:
+) -> list[EvaluationResult]:
     """Judge a scene by the paper's trials: one judgement for each trial and disparity map.
 
     Raises InputError where the scene or an option is bad, Cancelled once should_stop is true.
@@ -133,10 +133,12 @@ def evaluate(
     source: DisparityFrom = "auto" if isinstance(options.source, Path) else options.source
     judgements = []
     for trial in trials_of(scene, source, options.most_views):
-        tell(0, 0, f"{scene.name}: disparity")
-        given = given_of(trial, options.source, options.choice, options.max_pixels, should_stop)
+        report_progress(0, 0, f"{scene.name}: disparity")
+        given = trial_input(trial, options.source, options.choice, options.max_pixels, should_stop)
         for disparity in given.maps:
-            judgements.append(_Judge(trial, given, disparity, options, lpips, tell, should_stop).judged())
+            judgements.append(
+                _Evaluator(trial, given, disparity, options, lpips, report_progress, should_stop).judged()
+            )
     return judgements
 
 
@@ -146,21 +148,21 @@ def _lpips(folder: Path) -> Lpips:
     return Lpips(folder)
 
 
-class _Judge:
+class _Evaluator:
     """One trial with one disparity map, view by view."""
 
     def __init__(
         self,
         trial: Trial,
-        given: Given,
+        given: TrialInput,
         disparity: Disparity,
         options: Options,
         lpips: Lpips | None,
-        tell: Tell,
+        report_progress: Tell,
         should_stop: Callable[[], bool],
     ) -> None:
         self.trial, self.given, self.disparity, self.options = trial, given, disparity, options
-        self.lpips, self.tell, self.should_stop = lpips, tell, should_stop
+        self.lpips, self.report_progress, self.should_stop = lpips, report_progress, should_stop
         self.refined = disparity.values
         if options.choice.refine > 0:
             self.refined = refine(given.photo, disparity.values, options.choice.refine)
@@ -175,7 +177,7 @@ class _Judge:
         self.stacks = self._stacks() if options.with_refocus and trial.name == CENTRE_TRIAL else {}
         self.farthest = max(trial.judged, key=lambda k: math.hypot(*trial.offset(k)))
 
-    def judged(self) -> Judgement:
+    def judged(self) -> EvaluationResult:
         trial, scene, start = self.trial, self.trial.scene, time.perf_counter()
         offsets = [trial.offset(index) for index in trial.judged]
         with (
@@ -183,16 +185,16 @@ class _Judge:
             ThreadPoolExecutor(2, thread_name_prefix="iibr-metrics") as pool,
         ):
             for done, index in enumerate(trial.judged):
-                self.tell(done, len(trial.judged), f"{scene.name}: {scene.views[index].name}")
+                self.report_progress(done, len(trial.judged), f"{scene.name}: {scene.views[index].name}")
                 self._judge_view(index, maker, pool)
             agreement = self._consistency(maker, offsets) if self.options.with_consistency else {}
         rows = tuple(_row(method, of_views) for method, of_views in self.figures.items())
-        return Judgement(
+        return EvaluationResult(
             scene.name,
             scene.layout,
             trial.name,
             scene.views[trial.given].name,
-            (self.given.photo.shape[0], self.given.photo.shape[1]),
+            image_size(self.given.photo),
             self.disparity.source,
             rows,
             agreement,
@@ -210,7 +212,7 @@ class _Judge:
         made = {IDENTITY: (self.given.photo, 0.0), **self._warped(offset)}
         for quality in self.options.qualities:
             made_view, ms = maker.timed_view(quality, offset)
-            made[quality] = as_stored(made_view.colors), ms
+            made[quality] = quantise_as_stored(made_view.colors), ms
         hole, visible = judge.hole & known, judge.visible & known
         self.hole_shares.append(float(hole.mean()))
 
@@ -244,7 +246,7 @@ class _Judge:
             stack.add(ViewOffset(0.0, 0.0), photo)
         return stacks
 
-    def _refocused(self) -> tuple[Refocused, ...]:
+    def _refocused(self) -> tuple[RefocusResult, ...]:
         if not self.stacks:
             return ()
         qualities = self.options.qualities
@@ -254,7 +256,7 @@ class _Judge:
     def _warped(self, offset: ViewOffset) -> dict[str, tuple[FloatImage, float]]:
         start = time.perf_counter()
         colors = reference_warp(self.given.photo, self.disparity.values, offset).colors
-        return {REFERENCE: (as_stored(colors), 1e3 * (time.perf_counter() - start))}
+        return {REFERENCE: (quantise_as_stored(colors), 1e3 * (time.perf_counter() - start))}
 
     def _figures(
         self, image: FloatImage, truth: FloatImage, known: Mask | None, visible: Mask, hole: Mask, ms: float
@@ -289,7 +291,7 @@ class _Judge:
     def _consistency(self, maker: ViewMaker, offsets: Sequence[ViewOffset]) -> dict[str, Consistency]:
         found: dict[str, Consistency] = {}
         for quality in self.options.qualities:
-            self.tell(0, 0, f"{self.trial.scene.name}: consistency, {quality}")
+            self.report_progress(0, 0, f"{self.trial.scene.name}: consistency, {quality}")
             make = partial(maker.view, quality)
             found[quality] = consistency(make, offsets, self.given.photo, self.refined)
         if len(self.lines) + 1 >= LEAST_EPI_VIEWS:

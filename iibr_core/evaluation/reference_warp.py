@@ -54,7 +54,7 @@ def reference_warp(photo: FloatImage, disparity: FloatImage, offset: ViewOffset)
     from_x, from_y = x + nearest * offset.s, y + nearest * offset.t
     hole |= (from_x < -0.5) | (from_y < -0.5) | (from_x > width - 0.5) | (from_y > height - 0.5)
     colors = np.clip(_lanczos(photo.astype(np.float32), from_x, from_y), 0, 1)
-    return WarpedView(_filled(colors, hole, nearest), nearest, hole)
+    return WarpedView(_fill_holes(colors, hole, nearest), nearest, hole)
 
 
 @kernel
@@ -129,7 +129,7 @@ def _lanczos(photo, from_x, from_y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _filled(colors, hole, disparity):  # type: ignore[no-untyped-def]
+def _fill_holes(colors, hole, disparity):  # type: ignore[no-untyped-def]
     """Colours with holes filled: of what is met first in eight directions, the farthest surface, nearer ones more."""
     height, width = hole.shape
     filled = colors.copy()

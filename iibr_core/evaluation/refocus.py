@@ -46,7 +46,7 @@ class RefocusFigures:
 
 
 @dataclass(frozen=True, eq=False)
-class Refocused:
+class RefocusResult:
     """One focus: figures by method; to look at, the picture of one of them and how it should be, (H, W, 3).
 
     views: how many were added up.
@@ -111,7 +111,7 @@ class FocalStack:
         linear = linear_from_srgb(view)
         for k, (focus, weight) in enumerate(zip(self.foci, weights)):
             if weight > 0:
-                self._sums[k] = self._sums[k] + np.float32(weight) * sheared(linear, offset, focus)
+                self._sums[k] = self._sums[k] + np.float32(weight) * shear(linear, offset, focus)
                 self._weights[k] += weight
                 self.views[k] += 1
 
@@ -120,11 +120,11 @@ class FocalStack:
         return [srgb_from_linear(total / np.float32(weight)) for total, weight in zip(self._sums, self._weights)]
 
 
-def sheared(view: FloatImage, offset: ViewOffset, focus: Focus) -> FloatImage:
+def shear(view: FloatImage, offset: ViewOffset, focus: Focus) -> FloatImage:
     """The view (H, W, 3) moved so that what lies in focus is where the given view has it, see `within`."""
     for axis, at in enumerate(offset):
         size, margin = view.shape[axis], _margin(focus)
-        view = _moved(view, axis, margin - focus.disparity * at, size - 2 * margin)
+        view = _shift(view, axis, margin - focus.disparity * at, size - 2 * margin)
     return view
 
 
@@ -144,7 +144,7 @@ def _is_worth_it(focus: Focus, image: FloatImage) -> bool:
     return min(image.shape[:2]) - 2 * _margin(focus) >= LEAST_PX
 
 
-def _moved(image: FloatImage, axis: int, start: float, length: int) -> FloatImage:
+def _shift(image: FloatImage, axis: int, start: float, length: int) -> FloatImage:
     """`length` values from a real place on, one pixel apart, by cubic convolution (Keys 1981)."""
     low = math.floor(start)
     f = start - low
@@ -162,7 +162,9 @@ def _part(image: FloatImage, axis: int, start: int, length: int) -> FloatImage:
     return image[start : start + length] if axis == 0 else image[:, start : start + length]
 
 
-def judged(stacks: Mapping[str, FocalStack], truth: str, shown: str, lens: LensPicture | None) -> tuple[Refocused, ...]:
+def score_methods(
+    stacks: Mapping[str, FocalStack], truth: str, shown: str, lens: LensPicture | None
+) -> tuple[RefocusResult, ...]:
     """Every method's pictures against those of the stack named `truth`; what a lens shows, the truth's too, against
     the lens's own picture. shown: the method whose pictures are kept.
     """
@@ -177,5 +179,5 @@ def judged(stacks: Mapping[str, FocalStack], truth: str, shown: str, lens: LensP
             del of_methods[truth]
         figures = {m: RefocusFigures(psnr(p, expected), flip(p, expected)) for m, p in of_methods.items()}
         to_see = [stored_from_encoded(picture, False).astype(np.uint8) for picture in (of_methods[shown], expected)]
-        found.append(Refocused(focus, stacks[truth].views[k], figures, shown, to_see[0], to_see[1]))
+        found.append(RefocusResult(focus, stacks[truth].views[k], figures, shown, to_see[0], to_see[1]))
     return tuple(found)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from iibr_core.evaluation.page import page_of
-from iibr_core.evaluation.protocol import Judgement
-from iibr_core.evaluation.refocus import Refocused
+from iibr_core.evaluation.protocol import EvaluationResult
+from iibr_core.evaluation.refocus import RefocusResult
 from iibr_core.evaluation.tables import (
     ABOUT_CONSISTENCY,
     Table,
@@ -23,7 +23,7 @@ from iibr_core.evaluation.tables import (
     refocus_table,
     summary_table,
 )
-from iibr_core.formats.files import written_whole
+from iibr_core.formats.files import atomic_write
 from iibr_core.types import InputError
 
 FILES = ("report.json", "report.md", "index.html")
@@ -38,7 +38,7 @@ def require_report_folder(folder: Path) -> None:
         raise InputError(f"{folder}: {existing} is a file; choose another place with --out")
 
 
-def write_report(folder: Path, judgements: Sequence[Judgement], command: str) -> None:
+def write_report(folder: Path, judgements: Sequence[EvaluationResult], command: str) -> None:
     """Write FILES into a folder, made if need be; each whole or not at all. command: how they were made.
 
     Raises InputError where the folder cannot be written.
@@ -49,11 +49,11 @@ def write_report(folder: Path, judgements: Sequence[Judgement], command: str) ->
     except OSError as error:
         raise InputError(f"{folder}: cannot be created ({error.strerror}); choose another place with --out") from error
     for name, text in zip(FILES, texts):
-        with written_whole(folder / name) as temporary:
+        with atomic_write(folder / name) as temporary:
             temporary.write_text(text, encoding="utf-8")
 
 
-def json_of(judgements: Sequence[Judgement], command: str) -> str:
+def json_of(judgements: Sequence[EvaluationResult], command: str) -> str:
     """Everything but the pictures; what is not known is null."""
     plain = []
     for judgement in judgements:
@@ -61,12 +61,12 @@ def json_of(judgements: Sequence[Judgement], command: str) -> str:
         fields["rows"] = [asdict(replace(row, of_views=dict(row.of_views))) for row in judgement.rows]
         fields["consistency"] = {name: asdict(found) for name, found in judgement.consistency.items()}
         fields["refocus"] = [_plain_refocus(found) for found in judgement.refocus]
-        fields["size"] = {"height": judgement.size[0], "width": judgement.size[1]}
+        fields["size"] = {"height": judgement.size.height, "width": judgement.size.width}
         plain.append(fields)
     return json.dumps(_finite({"command": command, "judgements": plain}), indent=1, allow_nan=False) + "\n"
 
 
-def _plain_refocus(found: Refocused) -> dict[str, Any]:
+def _plain_refocus(found: RefocusResult) -> dict[str, Any]:
     figures = {method: asdict(of_method) for method, of_method in found.figures.items()}
     return {**asdict(found.focus), "views": found.views, "methods": figures}
 
@@ -80,7 +80,7 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def markdown_of(judgements: Sequence[Judgement], command: str) -> str:
+def markdown_of(judgements: Sequence[EvaluationResult], command: str) -> str:
     """Tables of all judgements, a summary first."""
     lines = ["# Evaluation", "", f"Made by `{command}`.", "", *markdown_table(summary_table(judgements))]
     if any(judgement.consistency for judgement in judgements):

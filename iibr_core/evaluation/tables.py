@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from iibr_core.evaluation.protocol import Judgement
+from iibr_core.evaluation.protocol import EvaluationResult
 from iibr_core.evaluation.refocus import LENS
 from iibr_core.evaluation.trials import CENTRE_TRIAL
 
@@ -26,7 +26,7 @@ def number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else NO_FIGURE
 
 
-def figures_table(judgement: Judgement) -> Table:
+def figures_table(judgement: EvaluationResult) -> Table:
     """One row a method: means over the judged views, and the worst of them."""
     head = ("method", "full dB", "visible dB", "hole dB", "worst view dB", "SSIM", "FLIP", "LPIPS", "ms a view")
     has_lpips = any(math.isfinite(row.mean.lpips) for row in judgement.rows)
@@ -43,7 +43,7 @@ def figures_table(judgement: Judgement) -> Table:
     return Table(head[:7] + head[8:], tuple(row[:7] + row[8:] for row in rows))
 
 
-def consistency_table(judgement: Judgement) -> Table:
+def consistency_table(judgement: EvaluationResult) -> Table:
     """How far the views agree with each other, one row a quality; the truth's own EPIs where it has some."""
     head = (
         "views of",
@@ -76,7 +76,7 @@ ABOUT_CONSISTENCY = (
 )
 
 
-def refocus_table(judgement: Judgement) -> Table:
+def refocus_table(judgement: EvaluationResult) -> Table:
     """PSNR and FLIP of the refocused pictures, two columns a focus, one row a method."""
     methods = dict.fromkeys(method for found in judgement.refocus for method in found.figures)
     head = ["refocused views of"]
@@ -92,7 +92,7 @@ def refocus_table(judgement: Judgement) -> Table:
     return Table(tuple(head), tuple(rows))
 
 
-def about_refocus(judgement: Judgement) -> str:
+def about_refocus(judgement: EvaluationResult) -> str:
     """What the refocused pictures are, in a line."""
     views = {found.views for found in judgement.refocus}
     of = f"{max(views)}" if len(views) == 1 else f"{min(views)} to {max(views)}"
@@ -105,7 +105,7 @@ def about_refocus(judgement: Judgement) -> str:
     )
 
 
-def summary_table(judgements: Sequence[Judgement]) -> Table:
+def summary_table(judgements: Sequence[EvaluationResult]) -> Table:
     """Full-frame PSNR of every method, one row a judgement; means over scenes where there are several."""
     methods = list(dict.fromkeys(row.method for judgement in judgements for row in judgement.rows))
     head = ("scene", "trial", "disparity", "views", *methods)
@@ -133,19 +133,19 @@ def summary_table(judgements: Sequence[Judgement]) -> Table:
     return Table(head, tuple(rows))
 
 
-def _by_scene(judgements: Sequence[Judgement]) -> list[list[Judgement]]:
-    scenes: dict[str, list[Judgement]] = {}
+def _by_scene(judgements: Sequence[EvaluationResult]) -> list[list[EvaluationResult]]:
+    scenes: dict[str, list[EvaluationResult]] = {}
     for judgement in judgements:
         scenes.setdefault(judgement.scene, []).append(judgement)
     return list(scenes.values())
 
 
-def heading(judgement: Judgement) -> str:
+def heading(judgement: EvaluationResult) -> str:
     """A judgement in a line."""
     return f"{judgement.scene}: {judgement.trial}, {judgement.disparity}"
 
 
-def about(judgement: Judgement) -> str:
+def about(judgement: EvaluationResult) -> str:
     """What was judged, in a line."""
     height, width = judgement.size
     views = len(judgement.rows[0].of_views)
@@ -155,7 +155,7 @@ def about(judgement: Judgement) -> str:
     )
 
 
-def summary_line(judgement: Judgement) -> str:
+def summary_line(judgement: EvaluationResult) -> str:
     """The full-frame PSNR of every method, in a line."""
     figures = ", ".join(f"{row.method} {number(row.mean.full_db, 2)}" for row in judgement.rows)
     return f"{heading(judgement)}: {figures} dB"

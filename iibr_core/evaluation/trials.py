@@ -20,7 +20,7 @@ from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import size_within
 from iibr_core.formats.light_fields.scene import KnownDisparity, MultiView
-from iibr_core.inpainting.disparity_holes import fill_from_background
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, ViewOffset
 
 DisparityFrom = Literal["auto", "gt", "estimate"]
@@ -45,7 +45,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class TrialInput:
     """What a trial starts from.
 
     photo: (H, W, 3) sRGB-encoded in 0..1. maps: disparities to try, by name. judge: (H, W) disparity that tells holes
@@ -67,7 +67,7 @@ def trials_of(scene: MultiView, source: DisparityFrom, most_views: int | None = 
         raise InputError(f"--views {most_views}: give 1 or more")
     centre = _given_near_centre(scene, source)
     others = [index for index in range(len(scene.views)) if index != centre]
-    trials = [Trial(CENTRE_TRIAL, scene, centre, tuple(_spread(others, most_views)))]
+    trials = [Trial(CENTRE_TRIAL, scene, centre, tuple(_evenly_spaced(others, most_views)))]
     corners = _left_corners(scene)
     if corners is not None:
         bottom, top = corners
@@ -84,7 +84,7 @@ def _given_near_centre(scene: MultiView, source: DisparityFrom) -> int:
     return min(truths, key=lambda k: (scene.views[k].offset.t - at.t) ** 2 + (scene.views[k].offset.s - at.s) ** 2)
 
 
-def _spread(indices: list[int], most: int | None) -> list[int]:
+def _evenly_spaced(indices: list[int], most: int | None) -> list[int]:
     if most is None or most >= len(indices):
         return indices
     return [indices[round(k)] for k in np.linspace(0, len(indices) - 1, most)]
@@ -102,13 +102,13 @@ def _left_corners(scene: MultiView) -> tuple[int, int] | None:
     return found[0], found[1]
 
 
-def given_of(
+def trial_input(
     trial: Trial,
     source: DisparityFrom | Path,
     choice: DepthChoice,
     max_pixels: int,
     should_stop: Callable[[], bool] = lambda: False,
-) -> Given:
+) -> TrialInput:
     """The given view of a trial and its disparity. source: a file is the centre view's. choice: how one is estimated.
 
     An estimate comes twice: as it is, and scaled and shifted to the truth (to the true views where no map is known).
@@ -127,10 +127,10 @@ def given_of(
     elif source != "estimate":
         given = truth or _map_of(trial, scene.disparity, max_pixels)
     if given is not None:
-        return Given(photo, (given,), truth or given, given.notes)
-    estimate = _estimated(trial, choice, max_pixels, should_stop)
-    aligned = _aligned(trial, photo, estimate, truth, max_pixels)
-    return Given(photo, (estimate, aligned), truth or aligned, estimate.notes)
+        return TrialInput(photo, (given,), truth or given, given.notes)
+    estimate = _estimate_disparity(trial, choice, max_pixels, should_stop)
+    aligned = _align_to_truth(trial, photo, estimate, truth, max_pixels)
+    return TrialInput(photo, (estimate, aligned), truth or aligned, estimate.notes)
 
 
 def _map_of(trial: Trial, maps: Mapping[int, KnownDisparity], max_pixels: int) -> Disparity | None:
@@ -144,19 +144,21 @@ def _map_of(trial: Trial, maps: Mapping[int, KnownDisparity], max_pixels: int) -
     if nearest == trial.given:
         return stored
     offset = trial.offset(nearest)
-    values = carried(stored.values, ViewOffset(-offset.t, -offset.s))
+    values = warp_disparity(stored.values, ViewOffset(-offset.t, -offset.s))
     note = f"The disparity of {scene.views[nearest].name} was carried over to {scene.views[trial.given].name}."
     return Disparity(values, f"{stored.source}, carried over", (*stored.notes, note))
 
 
-def carried(disparity: FloatImage, offset: ViewOffset) -> FloatImage:
+def warp_disparity(disparity: FloatImage, offset: ViewOffset) -> FloatImage:
     """The disparity (H, W) of another view, at an offset from its own; what was hidden is filled from behind."""
     warped = reference_warp(np.zeros((*disparity.shape, 3), np.float32), disparity, offset)
     values = np.where(warped.hole, np.float32(np.nan), warped.disparity)
-    return disparity if np.isnan(values).all() else fill_from_background(values)
+    return disparity if np.isnan(values).all() else fill_disparity_holes(values)
 
 
-def _estimated(trial: Trial, choice: DepthChoice, max_pixels: int, should_stop: Callable[[], bool]) -> Disparity:
+def _estimate_disparity(
+    trial: Trial, choice: DepthChoice, max_pixels: int, should_stop: Callable[[], bool]
+) -> Disparity:
     """As the program estimates it from the given view alone; in the data set's range where that is stated."""
     reach = [round(2 * max(abs(trial.offset(k)[axis]) for k in trial.judged)) + 1 for axis in (0, 1)]
     path = trial.scene.views[trial.given].path
@@ -177,7 +179,7 @@ def _within(values: FloatImage, range_px: tuple[float, float]) -> FloatImage:
     return np.float32(range_px[0]) + np.float32(range_px[1] - range_px[0]) * share
 
 
-def _aligned(
+def _align_to_truth(
     trial: Trial, photo: FloatImage, estimate: Disparity, truth: Disparity | None, max_pixels: int
 ) -> Disparity:
     if truth is not None:

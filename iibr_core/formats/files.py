@@ -23,7 +23,7 @@ def temporary_sibling(path: Path) -> Path:
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Yield the temporary name to write to; it takes the place of `path` when the block ends well, else it is removed.
 
     Raises InputError where the folder is missing, is no folder, or may not be written to.
@@ -53,7 +53,7 @@ def require_file(path: Path) -> None:
 
 
 @contextmanager
-def opened_file(path: Path) -> Iterator[BinaryIO]:
+def open_binary(path: Path) -> Iterator[BinaryIO]:
     """The file, open for reading bytes.
 
     Raises InputError as `require_file` does, and where the file goes away or fails while it is read.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 
-from iibr_core.formats.files import require_file, written_whole
+from iibr_core.formats.files import atomic_write, require_file
 from iibr_core.types import InputError
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def write_tensors(path: Path, content: str, tensors: Mapping[str, Tensor], metad
     # Cloned, because safetensors refuses tensors that share memory, as tied layers do.
     copies = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     data = save(copies, {**metadata, "content": content, "version": VERSION})
-    with written_whole(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_bytes(data)
 
 

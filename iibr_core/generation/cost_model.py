@@ -25,19 +25,19 @@ GAP_PX = 1.0
 """A depth edge disoccludes something if it opens a gap wider than this in the outermost view."""
 MOST_PARALLAX_PX = 1e6
 
-RAY_BYTES, SURROUNDINGS_BYTES = 21, 12
+RAY_BYTES, STATISTICS_BYTES = 21, 12
 """Of one pixel of one source image: colours, disparity, coverage, flag (rays.RaySet); what lies around it."""
 WORKING_BYTES = 18
 """Of one pixel of a view in the making: float colours, disparity, flags."""
-CANDIDATE_BYTES, CONTESTED_BYTES = 30, 750
-"""Of one pixel of the band of rows in the making: its candidates and weights; hypotheses and features if contested."""
+CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
+"""Of one pixel of the band of rows in the making: its candidates and weights; hypotheses and features if ambiguous."""
 
 
-class Work(NamedTuple):
+class Workload(NamedTuple):
     """What there is to do, in pixels and rays of all views together.
 
     photo_pixels: made rays of, once. view_pixels: each gets candidates, weights, a colour. meeting_pixels: those of
-    them where surfaces meet. framed_pixels: view_pixels, where views look beyond the photo's frame. contested_rays,
+    them where surfaces meet. framed_pixels: view_pixels, where views look beyond the photo's frame. ambiguous_rays,
     soft_rays, plain_rays: that the transformer is asked for, where surfaces contest a ray in maps with sharp and with
     soft edges, and where none do.
     """
@@ -46,16 +46,16 @@ class Work(NamedTuple):
     view_pixels: float
     meeting_pixels: float
     framed_pixels: float
-    contested_rays: float
+    ambiguous_rays: float
     soft_rays: float
     plain_rays: float
 
 
-NANOSECONDS = Work(100.0, 52.0, 680.0, 45.0, 1650.0, 2000.0, 870.0)
+NANOSECONDS = Workload(100.0, 52.0, 680.0, 45.0, 1650.0, 2000.0, 870.0)
 """What each piece of work takes one core."""
 
 
-class Need(NamedTuple):
+class CostEstimate(NamedTuple):
     """What making all views takes: seconds on all cores of a machine like the one measured on, and memory at most,
     the finished views not counted.
     """
@@ -64,25 +64,25 @@ class Need(NamedTuple):
     peak_bytes: int
 
 
-class Needs(NamedTuple):
+class CostEstimates(NamedTuple):
     """In each quality."""
 
-    fast: Need
-    balanced: Need
-    exact: Need
+    fast: CostEstimate
+    balanced: CostEstimate
+    exact: CostEstimate
 
-    def of(self, quality: Quality) -> Need:
+    def of(self, quality: Quality) -> CostEstimate:
         """Those of one quality."""
         return self[get_args(Quality).index(quality)]
 
 
-NO_NEEDS = Needs(*3 * [Need(0.0, 0)])
+NO_COST = CostEstimates(*3 * [CostEstimate(0.0, 0)])
 
 
 @dataclass(frozen=True, eq=False)
-class Relief:
+class ParallaxStatistics:
     """How content moves in the outermost view, px. step (H, W): the largest difference between neighbours near each
-    pixel. change (H, W): from least to most around it. softness: see `Surroundings`. most_px: of all content.
+    pixel. change (H, W): from least to most around it. softness: see `Statistics`. most_px: of all content.
     frame_px: of what lies at the frame.
     """
 
@@ -111,29 +111,29 @@ class Relief:
 
     def meeting_share(self, parallax: float) -> float:
         """Share of the pixels where surfaces meet in a view with this share of the outermost one's parallax."""
-        from iibr_core.rendering.ambiguous_rays import CONTESTED_PX
+        from iibr_core.rendering.ambiguous_rays import AMBIGUOUS_PX
 
-        return float((self.step * np.float32(parallax) > CONTESTED_PX).mean())
+        return float((self.step * np.float32(parallax) > AMBIGUOUS_PX).mean())
 
-    def contested_share(self, parallax: float) -> float:
+    def ambiguous_share(self, parallax: float) -> float:
         """Share of the rays that several surfaces contest there: more where edges are soft."""
-        from iibr_core.rendering.ambiguous_rays import CONTESTED_AROUND_PX
+        from iibr_core.rendering.ambiguous_rays import AMBIGUOUS_AROUND_PX
 
         if not self.is_soft:
             return self.meeting_share(parallax)
         # What changes by that much within the reach of the search changes by half of it within this shorter one.
-        return float((self.change * np.float32(parallax) > 0.5 * CONTESTED_AROUND_PX).mean())
+        return float((self.change * np.float32(parallax) > 0.5 * AMBIGUOUS_AROUND_PX).mean())
 
 
-def relief_of(disparity: FloatImage, outermost: float) -> Relief:
-    """The relief of field disparity (H, W), px per view step; NaN counts as 0. outermost: the largest view offset."""
-    from iibr_core.rendering.disparity_statistics import surroundings_of
+def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatistics:
+    """Of field disparity (H, W), px per view step; NaN counts as 0. outermost: the largest view offset."""
+    from iibr_core.rendering.disparity_statistics import measure_disparity
 
     moved = np.nan_to_num(disparity * np.float32(outermost))
     moved = np.clip(moved, -MOST_PARALLAX_PX, MOST_PARALLAX_PX)
-    around = surroundings_of(moved[None], 1.0)
+    around = measure_disparity(moved[None], 1.0)
     frame = np.concatenate([moved[0], moved[-1], moved[:, 0], moved[:, -1]])
-    return Relief(
+    return ParallaxStatistics(
         around.step[0],
         around.high[0] - around.low[0],
         around.softness,
@@ -142,53 +142,53 @@ def relief_of(disparity: FloatImage, outermost: float) -> Relief:
     )
 
 
-def outermost_of(grid: GridShape) -> float:
+def largest_offset(grid: GridShape) -> float:
     """The largest view offset of a grid, view steps."""
     return max(abs(part) for v in (0, grid.rows - 1) for u in (0, grid.columns - 1) for part in grid.offset(v, u))
 
 
-def needs_of(relief: Relief, grid: GridShape) -> Needs:
+def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstimates:
     """What making all views of a grid takes."""
     found = []
     for quality in get_args(Quality):
-        work = work_of(relief, grid, quality)
+        work = estimate_workload(statistics, grid, quality)
         seconds = sum(amount * each for amount, each in zip(work, NANOSECONDS)) * 1e-9 / CORES
-        found.append(Need(seconds, _peak_bytes(relief, grid, quality)))
-    return Needs(*found)
+        found.append(CostEstimate(seconds, _peak_bytes(statistics, grid, quality)))
+    return CostEstimates(*found)
 
 
-def work_of(relief: Relief, grid: GridShape, quality: Quality) -> Work:
+def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> Workload:
     """What there is to do for all views of a grid in one quality."""
-    pixels, views = relief.step.size, grid.rows * grid.columns - 1
-    twice = _inpainted_views(relief, grid) if quality != "fast" else 0
+    pixels, views = statistics.step.size, grid.rows * grid.columns - 1
+    twice = _inpainted_views(statistics, grid) if quality != "fast" else 0
     made = pixels * (views + twice)
-    meeting = pixels * (_summed(relief.meeting_share, grid) + twice * relief.meeting_share(1.0))
-    framed = made if relief.frame_px > STILL_PX else 0
-    asked = pixels * _summed(relief.contested_share, grid) if quality != "fast" else 0
-    sharp, soft = (0, asked) if relief.is_soft else (asked, 0)
+    meeting = pixels * (_sum_over_views(statistics.meeting_share, grid) + twice * statistics.meeting_share(1.0))
+    framed = made if statistics.frame_px > STILL_PX else 0
+    asked = pixels * _sum_over_views(statistics.ambiguous_share, grid) if quality != "fast" else 0
+    sharp, soft = (0, asked) if statistics.is_soft else (asked, 0)
     plain = pixels * views - asked if quality == "exact" else 0
-    return Work(pixels if views else 0, made, meeting, framed, sharp, soft, plain)
+    return Workload(pixels if views else 0, made, meeting, framed, sharp, soft, plain)
 
 
-def _summed(share: Callable[[float], float], grid: GridShape) -> float:
+def _sum_over_views(share: Callable[[float], float], grid: GridShape) -> float:
     """A share of the rays, which depends on the parallax, summed over all views."""
-    outermost = outermost_of(grid)
+    outermost = largest_offset(grid)
     offsets = (grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns))
     rings = Counter(max(abs(at.t), abs(at.s)) / outermost for at in offsets if outermost > 0)
     return sum(count * share(parallax) for parallax, count in rings.items())
 
 
-def _inpainted_views(relief: Relief, grid: GridShape) -> int:
-    return min(FARTHEST_VIEWS, grid.rows * grid.columns - 1) if relief.has_disocclusion else 0
+def _inpainted_views(statistics: ParallaxStatistics, grid: GridShape) -> int:
+    return min(FARTHEST_VIEWS, grid.rows * grid.columns - 1) if statistics.has_disocclusion else 0
 
 
-def _peak_bytes(relief: Relief, grid: GridShape, quality: Quality) -> int:
+def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> int:
     """Memory for the ray set (the photo, its fringe, inpainted views) and the views in flight, one a thread."""
     from iibr_core.rendering.view_synthesis import EVERY_COST
 
-    pixels = relief.step.size
+    pixels = statistics.step.size
     band = min(pixels, MOST_BAND_PIXELS // (EVERY_COST if quality == "exact" else 1))
-    asked = {"fast": 0.0, "balanced": relief.contested_share(1.0), "exact": 1.0}[quality]
-    ray = RAY_BYTES + (SURROUNDINGS_BYTES if quality != "fast" else 0)
-    in_flight = pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + asked * CONTESTED_BYTES)
-    return round(pixels * ray * (2 + _inpainted_views(relief, grid)) + CORES * in_flight)
+    asked = {"fast": 0.0, "balanced": statistics.ambiguous_share(1.0), "exact": 1.0}[quality]
+    ray = RAY_BYTES + (STATISTICS_BYTES if quality != "fast" else 0)
+    in_flight = pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + asked * AMBIGUOUS_BYTES)
+    return round(pixels * ray * (2 + _inpainted_views(statistics, grid)) + CORES * in_flight)

@@ -13,7 +13,7 @@ import numpy as np
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.rendering.ambiguous_rays import Contested
+from iibr_core.rendering.ambiguous_rays import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
 from iibr_core.runtime.resources import resource_folder
@@ -29,6 +29,7 @@ from iibr_core.types import (
     StoredColors,
     ViewOffset,
     ViewUpdate,
+    image_size,
 )
 
 
@@ -51,12 +52,12 @@ def generate(
     Raises ValueError if photo and disparity differ in size, InputError if the trained weights cannot be read.
     """
     if disparity.values.shape != photo.size:
-        raise ValueError(f"disparity is {disparity.values.shape}, the photo {photo.size} (height, width)")
+        raise ValueError(f"disparity is {image_size(disparity.values)}, the photo {photo.size}")
     with suppress(Cancelled):
-        yield from _views(photo, disparity, plan, should_stop, nearest_to, quality)
+        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, quality)
 
 
-def _views(
+def _generate_views(
     photo: Photo,
     disparity: Disparity,
     plan: ScenePlan,
@@ -65,14 +66,14 @@ def _views(
     quality: Quality,
 ) -> Iterator[ViewUpdate]:
     grid = plan.grid
-    colors = _stored(photo.pixels, photo.is_hdr, should_stop)
+    colors = _encode_for_storage(photo.pixels, photo.is_hdr, should_stop)
     yield ViewUpdate(*grid.centre, colors, disparity.values, np.zeros(photo.size, np.bool_))
     remaining = [(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
     if not remaining:
         return
 
     def update(index: tuple[int, int], view: RenderedView, threads: int | None = None) -> ViewUpdate:
-        colors = _stored(view.colors, photo.is_hdr, should_stop, threads)
+        colors = _encode_for_storage(view.colors, photo.is_hdr, should_stop, threads)
         return ViewUpdate(*index, colors, view.disparity, view.inpainted)
 
     transformer = transformer_for(quality)
@@ -87,7 +88,7 @@ def _views(
         def made(index: tuple[int, int]) -> ViewUpdate:
             return update(index, synthesis.render_alone(rays, grid.offset(*index)), threads=1)
 
-        yield from synthesis.side_by_side(made, _in_order(grid, remaining, nearest_to))
+        yield from synthesis.side_by_side(made, _nearest_first(grid, remaining, nearest_to))
 
 
 def ray_set(
@@ -102,10 +103,10 @@ def ray_set(
     farthest = max(*map(abs, grid.offset(0, 0)), *map(abs, grid.offset(grid.rows - 1, grid.columns - 1)), 1.0)
     indices = _farthest_views(grid) if plan.has_disocclusion else []
     rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(indices), should_stop)
-    return rays, _completing(rays, grid, indices, should_stop)
+    return rays, _complete_ray_set(rays, grid, indices, should_stop)
 
 
-def _completing(
+def _complete_ray_set(
     rays: RaySet, grid: GridShape, indices: list[tuple[int, int]], should_stop: ShouldStop
 ) -> Iterator[tuple[tuple[int, int], RenderedView]]:
     with ViewSynthesis(should_stop) as synthesis:
@@ -117,8 +118,8 @@ def _completing(
             yield index, view
 
 
-def transformer_for(quality: Quality) -> Callable[[Contested], FloatImage] | None:
-    """What weighs contested rays: the shipped transformer, or None for the closed form.
+def transformer_for(quality: Quality) -> Callable[[AmbiguousRays], FloatImage] | None:
+    """What weighs ambiguous rays: the shipped transformer, or None for the closed form.
 
     Raises InputError if the shipped weights cannot be read.
     """
@@ -140,7 +141,7 @@ def _farthest_views(grid: GridShape) -> list[tuple[int, int]]:
     return [index for index in dict.fromkeys(indices) if index != grid.centre]
 
 
-def _in_order(
+def _nearest_first(
     grid: GridShape, remaining: list[tuple[int, int]], nearest_to: Callable[[], ViewOffset]
 ) -> Iterator[tuple[int, int]]:
     """Each time the index whose view is nearest to where the user looks then; the first of equals."""
@@ -156,12 +157,14 @@ def _in_order(
         yield index
 
 
-def _stored(encoded: FloatImage, is_hdr: bool, should_stop: ShouldStop, threads: int | None = None) -> StoredColors:
+def _encode_for_storage(
+    encoded: FloatImage, is_hdr: bool, should_stop: ShouldStop, threads: int | None = None
+) -> StoredColors:
     """`stored_from_encoded`, in bands."""
     stored = np.empty(encoded.shape, np.float16 if is_hdr else np.uint8)
 
     def band(first: int, last: int) -> None:
         stored[first:last] = stored_from_encoded(encoded[first:last], is_hdr)
 
-    in_bands(band, (encoded.shape[0], encoded.shape[1]), should_stop, threads)
+    in_bands(band, image_size(encoded), should_stop, threads)
     return stored

@@ -1,4 +1,4 @@
-"""ScenePlan: what this scene needs, and why. Nothing is modelled that the disparity does not ask for."""
+"""ScenePlan: what this scene costs, and why. Nothing is modelled that the disparity does not ask for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ from math import ceil
 import numpy as np
 import psutil
 
-from iibr_core.generation.cost_model import NO_NEEDS, STILL_PX, Needs, Relief, needs_of, outermost_of, relief_of
+from iibr_core.generation.cost_model import (
+    NO_COST,
+    STILL_PX,
+    CostEstimates,
+    ParallaxStatistics,
+    estimate_costs,
+    largest_offset,
+    measure_parallax,
+)
 from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, Disparity, GridShape, InputError, Photo
 
 STEP_PX = 4.0
@@ -41,7 +49,7 @@ class ScenePlan:
     disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3
     px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
     of the light field, and at most while generating in the default quality, the field not counted. reasons: the same
-    in sentences. needs: time and memory of making all views, in each quality.
+    in sentences. costs: time and memory of making all views, in each quality.
     """
 
     grid: GridShape
@@ -53,7 +61,7 @@ class ScenePlan:
     field_bytes: int
     peak_bytes: int
     reasons: tuple[str, ...]
-    needs: Needs = NO_NEEDS
+    costs: CostEstimates = NO_COST
 
     def field_disparity(self, given: Disparity) -> Disparity:
         """The disparity the light field is generated from (px per view step of this plan's grid)."""
@@ -72,7 +80,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
     budget = _memory_budget(wanted.memory_bytes)
     low, high = (float(p) for p in np.percentile(disparity.values, ROBUST_PERCENTILES))
     zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
-    width = photo.size[1]
+    width = photo.size.width
     parallax_px = (
         TOTAL_PARALLAX * width * abs(wanted.depth_strength) if high - low > 1e-6 * max(abs(low), abs(high), 1) else 0.0
     )
@@ -82,8 +90,8 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
         reasons.append(f"{grid.columns} x {grid.rows} views, as asked.")
     else:
         most_moved = 0.5 * parallax_px / (high - low) if parallax_px else 0.0
-        relief = relief_of(disparity.values - np.float32(zero), most_moved)
-        grid = _grid_for(parallax_px, relief, _view_bytes(photo), budget)
+        statistics = measure_parallax(disparity.values - np.float32(zero), most_moved)
+        grid = _grid_for(parallax_px, statistics, _view_bytes(photo), budget)
         reasons.append(_grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
     scale = parallax_px / steps / (high - low) * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
@@ -91,7 +99,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
         reasons.append(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
-    return _finished(photo, disparity, grid, float(scale), zero, budget, reasons)
+    return _complete_plan(photo, disparity, grid, float(scale), zero, budget, reasons)
 
 
 def plan_literal(photo: Photo, disparity: Disparity, grid: GridShape, memory_bytes: int | None = None) -> ScenePlan:
@@ -100,7 +108,7 @@ def plan_literal(photo: Photo, disparity: Disparity, grid: GridShape, memory_byt
     Raises InputError if the grid has no view or generating it does not fit into memory.
     """
     reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
-    return _finished(photo, disparity, grid, 1.0, 0.0, _memory_budget(memory_bytes), reasons)
+    return _complete_plan(photo, disparity, grid, 1.0, 0.0, _memory_budget(memory_bytes), reasons)
 
 
 def _memory_budget(memory_bytes: int | None) -> int:
@@ -115,12 +123,12 @@ def _view_bytes(photo: Photo) -> int:
     return height * width * (3 * (2 if photo.is_hdr else 1) + DISPARITY_BYTES)
 
 
-def _grid_for(parallax_px: float, relief: Relief, view_bytes: int, budget: int) -> GridShape:
+def _grid_for(parallax_px: float, statistics: ParallaxStatistics, view_bytes: int, budget: int) -> GridShape:
     """The smallest odd grid whose neighbouring views differ by at most STEP_PX, as far as memory allows."""
     if parallax_px < STILL_PX:
         return GridShape(1, 1)
     side = min(max(ceil(parallax_px / STEP_PX) // 2 * 2 + 1, 3), MOST_VIEWS_A_SIDE)
-    beside = needs_of(relief, GridShape(side, side)).of(DEFAULT_QUALITY).peak_bytes
+    beside = estimate_costs(statistics, GridShape(side, side)).of(DEFAULT_QUALITY).peak_bytes
     while side > 3 and side * side * view_bytes > budget - beside:
         side -= 2
     return GridShape(side, side)
@@ -133,16 +141,16 @@ def _grid_reason(grid: GridShape, parallax_px: float) -> str:
     return f"{grid.columns} x {grid.rows} views: neighbours differ by {step:.1f} px, the renderer fills in between."
 
 
-def _finished(
+def _complete_plan(
     photo: Photo, disparity: Disparity, grid: GridShape, scale: float, zero: float, budget: int, reasons: list[str]
 ) -> ScenePlan:
     """The plan with what follows from grid and scale."""
     if grid.rows < 1 or grid.columns < 1:
         raise InputError(f"--grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
     field = (disparity.values - np.float32(zero)) * np.float32(scale)
-    relief = relief_of(field, outermost_of(grid))
-    needs = needs_of(relief, grid)
-    field_bytes, peak_bytes = grid.rows * grid.columns * _view_bytes(photo), needs.of(DEFAULT_QUALITY).peak_bytes
+    statistics = measure_parallax(field, largest_offset(grid))
+    costs = estimate_costs(statistics, grid)
+    field_bytes, peak_bytes = grid.rows * grid.columns * _view_bytes(photo), costs.of(DEFAULT_QUALITY).peak_bytes
     if peak_bytes > budget:
         raise InputError(
             f"generating from {photo.name} takes {peak_bytes / 2**20:.0f} MiB, the budget is {budget / 2**20:.0f} MiB:"
@@ -153,26 +161,26 @@ def _finished(
         scale,
         zero,
         (float(field.min()), float(field.max())),
-        relief.edge_share,
-        relief.has_disocclusion,
+        statistics.edge_share,
+        statistics.has_disocclusion,
         field_bytes,
         peak_bytes,
-        (*reasons, *_cost_reasons(relief, needs, field_bytes)),
-        needs,
+        (*reasons, *_cost_reasons(statistics, costs, field_bytes)),
+        costs,
     )
 
 
-def _cost_reasons(relief: Relief, needs: Needs, field_bytes: int) -> list[str]:
+def _cost_reasons(statistics: ParallaxStatistics, costs: CostEstimates, field_bytes: int) -> list[str]:
     inpainted = (
         "holes behind them are inpainted."
-        if relief.has_disocclusion
+        if statistics.has_disocclusion
         else "nothing is disoccluded, so nothing is inpainted."
     )
-    memory = f"{field_bytes / 2**20:.0f} MiB for the views, {needs.of(DEFAULT_QUALITY).peak_bytes / 2**20:.0f} MiB"
+    memory = f"{field_bytes / 2**20:.0f} MiB for the views, {costs.of(DEFAULT_QUALITY).peak_bytes / 2**20:.0f} MiB"
     return [
-        f"{relief.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}",
-        f"Making all views takes about {_seconds(needs.fast.seconds)} in fast, {_seconds(needs.balanced.seconds)} in"
-        f" balanced and {_seconds(needs.exact.seconds)} in exact quality.",
+        f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}",
+        f"Making all views takes about {_seconds(costs.fast.seconds)} in fast, {_seconds(costs.balanced.seconds)} in"
+        f" balanced and {_seconds(costs.exact.seconds)} in exact quality.",
         f"Memory: {memory} to make them.",
     ]
 

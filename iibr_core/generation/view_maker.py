@@ -96,6 +96,6 @@ class ViewMaker:
         return synthesis.side_by_side(lambda offset: synthesis.render_alone(self._rays, offset), offsets)
 
 
-def as_stored(colors: FloatImage) -> FloatImage:
+def quantise_as_stored(colors: FloatImage) -> FloatImage:
     """Colours as the light field keeps them: rounded to bytes, 1 = white."""
     return encoded_from_stored(stored_from_encoded(colors, False))

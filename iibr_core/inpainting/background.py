@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel, nearest_pixel
-from iibr_core.runtime.tiling import ShouldStop, go_on, in_bands, in_pieces, never
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, never, raise_if_stopped
+from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
 DIRECTIONS = np.array(
     [
@@ -44,10 +44,13 @@ def fill_background(
     """
     height, width = hole.shape
     found = in_bands(
-        lambda first, last: first * width + np.flatnonzero(hole[first:last]), (height, width), should_stop, threads
+        lambda first, last: first * width + np.flatnonzero(hole[first:last]),
+        ImageSize(height, width),
+        should_stop,
+        threads,
     )
     pixels = np.concatenate(found)
-    known = _known_around(hole, pixels, should_stop, threads)
+    known = _nearest_known(hole, pixels, should_stop, threads)
     smoothed = np.empty((len(pixels), 3), np.float32)
     tolerance = HIDDEN_PX / max(abs(offset.s), abs(offset.t))
     parts = [slice(first, first + MOST_PIECE_PIXELS) for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
@@ -59,26 +62,26 @@ def fill_background(
         _smooth(colors, disparity, hole, pixels[part], tolerance, smoothed[part])
 
     def put(part: slice) -> None:
-        _put(smoothed[part], pixels[part], colors)
+        _write_colors(smoothed[part], pixels[part], colors)
 
     for step in (fill, smooth, put):
         in_pieces(step, parts, should_stop, threads)
 
 
-def _known_around(
+def _nearest_known(
     hole: NDArray[np.bool_], pixels: NDArray[np.int64], should_stop: ShouldStop, threads: int
 ) -> NDArray[np.int64]:
     """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none.
 
     The second known pixel where there are two (the first may be mixed with what hides the hole).
     """
-    go_on(should_stop)
+    raise_if_stopped(should_stop)
     number = np.empty(hole.shape, np.int32)
     _number(pixels, number)
     known = np.empty((len(pixels), len(DIRECTIONS)), np.int64)
 
     def look(k: int) -> None:
-        _known_towards(hole, pixels, number, *DIRECTIONS[k], known[:, k])
+        _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known[:, k])
 
     in_pieces(look, range(len(DIRECTIONS)), should_stop, threads)
     return known
@@ -93,8 +96,8 @@ def _number(pixels, number):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _known_towards(hole, pixels, number, step_x, step_y, known):  # type: ignore[no-untyped-def]
-    """What `_known_around` returns, for one direction.
+def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):  # type: ignore[no-untyped-def]
+    """What `_nearest_known` returns, for one direction.
 
     pixels: flat indices of the hole pixels, ascending. Holes pass on what the next pixel in that direction found, so
     the cost does not depend on the holes' size.
@@ -175,7 +178,7 @@ def _smooth(colors, disparity, hole, pixels, tolerance, smoothed):  # type: igno
 
 
 @kernel
-def _put(smoothed, pixels, colors):  # type: ignore[no-untyped-def]
+def _write_colors(smoothed, pixels, colors):  # type: ignore[no-untyped-def]
     width = colors.shape[1]
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width

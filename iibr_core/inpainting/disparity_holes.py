@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, go_on, never
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage
 
 # Lines through a pixel: falling diagonal, vertical, rising diagonal, horizontal; the length of one step along each. The
@@ -19,7 +19,7 @@ OPEN_LINE = 12
 SHORTNESS = 8
 
 
-def fill_from_background(values: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
+def fill_disparity_holes(values: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
     """Replace the NaN of an (H, W) disparity map; known values stay as they are.
 
     On each of four lines through an unknown pixel, the farther (smaller) of the two nearest known values counts; the
@@ -34,12 +34,12 @@ def fill_from_background(values: FloatImage, should_stop: ShouldStop = never) ->
     while (count := int(unknown.sum())) > 0:
         near = np.empty((2, count, 4), np.float32)
         steps = np.empty((2, count, 4), np.int32)
-        go_on(should_stop)
+        raise_if_stopped(should_stop)
         _nearest_before(filled, near[0], steps[0])
-        go_on(should_stop)
+        raise_if_stopped(should_stop)
         # The same, seen from the last pixel: everything that comes after.
         _nearest_before(filled[::-1, ::-1], near[1, ::-1], steps[1, ::-1])
-        go_on(should_stop)
+        raise_if_stopped(should_stop)
         filled[unknown] = _farther_side(near, steps, np.array(STEP_LENGTHS))
         unknown = np.isnan(filled)  # pixels with no known value on any line; the second round reaches them
     return filled

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.formats.weights import read_weights, require_shapes
-from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE, Contested
+from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE, AmbiguousRays
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage
 
@@ -32,7 +32,7 @@ SHAPES = {
 
 
 class TrainedWeights:
-    """The weights of a RayTransformer from a file, called with contested rays. Safe to call from several threads."""
+    """The weights of a RayTransformer from a file, called with ambiguous rays. Safe to call from several threads."""
 
     def __init__(self, path: Path) -> None:
         """Raises InputError for a file that is not such weights."""
@@ -40,10 +40,10 @@ class TrainedWeights:
         require_shapes(path, tensors, SHAPES)
         self._layers = tuple(np.ascontiguousarray(tensors[name].T) for name in SHAPES)
 
-    def __call__(self, contested: Contested) -> FloatImage:
+    def __call__(self, ambiguous: AmbiguousRays) -> FloatImage:
         """Weights (N, K), 0 for unused hypotheses; rows sum to 1."""
-        weights = np.zeros(contested.mask.shape, np.float32)
-        _weigh(contested.features, contested.mask, *self._layers, weights)
+        weights = np.zeros(ambiguous.mask.shape, np.float32)
+        _weigh(ambiguous.features, ambiguous.mask, *self._layers, weights)
         return weights
 
 

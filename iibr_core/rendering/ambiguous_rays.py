@@ -1,4 +1,4 @@
-"""Contested rays: what they show lies near a depth edge of its source, so that someone has to decide what it is.
+"""Ambiguous rays: what they show lies near a depth edge of its source, so that someone has to decide what it is.
 
 For each of them K hypotheses are laid out: surfaces that land within a few pixels, as different from each other as
 possible. A hypothesis says "this ray shows the source ray that disparity d leads to"; its features say how well that
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
-from iibr_core.rendering.resampling import cubic, look_up
+from iibr_core.rendering.resampling import cubic, resample
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.types import FloatImage, ViewOffset
 
@@ -37,11 +37,11 @@ AROUND_DISTANCE = np.hypot(*AROUND.T)
 AROUND_SHARP = 12
 SOFT = 0.5
 """Where depth edges are softer than this, all of AROUND is looked at, else the first AROUND_SHARP."""
-CONTESTED_PX = 1.5
+AMBIGUOUS_PX = 1.5
 """A step of disparity that moves its sides apart by less than this does not contest a ray."""
 OWN_LANDING_PX = 0.75
 """What lands near by at less than this from a hypothesis is of its surface."""
-CONTESTED_AROUND_PX = 1.5
+AMBIGUOUS_AROUND_PX = 1.5
 """Where edges are soft there are no steps: there a surface within REACH_PX contests a ray if it is this far off."""
 DISTINCT_PX = 0.5
 """Hypotheses closer than this are one; a ray whose surfaces all are has nothing to decide."""
@@ -63,8 +63,8 @@ FEATURES = PROFILE + 2 * len(PROFILE_PX) + 1
 
 
 @dataclass(frozen=True, eq=False)
-class Contested:
-    """Contested rays (N) of one view and their hypotheses (K).
+class AmbiguousRays:
+    """Ambiguous rays (N) of one view and their hypotheses (K).
 
     offset: of the view. pixel (N, 2): (row, column) in the view. mask (N, K): hypotheses in use, the first always.
     disparity (N, K). source (N, K). features (N, K, FEATURES).
@@ -78,7 +78,7 @@ class Contested:
     features: FloatImage
 
 
-def find_contested(
+def find_ambiguous_rays(
     rays: RaySet,
     candidates: Candidates,
     weights: FloatImage,
@@ -86,11 +86,11 @@ def find_contested(
     rows: tuple[int, int],
     every: bool = False,
     hypotheses: int = HYPOTHESES,
-) -> Contested:
-    """The contested rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
+) -> AmbiguousRays:
+    """The ambiguous rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
 
     shown: disparity and source (N, W) of the candidates that `lookup.heaviest` gives. every: take all rays
-    near which anything lands, contested or not. hypotheses: K, at least 2.
+    near which anything lands, ambiguous or not. hypotheses: K, at least 2.
     """
     first, last = rows
     shape = (last - first) * candidates.count.shape[1], hypotheses
@@ -98,55 +98,57 @@ def find_contested(
     disparity, source = np.empty(shape, np.float32), np.empty(shape, np.uint8)
     share, nearest = np.empty(shape, np.float32), np.empty(shape, np.float32)
     offsets, _, surfaces, coverage, _ = rays.arrays
-    around = rays.surroundings
+    around = rays.statistics
     from_sources = np.array(candidates.offset) - offsets
     parallax = max(*map(abs, candidates.offset), 1e-9)
     is_soft = around.softness > SOFT
     looks = len(AROUND) if is_soft else AROUND_SHARP
     certain = candidates.smooth & (not every and not is_soft)
-    count = _lay_out(
+    count = _collect_hypotheses(
         certain, candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step,
         from_sources, rays.photo_images, parallax, is_soft, looks, candidates.first_row, first, last, every,
         pixel, number, disparity, source, share, nearest,
     )  # fmt: skip
     pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
     features = np.zeros((count, hypotheses, FEATURES), np.float32)
-    _describe(
+    _describe_hypotheses(
         surfaces, coverage, around.low, around.high, around.step, around.softness, from_sources, rays.photo_images,
         candidates.count, weights, candidates.first_row, parallax,
         pixel, number, disparity, source, share[:count], nearest[:count], features,
     )  # fmt: skip
     pixel[:, 0] += candidates.first_row
     mask = np.arange(hypotheses) < number[:, None]
-    return Contested(candidates.offset, pixel, mask, disparity, source, features)
+    return AmbiguousRays(candidates.offset, pixel, mask, disparity, source, features)
 
 
-def votes(rays: RaySet, contested: Contested) -> FloatImage:
+def hypothesis_colors(rays: RaySet, ambiguous: AmbiguousRays) -> FloatImage:
     """What each hypothesis would show: colours (N, K, 3), sRGB-encoded; black in unused slots."""
-    colors = np.zeros((*contested.mask.shape, 3), np.float32)
-    one = np.eye(contested.mask.shape[1], dtype=np.float32)
+    colors = np.zeros((*ambiguous.mask.shape, 3), np.float32)
+    one = np.eye(ambiguous.mask.shape[1], dtype=np.float32)
     for a in range(len(one)):
-        weights = np.where(contested.mask, one[a], 0.0).astype(np.float32)
-        colors[:, a] = np.where(contested.mask[:, a, None], decide(rays, contested, weights)[0], 0.0)
+        weights = np.where(ambiguous.mask, one[a], 0.0).astype(np.float32)
+        colors[:, a] = np.where(ambiguous.mask[:, a, None], blend_hypotheses(rays, ambiguous, weights)[0], 0.0)
     return colors
 
 
-def decide(rays: RaySet, contested: Contested, weights: FloatImage) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
-    """Colours (N, 3), disparity (N) and source (N) of contested rays for weights (N, K) whose rows sum to 1.
+def blend_hypotheses(
+    rays: RaySet, ambiguous: AmbiguousRays, weights: FloatImage
+) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
+    """Colours (N, 3), disparity (N) and source (N) of ambiguous rays for weights (N, K) whose rows sum to 1.
 
     Colours are summed in linear light; disparity and source are the heaviest hypothesis's.
     """
     colors = np.zeros((len(weights), 3), np.float32)
     offsets, images, surfaces, *_ = rays.arrays
     _blend(
-        images, surfaces, np.array(contested.offset) - offsets,
-        contested.pixel, contested.disparity, contested.source, weights, colors,
+        images, surfaces, np.array(ambiguous.offset) - offsets,
+        ambiguous.pixel, ambiguous.disparity, ambiguous.source, weights, colors,
     )  # fmt: skip
     heaviest = weights.argmax(axis=1)[:, None]
     return (
         colors,
-        np.take_along_axis(contested.disparity, heaviest, axis=1)[:, 0],
-        np.take_along_axis(contested.source, heaviest, axis=1)[:, 0] % PLAIN,
+        np.take_along_axis(ambiguous.disparity, heaviest, axis=1)[:, 0],
+        np.take_along_axis(ambiguous.source, heaviest, axis=1)[:, 0] % PLAIN,
     )
 
 
@@ -167,7 +169,7 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
             if source[n, a] >= PLAIN:
                 r, g, b = cubic(images, k, x, y)
             else:
-                r, g, b = look_up(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
+                r, g, b = resample(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
             if total == 0.0:
                 first_r, first_g, first_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
             apart = max(apart, abs(r - first_r), abs(g - first_g), abs(b - first_b))
@@ -183,12 +185,12 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
 
 
 @kernel
-def _lay_out(  # type: ignore[no-untyped-def]
+def _collect_hypotheses(  # type: ignore[no-untyped-def]
     certain, count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
     photo_images, parallax, is_soft, looks, first_row, first, last, every,
     pixel, number, disparity, source, share, nearest,
 ):  # fmt: skip
-    """Select contested rays, none in certain cells; pick the surfaces on each, then again and again the one around it
+    """Select ambiguous rays, none in certain cells; pick the surfaces on each, then again and again the one around it
     farthest from those. nearest: how many pixels away each surface lands.
     """
     _, rows, width = surface.shape
@@ -205,20 +207,20 @@ def _lay_out(  # type: ignore[no-untyped-def]
             for k in range(np.int64(count[y, x])):
                 heavy += weights[k, y, x] > LEAST_WEIGHT
                 covered += weights[k, y, x]
-            is_contested = every or heavy != 1 or covered < 1.0 - LEAST_WEIGHT
-            if not is_contested and is_soft:
+            is_ambiguous = every or heavy != 1 or covered < 1.0 - LEAST_WEIGHT
+            if not is_ambiguous and is_soft:
                 for i in range(looks):
                     v, u = y + AROUND[i, 0], x + AROUND[i, 1]
                     if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
                         apart = abs(shown_disparity[v, u] - shown_disparity[y, x]) * parallax
-                        is_contested |= apart > CONTESTED_AROUND_PX
-            elif not is_contested:
+                        is_ambiguous |= apart > AMBIGUOUS_AROUND_PX
+            elif not is_ambiguous:
                 d, origin_here = shown_disparity[y, x], np.int64(shown_source[y, x])
                 t, s = offsets[origin_here, 0], offsets[origin_here, 1]
                 u = min(max(nearest_pixel(x + d * s), 0), width - 1)
                 v = min(max(nearest_pixel(first_row + y + d * t), 0), height - 1)
-                is_contested = step[origin_here, v, u] * parallax > CONTESTED_PX
-            if not is_contested:
+                is_ambiguous = step[origin_here, v, u] * parallax > AMBIGUOUS_PX
+            if not is_ambiguous:
                 continue
             picked = 0
             for k in range(np.int64(count[y, x])):
@@ -283,7 +285,7 @@ def _lay_out(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _squashed(px):  # type: ignore[no-untyped-def]
+def _signed_log(px):  # type: ignore[no-untyped-def]
     """Pixels on a scale of -4..4 where small differences count most; 0 where there is no difference to tell."""
     if px != px:
         return 0.0
@@ -292,7 +294,7 @@ def _squashed(px):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _describe(  # type: ignore[no-untyped-def]
+def _describe_hypotheses(  # type: ignore[no-untyped-def]
     surfaces, coverage, low, high, step, softness, offsets, photo_images,
     count, weights, first_row, parallax, pixel, number, disparity, source, share, nearest, features,
 ):  # fmt: skip
@@ -332,17 +334,17 @@ def _describe(  # type: ignore[no-untyped-def]
                 for j in range(2):
                     v = np.uint64(min(max(nearest_pixel(source_y + (step_x if j else step_y)), 0), height - 1))
                     u = np.uint64(min(max(nearest_pixel(source_x + (-step_y if j else step_x)), 0), width - 1))
-                    features[n, a, PROFILE + 2 * i + j] = _squashed((surfaces[k, v, u] - d) * parallax)
+                    features[n, a, PROFILE + 2 * i + j] = _signed_log((surfaces[k, v, u] - d) * parallax)
 
             v, u = min(max(nearest_pixel(source_y), 0), height - 1), min(max(nearest_pixel(source_x), 0), width - 1)
             around_low, around_high = min(low[k, v, u], d), max(high[k, v, u], d)
             out = features[n, a]
-            out[0] = _squashed((d - own) * parallax)
-            out[1] = _squashed((around_high - d) * parallax)
-            out[2] = _squashed((d - around_low) * parallax)
+            out[0] = _signed_log((d - own) * parallax)
+            out[1] = _signed_log((around_high - d) * parallax)
+            out[2] = _signed_log((d - around_low) * parallax)
             out[3] = (own - around_low) / max(around_high - around_low, 1e-6)
-            out[4] = _squashed((front - d) * parallax)
-            out[5] = _squashed((d - back) * parallax)
+            out[4] = _signed_log((front - d) * parallax)
+            out[5] = _signed_log((d - back) * parallax)
             out[SHARE] = share[n, a]
             out[7] = nearest[n, a] / (REACH_PX + 1.0)
             out[8] = 1.0 if k >= photo_images else 0.0
@@ -351,4 +353,4 @@ def _describe(  # type: ignore[no-untyped-def]
             out[11] = softness
             out[12] = max(uncovered, 0.0)
             out[14] = 1.0 if source[n, a] >= PLAIN else 0.0
-            out[13] = _squashed(step[k, v, u] * parallax)
+            out[13] = _signed_log(step[k, v, u] * parallax)

@@ -14,7 +14,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.coherent_cells import find_smooth_cells, follow_back, land_on_rough
+from iibr_core.rendering.coherent_cells import backward_warp, find_coherent_cells, land_incoherent
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset
@@ -32,7 +32,7 @@ class Candidates:
 
     count: (N, W), how many of the K slots are used. coverage: (K, N, W), the area of the target pixel their
     footprints cover (may exceed 1). disparity: (K, N, W), coverage-weighted mean. source: (K, N, W), index into the
-    ray set. Slots beyond count are undefined. smooth: cells that one smooth surface fills (`find_smooth_cells`).
+    ray set. Slots beyond count are undefined. smooth: cells that one smooth surface fills (`find_coherent_cells`).
     """
 
     offset: ViewOffset
@@ -50,8 +50,8 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     At most `most` for each ray, the front-most kept.
     """
     first_row, last_row = rows
-    smooth, about = find_smooth_cells(rays, offset, rows)
-    shape = (most, last_row - first_row, rays.size[1])
+    smooth, about = find_coherent_cells(rays, offset, rows)
+    shape = (most, last_row - first_row, rays.size.width)
     found = Candidates(
         offset,
         first_row,
@@ -65,13 +65,13 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     cells = rays.cells
     for k in range(len(rays)):
         t, s = offset.t - offsets[k, 0], offset.s - offsets[k, 1]
-        needed = land_on_rough(cells, k, t, s, rows, smooth)
-        _land(
+        needed = land_incoherent(cells, k, t, s, rows, smooth)
+        _land_rays(
             disparity[k], coverage[k], needed, needed.any(axis=1), k, s, t, first_row,
             found.count, found.coverage, found.disparity, found.source,
         )  # fmt: skip
     _mean_disparity(found.count, found.coverage, found.disparity)
-    follow_back(
+    backward_warp(
         disparity[0], *offset, first_row, smooth, about,
         found.count, found.coverage, found.disparity, found.source,
     )  # fmt: skip
@@ -85,7 +85,7 @@ def _half_extent(gap):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _land(  # type: ignore[no-untyped-def]
+def _land_rays(  # type: ignore[no-untyped-def]
     ray_disparity, ray_coverage, needed, needed_rows, index, s, t, first_row, count, coverage, disparity, source
 ):  # fmt: skip
     """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, `disparity`

@@ -26,7 +26,9 @@ MOST_ROUNDS = 30
 ONE = np.uint64(1)
 
 
-def find_smooth_cells(rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -> tuple[NDArray[np.bool_], FloatImage]:
+def find_coherent_cells(
+    rays: RaySet, offset: ViewOffset, rows: tuple[int, int]
+) -> tuple[NDArray[np.bool_], FloatImage]:
     """Where all that shows in a cell of the view at `offset` is one smooth surface of the photo, (N, M); and about
     which disparity that has, (N, M).
 
@@ -41,7 +43,7 @@ def find_smooth_cells(rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -
         cells.low,
         cells.high,
         cells.row_ranges,
-        cells.rough,
+        cells.incoherent,
         np.array(offset) - rays.arrays[0],
         first,
         parallax,
@@ -53,12 +55,12 @@ def find_smooth_cells(rays: RaySet, offset: ViewOffset, rows: tuple[int, int]) -
     return smooth, np.where(smooth, far, np.float32(0.0))
 
 
-def land_on_rough(
+def land_incoherent(
     cells: Cells, k: int, t: float, s: float, rows: tuple[int, int], smooth: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Which cells (M, N) of source k, t and s away, land on any cell of these rows that is not smooth."""
-    needed = np.zeros(cells.rough.shape, np.bool_)
-    _land_on_rough(cells.low[k], cells.high[k], cells.row_ranges[k], t, s, rows[0] // CELL_PX, smooth, needed)
+    needed = np.zeros(cells.incoherent.shape, np.bool_)
+    _land_incoherent(cells.low[k], cells.high[k], cells.row_ranges[k], t, s, rows[0] // CELL_PX, smooth, needed)
     return needed
 
 
@@ -77,7 +79,7 @@ def _touches(least, most, t, row, rows):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _land_cells(low, high, row_ranges, rough, offsets, first_cell, parallax, far, near, smooth):  # type: ignore[no-untyped-def]
+def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax, far, near, smooth):  # type: ignore[no-untyped-def]
     """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
     rows, columns = smooth.shape
     for k in range(len(offsets)):
@@ -93,7 +95,7 @@ def _land_cells(low, high, row_ranges, rough, offsets, first_cell, parallax, far
                     continue
                 for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
                     for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
-                        if k == 0 and not rough[v, u]:
+                        if k == 0 and not incoherent[v, u]:
                             far[row, column] = min(far[row, column], least)
                             near[row, column] = max(near[row, column], most)
                         elif k == 0 or (most - far[row, column]) * parallax > IN_FRONT_PX:
@@ -101,7 +103,7 @@ def _land_cells(low, high, row_ranges, rough, offsets, first_cell, parallax, far
 
 
 @kernel
-def _land_on_rough(low, high, row_ranges, t, s, first_cell, smooth, needed):  # type: ignore[no-untyped-def]
+def _land_incoherent(low, high, row_ranges, t, s, first_cell, smooth, needed):  # type: ignore[no-untyped-def]
     rows, columns = smooth.shape
     for v in range(low.shape[0]):
         if not _touches(row_ranges[v, 0], row_ranges[v, 1], t, v - first_cell, rows):
@@ -118,7 +120,7 @@ def _land_on_rough(low, high, row_ranges, t, s, first_cell, smooth, needed):  # 
 
 
 @kernel
-def follow_back(  # type: ignore[no-untyped-def]
+def backward_warp(  # type: ignore[no-untyped-def]
     surface, t, s, first_row, smooth, about, count, coverage, disparity, source
 ):  # fmt: skip
     """Give every ray of the smooth cells one candidate that covers it: the photo's ray, of disparity (H, W) `surface`.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.types import FloatImage
+from iibr_core.types import FloatImage, image_size
 
 AROUND_PX = 2
 """Reach of the range of disparities around a source ray."""
@@ -25,7 +25,7 @@ EDGE_PARALLAX_PX = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class DisparityStatistics:
     """Of S source images. low, high (S, H, W): least and greatest disparity within AROUND_PX of each ray. step
     (S, H, W): the largest step between neighbours within STEP_AROUND_PX; all px per view step, 0 where nothing is.
     softness: 0..1, of the photo's depth edges: 0 where each is one step, near 1 where they are slopes.
@@ -37,21 +37,22 @@ class Surroundings:
     softness: float
 
 
-def surroundings_of(disparity: FloatImage, farthest_views: float, should_stop: ShouldStop = never) -> Surroundings:
-    """Surroundings of source images (S, H, W), the photo's first. farthest_views: the largest view offset rendered.
+def measure_disparity(
+    disparity: FloatImage, farthest_views: float, should_stop: ShouldStop = never
+) -> DisparityStatistics:
+    """Statistics of source images (S, H, W), the photo's first. farthest_views: the largest view offset rendered.
 
     Raises Cancelled once should_stop is true.
     """
     low, high, step = (np.empty(disparity.shape, np.float32) for _ in range(3))
     for source, *found in zip(disparity, low, high, step):
-        _survey(source, found, should_stop)
+        _measure_rows(source, found, should_stop)
     softness = edge_softness(disparity[0], EDGE_PARALLAX_PX / max(farthest_views, 1e-9), should_stop)
-    return Surroundings(low, high, step, softness)
+    return DisparityStatistics(low, high, step, softness)
 
 
-def _survey(disparity: FloatImage, found: list[FloatImage], should_stop: ShouldStop) -> None:
-    size = disparity.shape[0], disparity.shape[1]
-    in_bands(lambda first, last: _around(disparity, first, last, *found), size, should_stop)
+def _measure_rows(disparity: FloatImage, found: list[FloatImage], should_stop: ShouldStop) -> None:
+    in_bands(lambda first, last: _window_extremes(disparity, first, last, *found), image_size(disparity), should_stop)
 
 
 def edge_softness(disparity: FloatImage, least_edge: float, should_stop: ShouldStop = never) -> float:
@@ -76,9 +77,7 @@ def _edges(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> ND
         found = np.empty((2, rows.size), np.float32)
         return found[:, : _row_edges(rows, np.float32(least_edge), *found)].copy()
 
-    return np.concatenate(
-        [np.empty((2, 0), np.float32), *in_bands(edges, (values.shape[0], values.shape[1]), should_stop)], axis=1
-    )
+    return np.concatenate([np.empty((2, 0), np.float32), *in_bands(edges, image_size(values), should_stop)], axis=1)
 
 
 @kernel
@@ -104,7 +103,7 @@ def _row_edges(rows, least_edge, changes, lefts):  # type: ignore[no-untyped-def
 
 
 @kernel
-def _around(disparity, first, last, low, high, step):  # type: ignore[no-untyped-def]
+def _window_extremes(disparity, first, last, low, high, step):  # type: ignore[no-untyped-def]
     """Rows [first, last) of the range, and of the largest step, within a square: along rows first, then columns.
 
     NaN lies around the frame, as where nothing is: it is neither less nor greater than anything.

@@ -12,7 +12,7 @@ import numpy as np
 
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.types import FloatImage
+from iibr_core.types import FloatImage, image_size
 
 LEAST_SHARE = 0.05
 """Smaller shares of foreground are noise."""
@@ -39,9 +39,9 @@ def split_mixed_pixels(
     def band(first: int, last: int) -> None:
         own[first:last] = fringe[first:last] = colors[first:last]
         fringe_disparity[first:last], coverage[first:last] = np.nan, 0.0
-        _split(colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage)
+        _split_rows(colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage)
 
-    in_bands(band, disparity.shape, should_stop)
+    in_bands(band, image_size(disparity), should_stop)
     return own, fringe, fringe_disparity, coverage
 
 
@@ -63,7 +63,7 @@ def _towards_front(disparity, x, y, edge_step):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _split(  # type: ignore[no-untyped-def]
+def _split_rows(  # type: ignore[no-untyped-def]
     colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage,
 ):  # fmt: skip
     """Rows [first, last) of what `split_mixed_pixels` returns, which hold the photo where nothing is split."""

@@ -36,7 +36,7 @@ def occlusion_mask(weights: FloatImage) -> NDArray[np.bool_]:
 
 
 @kernel
-def _covered(weights, row, x):  # type: ignore[no-untyped-def]
+def _coverage(weights, row, x):  # type: ignore[no-untyped-def]
     covered = 0.0
     for k in range(weights.shape[0]):
         covered += weights[k, row, x]
@@ -62,7 +62,7 @@ def _entropy(weights):  # type: ignore[no-untyped-def]
     result = np.empty((rows, width), np.float32)
     for row in range(rows):
         for x in range(width):
-            result[row, x] = _entropy_at(weights, row, x, _covered(weights, row, x))
+            result[row, x] = _entropy_at(weights, row, x, _coverage(weights, row, x))
     return result
 
 
@@ -74,6 +74,6 @@ def _mask(weights, limit):  # type: ignore[no-untyped-def]
         for x in range(width):
             if weights[0, row, x] > MOSTLY_COVERED:
                 continue
-            covered = _covered(weights, row, x)
+            covered = _coverage(weights, row, x)
             mask[row, x] = covered <= MOSTLY_COVERED and _entropy_at(weights, row, x, covered) > limit
     return mask

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.disparity_statistics import Surroundings, surroundings_of
+from iibr_core.rendering.disparity_statistics import DisparityStatistics, measure_disparity
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 CELL_PX = 4
 """Side of the cells that rays are summed up by."""
@@ -25,14 +25,14 @@ SMOOTH_SHARE = 0.8
 @dataclass(frozen=True, eq=False)
 class Cells:
     """Rays of S images summed up by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
-    disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. rough (M, N): whether
-    the photo is there anything but one smooth surface.
+    disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. incoherent (M, N):
+    whether the photo is there anything but one smooth surface.
     """
 
     low: FloatImage
     high: FloatImage
     row_ranges: FloatImage
-    rough: NDArray[np.bool_]
+    incoherent: NDArray[np.bool_]
 
 
 class RaySet:
@@ -43,7 +43,7 @@ class RaySet:
     its pixel a ray fills, 0 = no ray. near_edge (S, H, W) bool: True where a 4x4 look-up may meet another surface.
     """
 
-    def __init__(self, capacity: int, size: tuple[int, int], surface_step: float, farthest_views: float = 1.0) -> None:
+    def __init__(self, capacity: int, size: ImageSize, surface_step: float, farthest_views: float = 1.0) -> None:
         """surface_step: disparities closer than this are one surface for look-ups.
 
         farthest_views: the largest view offset that will be rendered.
@@ -51,17 +51,17 @@ class RaySet:
         self._count = 0
         self._surface_step = surface_step
         self._farthest_views = farthest_views
-        self._surroundings: Surroundings | None = None
+        self._statistics: DisparityStatistics | None = None
         self._surveying = threading.Lock()
         self._offsets = np.empty((capacity, 2))
         self._colors = np.empty((capacity, *size, 3), np.float32)
         self._disparity = np.empty((capacity, *size), np.float32)
         self._coverage = np.empty((capacity, *size), np.float32)
         self._near_edge = np.empty((capacity, *size), np.bool_)
-        in_cells = -(-size[0] // CELL_PX), -(-size[1] // CELL_PX)
+        in_cells = -(-size.height // CELL_PX), -(-size.width // CELL_PX)
         self._low, self._high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
         self._row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
-        self._rough = np.ones(in_cells, np.bool_)
+        self._incoherent = np.ones(in_cells, np.bool_)
 
     def add(
         self,
@@ -81,29 +81,29 @@ class RaySet:
             _near_edge(disparity, self._surface_step, first, last, self._near_edge[k])
             _sum_up(disparity, coverage, first, last, self._low[k], self._high[k])
             if k == 0:
-                _find_rough(disparity, SMOOTH_SHARE * self._surface_step, first, last, self._rough)
+                _find_incoherent(disparity, SMOOTH_SHARE * self._surface_step, first, last, self._incoherent)
 
         in_bands(band, self.size, should_stop)
         self._row_ranges[k, :, 0], self._row_ranges[k, :, 1] = self._low[k].min(axis=1), self._high[k].max(axis=1)
         self._offsets[k] = offset
         self._count += 1
-        self._surroundings = None
+        self._statistics = None
 
-    def survey(self, should_stop: ShouldStop = never) -> Surroundings:
-        """`surroundings`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
+    def survey(self, should_stop: ShouldStop = never) -> DisparityStatistics:
+        """`statistics`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
         with self._surveying:
-            if self._surroundings is None:
+            if self._statistics is None:
                 disparity = self._disparity[: self._count]
-                self._surroundings = surroundings_of(disparity, self._farthest_views, should_stop)
-            return self._surroundings
+                self._statistics = measure_disparity(disparity, self._farthest_views, should_stop)
+            return self._statistics
 
     def __len__(self) -> int:
         return self._count
 
     @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) of every image."""
-        return self._disparity.shape[1], self._disparity.shape[2]
+    def size(self) -> ImageSize:
+        """Of every image."""
+        return image_size(self._disparity[0])
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
@@ -115,12 +115,12 @@ class RaySet:
     def cells(self) -> Cells:
         """The rays added so far, summed up."""
         low, high, row_ranges = (part[: self._count] for part in (self._low, self._high, self._row_ranges))
-        return Cells(low, high, row_ranges, self._rough)
+        return Cells(low, high, row_ranges, self._incoherent)
 
     @property
-    def surroundings(self) -> Surroundings:
+    def statistics(self) -> DisparityStatistics:
         """What lies around the rays added so far; made when first asked for after the last was added."""
-        return self._surroundings or self.survey()
+        return self._statistics or self.survey()
 
     @property
     def photo_images(self) -> int:
@@ -147,13 +147,13 @@ def _sum_up(disparity, coverage, first, last, low, high):  # type: ignore[no-unt
 
 
 @kernel
-def _find_rough(disparity, smooth_step, first, last, rough):  # type: ignore[no-untyped-def]
+def _find_incoherent(disparity, smooth_step, first, last, incoherent):  # type: ignore[no-untyped-def]
     """Of the cells that begin in rows [first, last): True on either side of a step larger than smooth_step, of a pixel
     without surface, of the border.
     """
     height, width = disparity.shape
     for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
-        rough[v] = False
+        incoherent[v] = False
         for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
             for x in range(width):
                 is_smooth = 0 < y < height - 1 and 0 < x < width - 1
@@ -164,7 +164,7 @@ def _find_rough(disparity, smooth_step, first, last, rough):  # type: ignore[no-
                     is_smooth &= abs(disparity[y - 1, x] - here) <= smooth_step
                     is_smooth &= abs(disparity[y + 1, x] - here) <= smooth_step
                 if not is_smooth:
-                    rough[v, x // CELL_PX] = True
+                    incoherent[v, x // CELL_PX] = True
 
 
 @kernel

@@ -30,7 +30,7 @@ ONE, TWO = np.uint64(1), np.uint64(2)
 """Unsigned indices need no test for counting from the end."""
 
 
-def look_up_colors(
+def resample_colors(
     rays: RaySet, candidates: Candidates, weights: FloatImage, wanted: NDArray[np.bool_] | None = None
 ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
     """Colours (N, W, 3), sRGB-encoded, of target rays; disparity (N, W) and source (N, W) of the heaviest candidates.
@@ -54,7 +54,7 @@ def look_up_colors(
     return colors, disparity, source
 
 
-def heaviest(candidates: Candidates, weights: FloatImage) -> tuple[FloatImage, NDArray[np.uint8]]:
+def heaviest_candidate(candidates: Candidates, weights: FloatImage) -> tuple[FloatImage, NDArray[np.uint8]]:
     """Disparity and source, each (N, W), of the heaviest candidates; 0 where there is none."""
     disparity, source = np.zeros(candidates.count.shape, np.float32), np.zeros(candidates.count.shape, np.uint8)
     _heaviest(candidates.count, candidates.disparity, candidates.source, weights, disparity, source)
@@ -114,7 +114,7 @@ def cubic(images, index, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def look_up(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-untyped-def]
+def resample(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-untyped-def]
     """Colour at a position from the pixels of disparity d, kept within their range where some are missing."""
     _, height, width, _ = images.shape
     tolerance = OWN_SURFACE_PX / parallax
@@ -201,7 +201,7 @@ def _gather(  # type: ignore[no-untyped-def]
     images, surfaces, near_edge, offsets, first_row,
     count, candidate_disparity, candidate_source, weights, wanted, colors, disparity, source,
 ):  # fmt: skip
-    """What `look_up_colors` returns. offsets (S, 2): from each source to the target view."""
+    """What `resample_colors` returns. offsets (S, 2): from each source to the target view."""
     _, height, width, _ = images.shape
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
@@ -228,7 +228,7 @@ def _gather(  # type: ignore[no-untyped-def]
                 source_y = min(max(first_row + row + d * t, -0.5), height - 0.5)
                 if near_edge[index, max(floor(source_y), 0), max(floor(source_x), 0)]:
                     parallax = max(abs(s), abs(t), 1e-9)
-                    r, g, b = look_up(images, surfaces, index, source_x, source_y, d, parallax)
+                    r, g, b = resample(images, surfaces, index, source_x, source_y, d, parallax)
                 else:
                     r, g, b = cubic(images, index, source_x, source_y)
                 if sole:

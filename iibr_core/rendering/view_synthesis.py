@@ -14,16 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import fill_background
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, Contested, decide, find_contested
+from iibr_core.rendering.ambiguous_rays import (
+    HYPOTHESES,
+    REACH_PX,
+    AmbiguousRays,
+    blend_hypotheses,
+    find_ambiguous_rays,
+)
 from iibr_core.rendering.candidates import Candidates, find_candidates
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import entropy, occlusion_mask
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import OWN_SURFACE_PX, heaviest, look_up_colors
-from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.rendering.resampling import OWN_SURFACE_PX, heaviest_candidate, resample_colors
+from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import ShouldStop, go_on, in_bands, never
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 EDGE_PX = 2.0
 """A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
@@ -60,7 +66,7 @@ def rays_of_photo(
     """
     centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
-    rays = RaySet(2 + more, disparity.shape, OWN_SURFACE_PX / farthest_views, farthest_views)
+    rays = RaySet(2 + more, image_size(disparity), OWN_SURFACE_PX / farthest_views, farthest_views)
     rays.add(centre, own, disparity, np.ones_like(disparity), should_stop)
     if coverage.any():
         rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
@@ -73,13 +79,13 @@ class ViewSynthesis:
     def __init__(
         self,
         should_stop: ShouldStop = never,
-        transformer: Callable[[Contested], FloatImage] | None = None,
+        transformer: Callable[[AmbiguousRays], FloatImage] | None = None,
         every: bool = False,
         slots: int = 5,
         keeps_entropy: bool = False,
         hypotheses: int = HYPOTHESES,
     ) -> None:
-        """transformer: gives the weights (N, K) of contested rays; None: closed form. every: of all rays.
+        """transformer: gives the weights (N, K) of ambiguous rays; None: closed form. every: of all rays.
 
         slots: candidates kept a ray. keeps_entropy: whether views bring the entropy of their weights. hypotheses: the
         transformer's K.
@@ -117,7 +123,7 @@ class ViewSynthesis:
             running.extend(self._threads.submit(work, item) for item in islice(items, tiling.THREADS - len(running)))
             if not running:
                 return
-            go_on(self._should_stop)
+            raise_if_stopped(self._should_stop)
             yield running.popleft().result()
 
     def _should_stop(self) -> bool:
@@ -128,7 +134,7 @@ class ViewSynthesis:
             raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
         if self._transformer:
             rays.survey(self._should_stop)
-        view = _blank(rays.size, self._keeps_entropy)
+        view = _blank_view(rays.size, self._keeps_entropy)
         most_pixels = tiling.MOST_BAND_PIXELS // (EVERY_COST if self._every else 1)
         in_bands(
             lambda first, last: self._render_rows(rays, offset, (first, last), view),
@@ -144,16 +150,18 @@ class ViewSynthesis:
         """Write rows [first, last) of the view, holes not filled yet."""
         around = REACH_PX if self._transformer else 0
         above = min(rows[0], around)
-        candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + around, rays.size[0])), self._slots)
-        go_on(self._should_stop)
-        weights = closed_form_weights(candidates)
+        candidates = find_candidates(
+            rays, offset, (rows[0] - above, min(rows[1] + around, rays.size.height)), self._slots
+        )
+        raise_if_stopped(self._should_stop)
+        weights = visibility_weights(candidates)
         occluded = occlusion_mask(weights)
         inner = slice(above, above + rows[1] - rows[0])
-        go_on(self._should_stop)
+        raise_if_stopped(self._should_stop)
         if self._transformer:
             colors, disparity, source = self._decided(rays, candidates, weights, inner)
         else:
-            colors, disparity, source = look_up_colors(rays, candidates, weights)
+            colors, disparity, source = resample_colors(rays, candidates, weights)
         shown = slice(*rows)
         view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
         view.occluded[shown] = occluded[inner]
@@ -164,24 +172,24 @@ class ViewSynthesis:
     def _decided(
         self, rays: RaySet, candidates: Candidates, weights: FloatImage, inner: slice
     ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
-        """What `look_up_colors` gives for the inner rows, but what contested rays show is the transformer's choice."""
+        """What `resample_colors` gives for the inner rows, but what ambiguous rays show is the transformer's choice."""
         assert self._transformer is not None
         rows = inner.start, inner.stop
-        shown = heaviest(candidates, weights)
-        contested = find_contested(rays, candidates, weights, shown, rows, self._every, self._hypotheses)
-        at = contested.pixel[:, 0] - candidates.first_row, contested.pixel[:, 1]
+        shown = heaviest_candidate(candidates, weights)
+        ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, rows, self._every, self._hypotheses)
+        at = ambiguous.pixel[:, 0] - candidates.first_row, ambiguous.pixel[:, 1]
         wanted = np.zeros(candidates.count.shape, np.bool_)
         wanted[inner] = True
         wanted[at] = False
-        go_on(self._should_stop)
-        colors, disparity, source = look_up_colors(rays, candidates, weights, wanted)
-        chosen = self._transformer(contested)
-        go_on(self._should_stop)
-        colors[at], disparity[at], source[at] = decide(rays, contested, chosen)
+        raise_if_stopped(self._should_stop)
+        colors, disparity, source = resample_colors(rays, candidates, weights, wanted)
+        chosen = self._transformer(ambiguous)
+        raise_if_stopped(self._should_stop)
+        colors[at], disparity[at], source[at] = blend_hypotheses(rays, ambiguous, chosen)
         return colors, disparity, source
 
 
-def _blank(size: tuple[int, int], with_entropy: bool) -> RenderedView:
+def _blank_view(size: ImageSize, with_entropy: bool) -> RenderedView:
     """A view (height, width) to be written to."""
     return RenderedView(
         np.empty((*size, 3), np.float32),

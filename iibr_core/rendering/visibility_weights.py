@@ -13,15 +13,15 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage
 
 
-def closed_form_weights(candidates: Candidates) -> FloatImage:
+def visibility_weights(candidates: Candidates) -> FloatImage:
     """Weights (K, N, W) in [0, 1], 0 in unused slots; their sum over K is the covered share of the pixel."""
     weights = np.zeros_like(candidates.coverage)
-    _front_to_back(candidates.count, candidates.coverage, candidates.disparity, weights)
+    _composite_front_to_back(candidates.count, candidates.coverage, candidates.disparity, weights)
     return weights
 
 
 @kernel
-def _front_to_back(count, coverage, disparity, weights):  # type: ignore[no-untyped-def]
+def _composite_front_to_back(count, coverage, disparity, weights):  # type: ignore[no-untyped-def]
     rows, width = count.shape
     for row in range(rows):
         for x in range(width):

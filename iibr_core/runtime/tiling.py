@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from iibr_core.types import ImageSize
+
 ShouldStop = Callable[[], bool]
 
 MOST_BAND_PIXELS = 1 << 17
@@ -29,7 +31,7 @@ def never() -> bool:
     return False
 
 
-def go_on(should_stop: ShouldStop) -> None:
+def raise_if_stopped(should_stop: ShouldStop) -> None:
     """Raise Cancelled once should_stop is true."""
     if should_stop():
         raise Cancelled
@@ -44,10 +46,10 @@ def in_pieces(
     """
 
     def piece(item: Item) -> Result:
-        go_on(should_stop)
+        raise_if_stopped(should_stop)
         return work(item)
 
-    go_on(should_stop)
+    raise_if_stopped(should_stop)
     if min(threads, len(items)) <= 1:
         return list(map(piece, items))
     with ThreadPoolExecutor(min(threads, len(items)), thread_name_prefix="iibr-bands") as pool:
@@ -56,7 +58,7 @@ def in_pieces(
 
 def in_bands(
     work: Callable[[int, int], Result],
-    size: tuple[int, int],
+    size: ImageSize,
     should_stop: ShouldStop = never,
     threads: int | None = None,
     most_pixels: int | None = None,

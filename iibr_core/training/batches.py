@@ -1,6 +1,6 @@
-"""Batches of contested rays from random scenes: true colours, and disparity as real maps have it.
+"""Batches of ambiguous rays from random scenes: true colours, and disparity as real maps have it.
 
-Step n of a seed always gives the same batch. Contested rays of a few views come after one EPI, which has every ray.
+Step n of a seed always gives the same batch. Ambiguous rays of a few views come after one EPI, which has every ray.
 """
 
 from __future__ import annotations
@@ -15,19 +15,26 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from iibr_core.color import linear_from_srgb
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, SHARE, Contested, find_contested, votes
+from iibr_core.rendering.ambiguous_rays import (
+    HYPOTHESES,
+    REACH_PX,
+    SHARE,
+    AmbiguousRays,
+    find_ambiguous_rays,
+    hypothesis_colors,
+)
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import heaviest
+from iibr_core.rendering.resampling import heaviest_candidate
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training.degradation import degrade
-from iibr_core.training.losses import EpiShape, color_loss, perceived
-from iibr_core.training.scenes.random_scene import Scene, cast, random_scene, render
+from iibr_core.training.losses import EpiShape, color_loss, to_perceptual
+from iibr_core.training.scenes.random_scene import RaycastScene, cast, random_scene, render
 from iibr_core.training.trainer import Batch
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
-SIZE = 112, 128
+SIZE = ImageSize(112, 128)
 VIEWS = 3
 RAYS_A_VIEW = 1500
 EPI_VIEWS, EPI_WIDTH = 9, 64
@@ -39,36 +46,36 @@ TYPICAL_ERROR, LEAST_ERROR = 0.004, 0.0005
 """Of colours, squared: which scenes count once, and below which a scene's error is no matter."""
 
 
-class Rays(NamedTuple):
-    """N contested rays: their hypotheses, what those would show (N, K, 3) and the truth (N, 3), both sRGB-encoded."""
+class LabelledRays(NamedTuple):
+    """N ambiguous rays: their hypotheses, what those would show (N, K, 3) and the truth (N, 3), both sRGB-encoded."""
 
-    contested: Contested
+    ambiguous: AmbiguousRays
     votes: FloatImage
     truth: FloatImage
 
 
-def _as_found(rays: RaySet, contested: Contested) -> Contested:
-    return contested
+def _collect(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
+    return ambiguous
 
 
 @dataclass(frozen=True)
 class RayChoice:
     """What rays are given to T; other than the default for ablations only.
 
-    hypotheses: K. inpainted: whether the ray set has what corner views inpaint. described: (rays, contested) ->
-    contested, with the features T shall see.
+    hypotheses: K. inpainted: whether the ray set has what corner views inpaint. described: (rays, ambiguous) ->
+    ambiguous, with the features T shall see.
     """
 
     hypotheses: int = HYPOTHESES
     inpainted: bool = True
-    described: Callable[[RaySet, Contested], Contested] = _as_found
+    described: Callable[[RaySet, AmbiguousRays], AmbiguousRays] = _collect
 
 
 AS_RENDERED = RayChoice()
 
 
 def training_batch(step: int, seed: int, choice: RayChoice = AS_RENDERED) -> Batch:
-    """The batch of a step: one EPI, then contested rays of VIEWS views, of one random scene."""
+    """The batch of a step: one EPI, then ambiguous rays of VIEWS views, of one random scene."""
     rng = np.random.default_rng((seed, step))
     radius = int(rng.choice([LIGHT_FIELD, STEREO], p=[0.75, 0.25]))
     largest = float(np.exp(rng.uniform(*np.log(PARALLAX_PX)))) / radius
@@ -77,7 +84,7 @@ def training_batch(step: int, seed: int, choice: RayChoice = AS_RENDERED) -> Bat
     rays = _ray_set(colors, degrade(disparity, rng, radius), radius, choice.inpainted)
     epi = _epi(scene, rays, radius, rng, choice)
     parts = list(epi or [])
-    parts += [_contested(scene, rays, _random_offset(radius, rng), rng, choice) for _ in range(VIEWS)]
+    parts += [_sample_ambiguous(scene, rays, _random_offset(radius, rng), rng, choice) for _ in range(VIEWS)]
     return _batch(parts, (1, EPI_VIEWS, EPI_WIDTH) if epi else None)
 
 
@@ -103,52 +110,60 @@ def _random_offset(radius: int, rng: np.random.Generator) -> ViewOffset:
             return ViewOffset(float(t), float(s))
 
 
-def _contested(scene: Scene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator, choice: RayChoice) -> Rays:
-    """Contested rays of a view, also those whose true surface the photo does not show: background is right there."""
-    contested = contested_rays(rays, offset, (0, SIZE[0]), False, choice.hypotheses)
-    contested = _subset(contested, rng.permutation(len(contested.pixel))[:RAYS_A_VIEW])
-    return _seen(scene, rays, contested, choice)
+def _sample_ambiguous(
+    scene: RaycastScene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator, choice: RayChoice
+) -> LabelledRays:
+    """Ambiguous rays of a view, also those whose true surface the photo does not show: background is right there."""
+    ambiguous = ambiguous_rays_of_view(rays, offset, (0, SIZE[0]), False, choice.hypotheses)
+    ambiguous = _subset(ambiguous, rng.permutation(len(ambiguous.pixel))[:RAYS_A_VIEW])
+    return _keep_visible(scene, rays, ambiguous, choice)
 
 
-def contested_rays(
+def ambiguous_rays_of_view(
     rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool, hypotheses: int = HYPOTHESES
-) -> Contested:
+) -> AmbiguousRays:
     """Those of rows [first, last) of the view at an offset, as `ViewSynthesis` finds them."""
     above = min(rows[0], REACH_PX)
-    candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + REACH_PX, rays.size[0])))
-    weights = closed_form_weights(candidates)
+    candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + REACH_PX, rays.size.height)))
+    weights = visibility_weights(candidates)
     inner = above, above + rows[1] - rows[0]
-    return find_contested(rays, candidates, weights, heaviest(candidates, weights), inner, every, hypotheses)
+    return find_ambiguous_rays(
+        rays, candidates, weights, heaviest_candidate(candidates, weights), inner, every, hypotheses
+    )
 
 
-def _seen(scene: Scene, rays: RaySet, contested: Contested, choice: RayChoice) -> Rays:
-    y, x = contested.pixel.T
-    return Rays(choice.described(rays, contested), votes(rays, contested), cast(scene, x, y, contested.offset)[0])
+def _keep_visible(scene: RaycastScene, rays: RaySet, ambiguous: AmbiguousRays, choice: RayChoice) -> LabelledRays:
+    y, x = ambiguous.pixel.T
+    return LabelledRays(
+        choice.described(rays, ambiguous), hypothesis_colors(rays, ambiguous), cast(scene, x, y, ambiguous.offset)[0]
+    )
 
 
-def _epi(scene: Scene, rays: RaySet, radius: int, rng: np.random.Generator, choice: RayChoice) -> list[Rays] | None:
+def _epi(
+    scene: RaycastScene, rays: RaySet, radius: int, rng: np.random.Generator, choice: RayChoice
+) -> list[LabelledRays] | None:
     """Every ray of a piece of one row in EPI_VIEWS views from left to right; None where one has no hypothesis."""
     row = int(rng.integers(REACH_PX, SIZE[0] - REACH_PX))
     first = int(rng.integers(0, SIZE[1] - EPI_WIDTH + 1))
     columns = np.arange(first, first + EPI_WIDTH)
     parts = []
     for s in np.linspace(-radius, radius, EPI_VIEWS):
-        contested = contested_rays(rays, ViewOffset(0.0, float(s)), (row, row + 1), True, choice.hypotheses)
-        chosen = np.flatnonzero(np.isin(contested.pixel[:, 1], columns))
+        ambiguous = ambiguous_rays_of_view(rays, ViewOffset(0.0, float(s)), (row, row + 1), True, choice.hypotheses)
+        chosen = np.flatnonzero(np.isin(ambiguous.pixel[:, 1], columns))
         if len(chosen) < EPI_WIDTH:
             return None
-        parts.append(_seen(scene, rays, _subset(contested, chosen), choice))
+        parts.append(_keep_visible(scene, rays, _subset(ambiguous, chosen), choice))
     return parts
 
 
-def _subset(contested: Contested, chosen: NDArray[np.intp]) -> Contested:
+def _subset(ambiguous: AmbiguousRays, chosen: NDArray[np.intp]) -> AmbiguousRays:
     names = ("pixel", "mask", "disparity", "source", "features")
-    return replace(contested, **{name: getattr(contested, name)[chosen] for name in names})
+    return replace(ambiguous, **{name: getattr(ambiguous, name)[chosen] for name in names})
 
 
-def _batch(parts: list[Rays], epi_shape: EpiShape | None) -> Batch:
-    features = torch.from_numpy(np.concatenate([part.contested.features for part in parts]))
-    mask = torch.from_numpy(np.concatenate([part.contested.mask for part in parts]))
+def _batch(parts: list[LabelledRays], epi_shape: EpiShape | None) -> Batch:
+    features = torch.from_numpy(np.concatenate([part.ambiguous.features for part in parts]))
+    mask = torch.from_numpy(np.concatenate([part.ambiguous.mask for part in parts]))
     colors = torch.from_numpy(linear_from_srgb(np.concatenate([part.votes for part in parts])))
     truth = torch.from_numpy(linear_from_srgb(np.concatenate([part.truth for part in parts])))
     return Batch(features, mask, colors, truth, epi_shape, _color_gain(features, mask, colors, truth))
@@ -161,4 +176,6 @@ def _color_gain(features: Tensor, mask: Tensor, colors: Tensor, truth: Tensor) -
     """
     share = (features[..., SHARE] + 1e-6) * mask
     closed_form = (share / share.sum(dim=1, keepdim=True))[..., None] * colors
-    return TYPICAL_ERROR / (float(color_loss(perceived(closed_form.sum(dim=1)), perceived(truth))) + LEAST_ERROR)
+    return TYPICAL_ERROR / (
+        float(color_loss(to_perceptual(closed_form.sum(dim=1)), to_perceptual(truth))) + LEAST_ERROR
+    )

@@ -20,7 +20,7 @@ UNTOUCHED = 0.4
 """Share of maps that `degrade` leaves exact, as rendered scenes have them: T must not spoil good maps."""
 
 
-def blurred(disparity: FloatImage, sigma_px: float) -> FloatImage:
+def blur(disparity: FloatImage, sigma_px: float) -> FloatImage:
     """Convolved with a Gaussian; the frame's pixels continue beyond it. sigma_px 0 changes nothing."""
     if sigma_px <= 0:
         return disparity.copy()
@@ -35,21 +35,21 @@ def blurred(disparity: FloatImage, sigma_px: float) -> FloatImage:
     return soft.astype(np.float32)
 
 
-def noisy(disparity: FloatImage, rng: np.random.Generator, strength: float, grain_px: float = 0.0) -> FloatImage:
+def add_noise(disparity: FloatImage, rng: np.random.Generator, strength: float, grain_px: float = 0.0) -> FloatImage:
     """With Gaussian noise of this standard deviation (px per view step), its grains grain_px (sigma) wide."""
-    grains = blurred(rng.standard_normal(disparity.shape).astype(np.float32), grain_px)
+    grains = blur(rng.standard_normal(disparity.shape).astype(np.float32), grain_px)
     spread = float(grains.std())
     return disparity + grains * np.float32(strength / spread if grain_px > 0 and spread > 0 else strength)
 
 
-def quantised(disparity: FloatImage, step: float) -> FloatImage:
+def quantise(disparity: FloatImage, step: float) -> FloatImage:
     """Rounded to multiples of a step (px per view step). A step of 0 changes nothing."""
     if step <= 0:
         return disparity.copy()
     return (np.rint(disparity / step) * step).astype(np.float32)
 
 
-def coarse(disparity: FloatImage, factor: int) -> FloatImage:
+def coarsen(disparity: FloatImage, factor: int) -> FloatImage:
     """Averaged over squares of factor x factor pixels, then enlarged bilinearly."""
     if factor <= 1:
         return disparity.copy()
@@ -58,25 +58,25 @@ def coarse(disparity: FloatImage, factor: int) -> FloatImage:
         starts = np.arange(0, out.shape[axis], factor)
         counts = np.diff(np.r_[starts, out.shape[axis]])
         means = np.moveaxis(np.add.reduceat(out, starts, axis=axis), axis, -1) / counts
-        out = np.moveaxis(_interpolated(means, starts + (counts - 1) * 0.5, out.shape[axis]), -1, axis)
+        out = np.moveaxis(_interpolate(means, starts + (counts - 1) * 0.5, out.shape[axis]), -1, axis)
     return out.astype(np.float32)
 
 
-def misaligned(disparity: FloatImage, down_px: float, right_px: float) -> FloatImage:
+def misalign(disparity: FloatImage, down_px: float, right_px: float) -> FloatImage:
     """Moved against the photo, with bilinear interpolation; the frame's pixels continue beyond it."""
     out = disparity.astype(np.float64)
     for axis, shift in ((0, down_px), (1, right_px)):
-        moved = _interpolated(np.moveaxis(out, axis, -1), np.arange(out.shape[axis]) + shift, out.shape[axis])
+        moved = _interpolate(np.moveaxis(out, axis, -1), np.arange(out.shape[axis]) + shift, out.shape[axis])
         out = np.moveaxis(moved, -1, axis)
     return out.astype(np.float32)
 
 
-def rescaled(disparity: FloatImage, scale: float, shift: float) -> FloatImage:
+def rescale(disparity: FloatImage, scale: float, shift: float) -> FloatImage:
     """Times scale, plus shift: what is left where scale and shift are estimated wrongly."""
     return (disparity * np.float32(scale) + np.float32(shift)).astype(np.float32)
 
 
-def _interpolated(values: NDArray[np.float64], places: NDArray[Any], count: int) -> NDArray[np.float64]:
+def _interpolate(values: NDArray[np.float64], places: NDArray[Any], count: int) -> NDArray[np.float64]:
     """(..., count): values (..., N) that stand at increasing places (N,), read linearly at 0, 1, ..., count - 1."""
     last = len(places) - 1
     wanted = np.clip(np.arange(count), places[0], places[-1])
@@ -96,12 +96,12 @@ def degrade(disparity: FloatImage, rng: np.random.Generator, views: float = 1.0)
         return disparity.copy()
     step = 1 / max(views, 1.0)
     faults: list[Callable[[FloatImage], FloatImage]] = [
-        lambda d: coarse(d, int(rng.integers(2, 5))),
-        lambda d: blurred(d, _log_uniform(rng, 0.5, 4.0)),
-        lambda d: misaligned(d, *rng.normal(0, 0.6, 2)),
-        lambda d: noisy(d, rng, step * _log_uniform(rng, 0.02, 1.0), _log_uniform(rng, 0.3, 6.0)),
-        lambda d: rescaled(d, exp(rng.normal(0, 0.05)), step * rng.normal(0, 0.3)),
-        lambda d: quantised(d, step * _log_uniform(rng, 0.05, 1.0)),
+        lambda d: coarsen(d, int(rng.integers(2, 5))),
+        lambda d: blur(d, _log_uniform(rng, 0.5, 4.0)),
+        lambda d: misalign(d, *rng.normal(0, 0.6, 2)),
+        lambda d: add_noise(d, rng, step * _log_uniform(rng, 0.02, 1.0), _log_uniform(rng, 0.3, 6.0)),
+        lambda d: rescale(d, exp(rng.normal(0, 0.05)), step * rng.normal(0, 0.3)),
+        lambda d: quantise(d, step * _log_uniform(rng, 0.05, 1.0)),
     ]
     # In the order in which they happen to a map: lost detail first, rounding for storage last.
     for index in sorted(rng.choice(len(faults), rng.integers(1, MOST_FAULTS + 1), replace=False)):

@@ -43,7 +43,7 @@ class Losses(NamedTuple):
     epi: Tensor
 
 
-def perceived(light: Tensor) -> Tensor:
+def to_perceptual(light: Tensor) -> Tensor:
     """Linear light on a scale like sRGB's, on which pictures are judged; its slope is finite at 0."""
     return (light.clamp_min(0) + LEAST_LIGHT) ** (1 / 2.2)
 
@@ -82,11 +82,11 @@ def structure_tensor(
     along s. One bad number spoils the whole EPI.
     """
     smooth, slope = _gaussian(derivative_sigma, epi), _gaussian_derivative(derivative_sigma, epi)
-    x = _filtered(epi, along_s=smooth, along_x=slope)
-    s = _filtered(epi, along_s=slope, along_x=smooth)
+    x = _correlate(epi, along_s=smooth, along_x=slope)
+    s = _correlate(epi, along_s=slope, along_x=smooth)
     products = torch.stack([(x * x).sum(dim=1), (x * s).sum(dim=1), (s * s).sum(dim=1)], dim=1)
     window = _gaussian(window_sigma, epi)
-    return _filtered(products, along_s=window, along_x=window)
+    return _correlate(products, along_s=window, along_x=window)
 
 
 def epi_loss(rendered_epi: Tensor, truth_epi: Tensor) -> Tensor:
@@ -152,7 +152,7 @@ def _gaussian_derivative(sigma: float, like: Tensor) -> Tensor:
     return taps / (taps * offsets).sum()
 
 
-def _filtered(images: Tensor, along_s: Tensor, along_x: Tensor) -> Tensor:
+def _correlate(images: Tensor, along_s: Tensor, along_x: Tensor) -> Tensor:
     """Images (..., V, W) correlated with taps along V and along W; the border repeats.
 
     As products with banded matrices: at these sizes faster than convolutions of one channel.

@@ -21,9 +21,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iibr_core.formats.files import written_whole
+from iibr_core.formats.files import atomic_write
 from iibr_core.formats.weights import load_weights, read_tensors, require_shapes, save_weights, write_tensors
-from iibr_core.training.losses import EpiShape, LossWeights, perceived, total_loss
+from iibr_core.training.losses import EpiShape, LossWeights, to_perceptual, total_loss
 from iibr_core.types import InputError
 
 __all__ = [
@@ -132,7 +132,7 @@ def train(
             while run.step < config.steps:
                 # The batch is made outside: Ctrl-C may stop that at once, but not an update half done.
                 batch = batches(run.step + 1).to(device)
-                with _interrupts_held():
+                with _defer_interrupts():
                     row = run.take_step(batch)
                     write_row(row)
                 if progress:
@@ -212,9 +212,9 @@ class _Run:
         weights = self.model(batch.features, batch.mask)
         if weights.shape != batch.mask.shape:
             raise ValueError(f"the model gives weights {tuple(weights.shape)}, needed are {tuple(batch.mask.shape)}")
-        rendered = perceived((weights[..., None] * batch.colors).sum(dim=1))
+        rendered = to_perceptual((weights[..., None] * batch.colors).sum(dim=1))
         lambdas = replace(self.config.lambdas, color=self.config.lambdas.color * batch.color_gain)
-        losses = total_loss(rendered, perceived(batch.truth), weights, batch.epi_shape, lambdas)
+        losses = total_loss(rendered, to_perceptual(batch.truth), weights, batch.epi_shape, lambdas)
         losses.total.backward()
         gradients = [parameter.grad for parameter in self.parameters if parameter.grad is not None]
         norm = nn.utils.get_total_norm(gradients).to(losses.total)
@@ -244,7 +244,7 @@ class _Run:
             if not torch.isfinite(tensor).all():
                 raise self._diverged(name, self.step)
         about = {"step": str(self.step), "seconds": repr(self._seconds()), "config": json.dumps(asdict(self.config))}
-        with _interrupts_held():
+        with _defer_interrupts():
             write_tensors(self.checkpoint, CHECKPOINT, tensors, about)
             self.saved_step = self.step
 
@@ -321,7 +321,7 @@ def _log(path: Path, done: int) -> Iterator[Callable[[_Row], None]]:
     """Yield what writes a row. Rows up to step `done` of the log that is there stay, what came after them goes."""
     rows = path.read_text(errors="replace").splitlines() if done and path.is_file() else []
     kept = [row for row in rows if row.count(",") == len(LOG_COLUMNS) - 1 and _step_of(row) <= done]
-    with written_whole(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text("".join(line + "\n" for line in [",".join(LOG_COLUMNS), *kept]))
     with path.open("a", buffering=1) as file:
 
@@ -337,7 +337,7 @@ def _step_of(row: str) -> float:
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
+def _defer_interrupts() -> Iterator[None]:
     """Ctrl-C within the block counts after it, so that model, moments and step never part. Other threads get none."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -13,8 +13,8 @@ from benchmarks.speed.rendering import (
     PINHOLE_VARIANTS,
     best_pictures,
     measure_drawing,
-    sheared_light,
-    shifted,
+    shear_light,
+    shift_image,
 )
 from benchmarks.speed.variants import BenchScene
 from iibr_core.evaluation.metrics import psnr
@@ -37,15 +37,15 @@ def quiet(done: int, total: int, doing: str) -> None:
 def test_shifting_moves_by_whole_pixels_exactly_and_smooth_pictures_nearly() -> None:
     x = np.arange(40, dtype=np.float32)
     image = np.stack([np.tile(np.sin(x / 6), (8, 1))] * 3, axis=-1)
-    np.testing.assert_array_equal(shifted(image, 3.0, 1)[:, 3:], image[:, :-3])
-    np.testing.assert_array_equal(shifted(image, -2.0, 0), image)
+    np.testing.assert_array_equal(shift_image(image, 3.0, 1)[:, 3:], image[:, :-3])
+    np.testing.assert_array_equal(shift_image(image, -2.0, 0), image)
     wanted = np.sin((x - 2.3) / 6)
-    np.testing.assert_allclose(shifted(image, 2.3, 1)[0, 5:-5, 0], wanted[5:-5], atol=1e-3)
+    np.testing.assert_allclose(shift_image(image, 2.3, 1)[0, 5:-5, 0], wanted[5:-5], atol=1e-3)
 
 
 def test_sheared_light_is_linear() -> None:
     grey = np.full((6, 7, 3), 0.5, np.float32)
-    np.testing.assert_allclose(sheared_light(grey, (0.4, -1.7)), ((0.5 + 0.055) / 1.055) ** 2.4, rtol=1e-5)
+    np.testing.assert_allclose(shear_light(grey, (0.4, -1.7)), ((0.5 + 0.055) / 1.055) ** 2.4, rtol=1e-5)
 
 
 def test_the_best_picture_without_depth_is_the_photo(scene: BenchScene) -> None:

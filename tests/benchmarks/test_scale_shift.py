@@ -12,9 +12,9 @@ from benchmarks.scale_shift_network import Network, color
 from benchmarks.scale_shift_scenes import Scenes, by_rule, normalised
 from iibr_core.generation.plan import plan_for_viewing
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import TOTAL_PARALLAX, Disparity, FloatImage, Photo, ViewOffset
+from iibr_core.types import TOTAL_PARALLAX, Disparity, FloatImage, ImageSize, Photo, ViewOffset
 
-SIZE = 40, 48
+SIZE = ImageSize(40, 48)
 
 
 def ramp() -> FloatImage:

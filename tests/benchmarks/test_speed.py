@@ -13,12 +13,12 @@ from PIL import Image
 
 from benchmarks.speed.figures import SceneFigures, measure_scene
 from benchmarks.speed.measure import Cost, exponent, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
-from benchmarks.speed.plot import plotted
-from benchmarks.speed.prediction import Foretold, fitted_nanoseconds, foretell, is_near, make_field, whole_field
+from benchmarks.speed.plot import plot_panels
+from benchmarks.speed.prediction import Prediction, fit_nanoseconds, is_near, make_field, predict, whole_field
 from benchmarks.speed.rendering_figures import DrawingFigures, Drawn
 from benchmarks.speed.report import Bench, markdown_of, means, panels, write_bench
-from benchmarks.speed.scaling import Point, growth, made_up
-from benchmarks.speed.targets import Target, foretold_targets, front_targets
+from benchmarks.speed.scaling import Point, growth, made_up_scene
+from benchmarks.speed.targets import SpeedTarget, front_targets, prediction_targets
 from benchmarks.speed.variants import (
     REFERENCE,
     VARIANTS,
@@ -26,14 +26,14 @@ from benchmarks.speed.variants import (
     Stored,
     Variant,
     bench_scenes,
+    evaluated_views,
     field_cost,
     is_possible,
-    judged_views,
     stored_offsets,
 )
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.generation.cost_model import CORES, NANOSECONDS, Work
+from iibr_core.generation.cost_model import CORES, NANOSECONDS, Workload
 from iibr_core.types import FloatImage, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, view_of_square, write_grid
 
@@ -141,7 +141,7 @@ def test_stored_views_of_variants(scenes: list[BenchScene]) -> None:
 
 @pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.name)
 def test_every_variant_makes_views_of_the_scenes_size(scenes: list[BenchScene], variant: Variant) -> None:
-    made = judged_views(variant, scenes[0], true_drawing)
+    made = evaluated_views(variant, scenes[0], true_drawing)
     assert made.keys() == scenes[0].truth.keys()
     for image in made.values():
         assert image.shape == (HEIGHT, WIDTH, 3)
@@ -160,30 +160,33 @@ def test_what_is_left_out_shows(figures: tuple[SceneFigures, ...]) -> None:
 
 
 def test_the_plan_beside_what_was_measured(scenes: list[BenchScene]) -> None:
-    fast, balanced = foretell([whole_field(scenes[0])], ("fast", "balanced"), 1, quiet)
-    assert 0 < fast.foretold_s < balanced.foretold_s
+    fast, balanced = predict([whole_field(scenes[0])], ("fast", "balanced"), 1, quiet)
+    assert 0 < fast.predicted_s < balanced.predicted_s
     assert min(fast.measured_s, balanced.measured_s) > 0
-    assert balanced.foretold_bytes > fast.foretold_bytes > 25 * HEIGHT * WIDTH * 7
-    assert fast.time_ratio == fast.foretold_s / fast.measured_s
+    assert balanced.predicted_bytes > fast.predicted_bytes > 25 * HEIGHT * WIDTH * 7
+    assert fast.time_ratio == fast.predicted_s / fast.measured_s
     assert len(make_field(whole_field(scenes[0]), "fast")) == 25
 
 
-def test_constants_are_recovered_from_what_they_foretold() -> None:
-    true = Work(200.0, 80.0, 300.0, 40.0, 2000.0, NANOSECONDS.soft_rays, NANOSECONDS.plain_rays)
+def test_constants_are_recovered_from_what_they_predicted() -> None:
+    true = Workload(200.0, 80.0, 300.0, 40.0, 2000.0, NANOSECONDS.soft_rays, NANOSECONDS.plain_rays)
     rng = np.random.default_rng(0)
     found = []
     for _ in range(12):
-        work = Work(*(float(amount) for amount in rng.uniform(1e7, 1e8, 5)), 0.0, 0.0)
+        work = Workload(*(float(amount) for amount in rng.uniform(1e7, 1e8, 5)), 0.0, 0.0)
         seconds = sum(amount * each for amount, each in zip(work, true)) * 1e-9 / CORES
-        found.append(Foretold("", "fast", 1.0, seconds, 1.0, 1.0, work))
-    assert fitted_nanoseconds(found) == pytest.approx(true, rel=1e-6)
+        found.append(Prediction("", "fast", 1.0, seconds, 1.0, 1.0, work))
+    assert fit_nanoseconds(found) == pytest.approx(true, rel=1e-6)
 
 
 def test_near_is_within_a_quarter() -> None:
     assert [is_near(ratio) for ratio in (0.7, 0.8, 1.2, 1.3, math.nan)] == [False, True, True, False, None]
-    work = Work(*7 * [0.0])
-    near, off = Foretold("a", "fast", 1.0, 1.1, 5.0, 5.0, work), Foretold("b", "fast", 1.0, 2.0, 5.0, math.nan, work)
-    time, memory = foretold_targets([near, off])
+    work = Workload(*7 * [0.0])
+    near, off = (
+        Prediction("a", "fast", 1.0, 1.1, 5.0, 5.0, work),
+        Prediction("b", "fast", 1.0, 2.0, 5.0, math.nan, work),
+    )
+    time, memory = prediction_targets([near, off])
     assert (time.is_met, memory.is_met) == (False, True)
     assert time.measured.startswith("1 of 2")
 
@@ -195,13 +198,13 @@ def test_the_plans_choice_is_judged_on_every_scene(figures: tuple[SceneFigures, 
 
 
 def test_made_up_scenes_have_what_is_asked_for() -> None:
-    photo, disparity = made_up(64, 4.0, 5)
+    photo, disparity = made_up_scene(64, 4.0, 5)
     assert photo.size == (64, 64)
     assert 0 <= photo.pixels.min() < photo.pixels.max() <= 1
     assert disparity.values.min() == 0
     assert 2 <= disparity.values.max() <= 4
-    assert not made_up(64, 4.0, 0)[1].values.any()
-    np.testing.assert_array_equal(made_up(64, 4.0, 5)[0].pixels, photo.pixels)
+    assert not made_up_scene(64, 4.0, 0)[1].values.any()
+    np.testing.assert_array_equal(made_up_scene(64, 4.0, 5)[0].pixels, photo.pixels)
 
 
 def test_growth_is_fitted_to_the_measured_points() -> None:
@@ -212,12 +215,16 @@ def test_growth_is_fitted_to_the_measured_points() -> None:
 
 
 def bench_of(figures: tuple[SceneFigures, ...]) -> Bench:
-    targets = (Target("a", "<= 1", "2", False), Target("b", ">= 1", "2", True), Target("c", "d", "–", None))
+    targets = (
+        SpeedTarget("a", "<= 1", "2", False),
+        SpeedTarget("b", ">= 1", "2", True),
+        SpeedTarget("c", "d", "–", None),
+    )
     drawn = tuple(Drawn(name, Cost(1, ratio), ratio, 9, 40 + ratio, 0.01) for name, ratio in (("once", 1), ("all", 5)))
-    foretold = (Foretold("a scene", "fast", 1.0, 2.0, 3e6, math.nan, Work(*7 * [0.0])),)
+    predicted = (Prediction("a scene", "fast", 1.0, 2.0, 3e6, math.nan, Workload(*7 * [0.0])),)
     growths = (growth("pixels", [Point(1.0, 16, 3, 1.0, 1)], 1, quiet),)
     drawings = (DrawingFigures("a picture", drawn),)
-    return Bench(figures, drawings, foretold, growths, targets, "a machine", "iibr bench")
+    return Bench(figures, drawings, predicted, growths, targets, "a machine", "iibr bench")
 
 
 def test_tables_name_every_variant_and_mark_the_front(figures: tuple[SceneFigures, ...]) -> None:
@@ -244,7 +251,7 @@ def test_means_are_geometric_for_time(figures: tuple[SceneFigures, ...]) -> None
 
 
 def test_plots_are_pictures(figures: tuple[SceneFigures, ...], tmp_path: Path) -> None:
-    svg, png = plotted(panels(bench_of(figures)), ("svg", "png"))
+    svg, png = plot_panels(panels(bench_of(figures)), ("svg", "png"))
     assert svg.startswith(b"<?xml")
     assert b"<svg" in svg
     picture = Image.open(io.BytesIO(png))

@@ -29,7 +29,7 @@ from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.maps.writer import write_map
 from iibr_core.formats.weights import save_weights
 from iibr_core.generation.plan import PlanOverrides, plan_for_viewing, plan_literal
-from iibr_core.types import GridShape, InputError, ViewUpdate
+from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import square_before_wall
 
@@ -204,8 +204,8 @@ def test_a_file_that_goes_away_between_two_looks(tmp_path, monkeypatch):
         ("a.png", read_photo),
         ("a.jpg", read_photo),
         ("a.jpg", read_embedded),
-        ("a.npy", lambda path: read_disparity(path, (4, 4))),
-        ("a.pfm", lambda path: read_disparity(path, (4, 4))),
+        ("a.npy", lambda path: read_disparity(path, ImageSize(4, 4))),
+        ("a.pfm", lambda path: read_disparity(path, ImageSize(4, 4))),
     ):
         with pytest.raises(InputError, match=name):
             read(tmp_path / name)
@@ -274,7 +274,7 @@ def test_npy_files_run_no_code(tmp_path):
         save(buffer, np.array([Touches(tmp_path / "touched")], dtype=object))
         (tmp_path / name).write_bytes(buffer.getvalue())
         with pytest.raises(InputError, match=name):
-            read_disparity(tmp_path / name, (1, 1))
+            read_disparity(tmp_path / name, ImageSize(1, 1))
     assert not (tmp_path / "touched").exists()
 
 
@@ -295,7 +295,7 @@ def test_npy_headers_that_lie(tmp_path, header):
     data = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header) + 1) + header + b"\n" + bytes(64)
     (tmp_path / "a.npy").write_bytes(data)
     with pytest.raises(InputError, match=r"a\.npy") as caught:
-        read_disparity(tmp_path / "a.npy", (4, 4))
+        read_disparity(tmp_path / "a.npy", ImageSize(4, 4))
     assert "\n" not in str(caught.value)
 
 

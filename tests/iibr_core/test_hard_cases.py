@@ -20,11 +20,11 @@ from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.background import fill_background
 from iibr_core.ray_transformer.inference import SHAPES, TrainedWeights
-from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE, Contested
+from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE, AmbiguousRays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.rendering.visibility_weights import closed_form_weights
-from iibr_core.types import Disparity, GridShape, ViewOffset
+from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.types import Disparity, GridShape, ImageSize, ViewOffset
 from tests.iibr_core.scenes import by_index, disparity_of, photo_of, smooth_texture, square_before_wall
 
 HEIGHT, WIDTH = 20, 26
@@ -153,12 +153,12 @@ def test_depth_of_0(tmp_path):
     depth[:, :9] = 1.0
     depth[6:9, 6:9] = 0.0
     np.save(tmp_path / "a_depth.npy", depth)
-    read = read_disparity(tmp_path / "a_depth.npy", (HEIGHT, WIDTH))
+    read = read_disparity(tmp_path / "a_depth.npy", ImageSize(HEIGHT, WIDTH))
     assert (read.values[:, :6] > read.values[:, 12:].max()).all()
     field_of(plain_photo(), read, quality="balanced")
     np.save(tmp_path / "b_depth.npy", depth * 0)
     with pytest.raises(ValueError, match=r"b_depth\.npy: no value is known"):
-        read_disparity(tmp_path / "b_depth.npy", (HEIGHT, WIDTH))
+        read_disparity(tmp_path / "b_depth.npy", ImageSize(HEIGHT, WIDTH))
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
@@ -222,7 +222,7 @@ def test_k_larger_than_the_number_of_rays(size):
     offset = ViewOffset(0.5, -1.0)
     found = find_candidates(rays, offset, (0, size[0]), most=40)
     assert found.count.max() <= size[0] * size[1]
-    assert (closed_form_weights(found)[found.count.max() :] == 0).all()
+    assert (visibility_weights(found)[found.count.max() :] == 0).all()
     shown = []
     for slots in (5, 40):
         with ViewSynthesis(slots=slots, keeps_entropy=True) as synthesis:
@@ -251,7 +251,7 @@ def test_softmax_of_huge_logits(factor):
     number = np.arange(70) % 6 + 1
     mask = np.arange(6) < number[:, None]
     unused = np.zeros((70, 6), np.float32), np.zeros((70, 6), np.uint8)
-    weights = Scaled(factor)(Contested(ViewOffset(0, 1), np.zeros((70, 2), np.int64), mask, *unused, features))
+    weights = Scaled(factor)(AmbiguousRays(ViewOffset(0, 1), np.zeros((70, 2), np.int64), mask, *unused, features))
     assert (weights >= 0).all()
     assert weights.sum(axis=1) == pytest.approx(1, abs=1e-5)
     assert (weights[~mask] == 0).all()

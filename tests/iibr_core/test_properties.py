@@ -8,13 +8,13 @@ from hypothesis.extra import numpy as stn
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.generation.light_field import transformer_for
-from iibr_core.rendering.ambiguous_rays import find_contested
+from iibr_core.rendering.ambiguous_rays import find_ambiguous_rays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import entropy
-from iibr_core.rendering.resampling import KEYS_A, look_up_colors
+from iibr_core.rendering.resampling import KEYS_A, resample_colors
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -129,14 +129,14 @@ def test_weights_sum_to_one(seed, offset):
     pixels, disparity = scene(seed)
     rays = rays_of_photo(pixels, disparity, 2.0, 0)
     found = find_candidates(rays, offset, (0, HEIGHT))
-    weights = closed_form_weights(found)
+    weights = visibility_weights(found)
     used = np.arange(5)[:, None, None] < found.count
     covered = np.minimum(np.where(used, found.coverage, 0).sum(axis=0, dtype=np.float64), 1)
     assert np.abs(weights.sum(axis=0) - covered).max() <= 1e-5
     assert weights.min() >= 0
-    shown = look_up_colors(rays, found, weights)[1:]
-    contested = find_contested(rays, found, weights, shown, (0, HEIGHT), every=True)
-    decided = transformer_for("exact")(contested)
+    shown = resample_colors(rays, found, weights)[1:]
+    ambiguous = find_ambiguous_rays(rays, found, weights, shown, (0, HEIGHT), every=True)
+    decided = transformer_for("exact")(ambiguous)
     assert np.abs(decided.sum(axis=1) - 1).max(initial=0) <= 1e-5
     assert decided.min(initial=0) >= 0
 

@@ -19,7 +19,7 @@ from iibr_core import color
 from iibr_core.depth import pictorial_cues, refine, scaling, search
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
-from iibr_core.depth.embedded.xmp import Xmp, parsed
+from iibr_core.depth.embedded.xmp import Xmp, parse_packet
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.formats.images import photo
 from iibr_core.formats.light_fields import hci
@@ -37,13 +37,13 @@ from iibr_core.rendering import (
     resampling,
 )
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.rendering.visibility_weights import closed_form_weights
-from iibr_core.types import Disparity, GridShape, Photo, ViewOffset, ViewUpdate
+from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.types import Disparity, GridShape, ImageSize, Photo, ViewOffset, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
 WILD = (math.nan, math.inf, -math.inf, 3e38, -3e38, 1e30, 1e-42, -1e-300, 0.0)
-SIZE = 12, 14
+SIZE = ImageSize(12, 14)
 GRID = GridShape(3, 3)
 
 
@@ -81,13 +81,13 @@ def found(value):
 
 def shown(value):
     """Weights, and what they show, of rays with a wild disparity."""
-    weights = closed_form_weights(found(value))
-    return weights, resampling.look_up_colors(rays(value), found(value), weights)
+    weights = visibility_weights(found(value))
+    return weights, resampling.resample_colors(rays(value), found(value), weights)
 
 
 def contest(value):
     weights, (_, disparity, origin) = shown(value)
-    return ambiguous_rays.find_contested(
+    return ambiguous_rays.find_ambiguous_rays(
         rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]), every=True
     )
 
@@ -98,7 +98,9 @@ def in_use(asked):
 
 
 def decided(value):
-    return ambiguous_rays.decide(rays(value), contest(value), generating.transformer_for("exact")(contest(value)))
+    return ambiguous_rays.blend_hypotheses(
+        rays(value), contest(value), generating.transformer_for("exact")(contest(value))
+    )
 
 
 def field(photo_given, values):
@@ -132,7 +134,7 @@ def known_of(estimate):
 
 def gdepth_xmp(value):
     depth = embedded.picture(np.full(SIZE, 90, np.uint8), "PNG")
-    return Xmp((parsed(embedded.gdepth_segments(depth, near=value, far=5)[0][len(embedded.STANDARD) :]),))
+    return Xmp((parse_packet(embedded.gdepth_segments(depth, near=value, far=5)[0][len(embedded.STANDARD) :]),))
 
 
 def map_file(folder, value, name="map"):
@@ -154,18 +156,18 @@ def field_on_disk(folder, value):
 
 FINITE = {
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
-    "rendering.ambiguous_rays.decide": lambda v, _: decided(v),
-    "rendering.ambiguous_rays.find_contested": lambda v, _: in_use(contest(v)),
-    "rendering.ambiguous_rays.votes": lambda v, _: ambiguous_rays.votes(rays(v), contest(v)),
-    "generation.cost_model.needs_of": lambda v, _: [
-        cost_model.needs_of(cost_model.relief_of(depths(values), 4.0), GRID) for values in (1.0, v)
+    "rendering.ambiguous_rays.blend_hypotheses": lambda v, _: decided(v),
+    "rendering.ambiguous_rays.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
+    "rendering.ambiguous_rays.hypothesis_colors": lambda v, _: ambiguous_rays.hypothesis_colors(rays(v), contest(v)),
+    "generation.cost_model.estimate_costs": lambda v, _: [
+        cost_model.estimate_costs(cost_model.measure_parallax(depths(values), 4.0), GRID) for values in (1.0, v)
     ],
-    "generation.cost_model.relief_of": lambda v, _: [
-        cost_model.relief_of(depths(v), 4.0),
-        cost_model.relief_of(depths(1.0), v),
+    "generation.cost_model.measure_parallax": lambda v, _: [
+        cost_model.measure_parallax(depths(v), 4.0),
+        cost_model.measure_parallax(depths(1.0), v),
     ],
-    "generation.cost_model.work_of": lambda v, _: cost_model.work_of(
-        cost_model.relief_of(depths(v), 4.0), GRID, "exact"
+    "generation.cost_model.estimate_workload": lambda v, _: cost_model.estimate_workload(
+        cost_model.measure_parallax(depths(v), 4.0), GRID, "exact"
     ),
     "depth.scaling.disparity_from": lambda v, _: [
         known_of(DisparityMap(scaling.disparity_from(kind(depths(v)), GRID)))
@@ -174,9 +176,9 @@ FINITE = {
     "depth.embedded.apple.heic_estimate": lambda v, _: apple.heic_estimate(
         np.ones(SIZE, np.float32), {"d_min": v, "d_max": 2.0}
     ),
-    "inpainting.disparity_holes.fill_from_background": lambda v, _: disparity_holes.fill_from_background(known(v)),
+    "inpainting.disparity_holes.fill_disparity_holes": lambda v, _: disparity_holes.fill_disparity_holes(known(v)),
     "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
-    "depth.pictorial_cues.estimate_offline": lambda v, _: pictorial_cues.estimate_offline(
+    "depth.pictorial_cues.estimate_from_cues": lambda v, _: pictorial_cues.estimate_from_cues(
         Photo(image(v), 20.0, "wild")
     ),
     "depth.refine.edge_blur_px": lambda v, _: refine.edge_blur_px(np.nan_to_num(depths(v))),
@@ -185,17 +187,19 @@ FINITE = {
         refine.refine(image(0.5), depths(1.0), strength=v),
     ],
     "formats.maps.resample.resample_surfaces": lambda v, _: known_of(
-        DisparityMap(resample.resample_surfaces(known(v), (7, 9)))
+        DisparityMap(resample.resample_surfaces(known(v), ImageSize(7, 9)))
     ),
     "formats.maps.disparity_file.read_disparity": lambda v, to: [
         disparity_file.read_disparity(map_file(to, v), SIZE),
-        disparity_file.read_disparity(map_file(to, v, "map_depth"), (7, 8)),
+        disparity_file.read_disparity(map_file(to, v, "map_depth"), ImageSize(7, 8)),
     ],
     "depth.search.open_with_depth": lambda v, to: [
         search.open_with_depth(photo_file(to, v)),
         search.open_with_depth(photo_file(to, 1.0), DepthChoice(file=str(map_file(to, v)))),
     ],
-    "depth.search.resized": lambda v, _: known_of(search.resized(DisparityMap(known(v)), (7, 9))),
+    "depth.search.resize_estimate": lambda v, _: known_of(
+        search.resize_estimate(DisparityMap(known(v)), ImageSize(7, 9))
+    ),
     "formats.light_fields.hci.read_light_field": lambda v, to: field_on_disk(to, v),
     "formats.images.photo.read_photo": lambda v, to: photo.read_photo(photo_file(to, v), max_pixels=90),
     "formats.images.photo.write_image": lambda v, to: [
@@ -207,8 +211,8 @@ FINITE = {
     ],
     "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
     "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0, 1)),
-    "rendering.resampling.heaviest": lambda v, _: resampling.heaviest(found(v), shown(v)[0]),
-    "rendering.resampling.look_up_colors": lambda v, _: shown(v)[1],
+    "rendering.resampling.heaviest_candidate": lambda v, _: resampling.heaviest_candidate(found(v), shown(v)[0]),
+    "rendering.resampling.resample_colors": lambda v, _: shown(v)[1],
     "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
         image(0.5), known(v), 0.5
     )[:2],
@@ -220,22 +224,22 @@ FINITE = {
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(focus_disparity=v)).field_disparity(scene()[1]),
     ],
     "generation.plan.plan_literal": lambda v, _: plan.plan_literal(scene()[0], Disparity(depths(v), "wild"), GRID),
-    "rendering.coherent_cells.find_smooth_cells": lambda v, _: [
-        coherent_cells.find_smooth_cells(rays(v), ViewOffset(0.5, -1.0), (0, SIZE[0])),
-        coherent_cells.find_smooth_cells(rays(1.0), ViewOffset(v, 0.5), (0, SIZE[0])),
+    "rendering.coherent_cells.find_coherent_cells": lambda v, _: [
+        coherent_cells.find_coherent_cells(rays(v), ViewOffset(0.5, -1.0), (0, SIZE[0])),
+        coherent_cells.find_coherent_cells(rays(1.0), ViewOffset(v, 0.5), (0, SIZE[0])),
     ],
-    "rendering.coherent_cells.land_on_rough": lambda v, _: [
-        coherent_cells.land_on_rough(rays(v).cells, 0, t, 0.5, (0, 4), np.eye(1, 4, dtype=np.bool_)) for t in (0.5, v)
+    "rendering.coherent_cells.land_incoherent": lambda v, _: [
+        coherent_cells.land_incoherent(rays(v).cells, 0, t, 0.5, (0, 4), np.eye(1, 4, dtype=np.bool_)) for t in (0.5, v)
     ],
     "rendering.disparity_statistics.edge_softness": lambda v, _: disparity_statistics.edge_softness(depths(v), 0.5),
-    "rendering.disparity_statistics.surroundings_of": lambda v, _: (
-        disparity_statistics.surroundings_of(depths(v)[None], 1.0).softness
+    "rendering.disparity_statistics.measure_disparity": lambda v, _: (
+        disparity_statistics.measure_disparity(depths(v)[None], 1.0).softness
     ),
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
     "rendering.view_synthesis.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
     "types.Disparity": lambda v, _: Disparity(depths(v), "wild"),
     "types.Photo": lambda v, _: Photo(image(v), 20.0, "wild"),
-    "rendering.visibility_weights.closed_form_weights": lambda v, _: closed_form_weights(found(v)),
+    "rendering.visibility_weights.visibility_weights": lambda v, _: visibility_weights(found(v)),
 }
 """What comes back is finite, or InputError or another ValueError says why not."""
 
@@ -281,12 +285,12 @@ READS_OR_TELLS = {
     "depth.models.config": "read_config package_for read_preparation",
     "depth.models.catalog": "known_model model_to_use is_installed cached_folder weight_files bytes_of fetch",
     "depth.models.package_models": "run_package",
-    "depth.embedded.images": "picture_file decoded_map",
+    "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar flat_disparity",
-    "depth.embedded.xmp": "is_jpeg jpeg_layout value_in xmp_of parsed",
-    "formats.files": "temporary_sibling written_whole require_file opened_file refuse_bomb",
-    "formats.light_fields.numbered_grid": "read_grid_folder",
+    "depth.embedded.xmp": "is_jpeg jpeg_layout value_in xmp_of parse_packet",
+    "formats.files": "temporary_sibling atomic_write require_file open_binary refuse_bomb",
+    "formats.light_fields.numbered_grid": "read_numbered_grid",
     "formats.light_fields.hci": "is_light_field_folder read_view HciWriter",
     "formats.images.heic": "is_heic read_heic read_heic_depth",
     "formats.light_fields.llff": "read_llff",
@@ -294,18 +298,18 @@ READS_OR_TELLS = {
     "formats.light_fields.scene": "pictures_in with_equal_sizes first_existing numbers_in scene_folders",
     "formats.maps.npy": "read_array",
     "formats.maps.pfm": "read_pfm",
-    "formats.images.oiio_writer": "write_picture",
+    "formats.images.oiio_writer": "write_image_file",
     "formats.images.oiio_reader": "read_size read_orientation read_raster read_map require_whole_png text_attribute "
     "complaint_of",
     "formats.light_fields.stanford": "read_stanford",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
     "generation.light_field": "transformer_for",
-    "generation.view_maker": "ViewMaker as_stored outer_views",
+    "generation.view_maker": "ViewMaker quantise_as_stored outer_views",
     "runtime.resources": "resource_folder",
-    "generation.cost_model": "Need Needs Work outermost_of",
-    "runtime.tiling": "Cancelled never go_on in_pieces in_bands",
+    "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
+    "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "rendering.view_synthesis": "ViewSynthesis",
-    "types": "ViewOffset GridShape InputError",
+    "types": "ViewOffset GridShape ImageSize image_size InputError",
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 
@@ -363,7 +367,7 @@ def public_names():
 def test_every_public_function_has_its_case():
     told = {f"{module}.{name}" for module, names in READS_OR_TELLS.items() for name in names.split()}
     tabled = {*FINITE, *ELEMENTWISE, *FINITE_BY_CONTRACT, *told}
-    kernels = type(candidates._land)  # pieces of hot loops, called by kernels only
+    kernels = type(candidates._land_rays)  # pieces of hot loops, called by kernels only
     missing = {
         name
         for name, value in public_names()

@@ -164,7 +164,7 @@ class Driver:
 
     def image(self) -> np.ndarray:
         """The picture as it was drawn last."""
-        return self.app.stage.renderer.read_image()
+        return self.app.scene_view.renderer.read_image()
 
 
 @pytest.fixture
@@ -190,14 +190,14 @@ def no_egl_context() -> Iterator[None]:
 @pytest.fixture
 def open_window(display: str, no_egl_context: None) -> Iterator[Callable[..., Driver]]:
     """Opens the viewer on a photo; closes it after the test."""
-    from viewer.app.main_loop import App, opening
+    from viewer.app.main_loop import App, initial_state
     from viewer.model.actions import OpenPath
     from viewer.model.state.app_state import AppState, Preferences, Source
 
     apps = []
 
     def start(path: Path | None, kept_in: Path | None = None, **changes: object) -> Driver:
-        state = opening(OpenPath(Source(str(path), **changes))) if path else None  # type: ignore[arg-type]
+        state = initial_state(OpenPath(Source(str(path), **changes))) if path else None  # type: ignore[arg-type]
         apps.append(App(replace(state or AppState(), preferences=Preferences(window=SMALL_WINDOW)), kept_in))
         return Driver(apps[-1])
 

@@ -25,8 +25,8 @@ from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import save_picture
-from viewer.app.preferences_store import keep, with_kept
-from viewer.background.scene_worker import Failed, Request, SceneReady, ViewReady, results_of
+from viewer.app.preferences_store import load_preferences, store_preferences
+from viewer.background.scene_worker import Failed, SceneReady, SceneRequest, ViewReady, results_of
 from viewer.model.actions import MoveEye, SetAperture
 from viewer.model.saved_settings import read_settings, settings_text_in
 from viewer.model.state.app_state import CENTRE, AppState, SaveTask, Source
@@ -52,7 +52,7 @@ def desk() -> Iterator[Desk]:
     made.worker.close()
 
 
-def failure(desk: Desk, request: Request) -> str:
+def failure(desk: Desk, request: SceneRequest) -> str:
     """What the worker says of a job that must fail; then it carries out another."""
     desk.worker.submit(request)
     while not isinstance(result := desk.next(), Failed):
@@ -64,7 +64,7 @@ def failure(desk: Desk, request: Request) -> str:
 def goes_on(desk: Desk, folder: Path, generation: int) -> None:
     """The worker makes a whole field of a good photo."""
     photo = write_scene(folder, "good")
-    desk.worker.submit(Request(generation, Source(str(photo), grid=GridShape(1, 2))))
+    desk.worker.submit(SceneRequest(generation, Source(str(photo), grid=GridShape(1, 2))))
     while not (isinstance(result := desk.next(), ViewReady) and result.progress.done == 2):
         assert not isinstance(result, Failed)
 
@@ -88,14 +88,14 @@ def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
 ) -> None:
     photo = write_scene(tmp_path)
     damage(photo)
-    message = failure(desk, Request(1, Source(str(photo))))
+    message = failure(desk, SceneRequest(1, Source(str(photo))))
     assert "scene.png" in message
     assert reason in message
     goes_on(desk, tmp_path, 2)
 
 
 def test_too_little_memory_is_one_line_and_the_worker_goes_on(desk: Desk, tmp_path: Path) -> None:
-    message = failure(desk, Request(1, Source(str(write_scene(tmp_path)), memory_bytes=10_000)))
+    message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)), memory_bytes=10_000)))
     assert "raise --memory or lower --max-pixels" in message
     goes_on(desk, tmp_path, 2)
 
@@ -103,7 +103,9 @@ def test_too_little_memory_is_one_line_and_the_worker_goes_on(desk: Desk, tmp_pa
 def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(tmp_path: Path) -> None:
     """Truly, not by a budget: an array that no machine has room for, in the midst of the views."""
 
-    def work(request: Request, should_stop: Callable[[], bool], eye: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+    def work(
+        request: SceneRequest, should_stop: Callable[[], bool], eye: Callable[[], ViewOffset]
+    ) -> Iterator[ViewReady]:
         for result in results_of(request, should_stop, eye):
             yield result  # type: ignore[misc]
             if request.generation == 1 and isinstance(result, ViewReady):
@@ -111,7 +113,7 @@ def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(tmp_path: Path)
 
     desk = Desk(work)
     try:
-        desk.worker.submit(Request(1, Source(str(write_scene(tmp_path)), grid=GRID)))
+        desk.worker.submit(SceneRequest(1, Source(str(write_scene(tmp_path)), grid=GRID)))
         while not isinstance(result := desk.next(), Failed):
             pass
         assert "MemoryError" in result.message
@@ -127,13 +129,13 @@ def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) 
         for row in range(3):
             for column in range(3):
                 writer.add(ViewUpdate(row, column, np.full((8, 9, 3), 90, np.uint8), None))
-    results = results_of(Request(1, Source(str(tmp_path / "field"))), lambda: False, lambda: CENTRE)
+    results = results_of(SceneRequest(1, Source(str(tmp_path / "field"))), lambda: False, lambda: CENTRE)
     assert isinstance(next(results), SceneReady)
     (tmp_path / "field" / "input_Cam008.png").unlink()
     seen = []
     with pytest.raises(InputError, match=r"input_Cam008\.png: no such file"):
         seen += list(results)
-    message = failure(desk, Request(2, Source(str(tmp_path / "field"))))
+    message = failure(desk, SceneRequest(2, Source(str(tmp_path / "field"))))
     assert "input_Cam008.png: this view is missing" in message
     goes_on(desk, tmp_path, 3)
 
@@ -146,7 +148,9 @@ def test_photos_of_any_size_and_depth_become_scenes(tmp_path: Path, size: tuple[
     values = random.uniform(-3, 3, size).astype(np.float32)
     values.flat[: min(values.size - 1, 4)] = [np.nan, np.inf, 1e6, -np.inf][: values.size - 1]
     np.save(tmp_path / "a_disparity.npy", values)
-    results = list(results_of(Request(1, Source(str(tmp_path / "a.png"), grid=GRID)), lambda: False, lambda: CENTRE))
+    results = list(
+        results_of(SceneRequest(1, Source(str(tmp_path / "a.png"), grid=GRID)), lambda: False, lambda: CENTRE)
+    )
     assert isinstance(results[0], SceneReady)
     views = [result.view for result in results if isinstance(result, ViewReady)]
     assert len(views) == 9
@@ -172,10 +176,10 @@ def test_a_full_disk_while_a_picture_is_saved(viewer: HeadlessViewer, tmp_path: 
     task = SaveTask(str(path), (96, 64), may_replace=True)
     others = set(tmp_path.iterdir())
     with full_disk(900), pytest.raises(InputError, match=f"{name}: cannot be written"):
-        save_picture(viewer._stage, viewer.state, task)
+        save_picture(viewer._scene_view, viewer.state, task)
     assert path.read_bytes() == b"mine"
     assert set(tmp_path.iterdir()) == others
-    save_picture(viewer._stage, viewer.state, task)
+    save_picture(viewer._scene_view, viewer.state, task)
     assert read_settings(path).size_px == (96, 64)
 
 
@@ -191,10 +195,10 @@ def test_the_photo_may_go_once_it_is_open(viewer: HeadlessViewer, tmp_path: Path
 
 def test_preferences_on_a_full_disk_keep_the_old_ones(tmp_path: Path) -> None:
     state = replace(AppState(), recent=("/a.png",))
-    keep(state, tmp_path)
+    store_preferences(state, tmp_path)
     with full_disk(10), pytest.raises(InputError, match="cannot be written"):
-        keep(replace(state, recent=("/b.png",)), tmp_path)
-    assert with_kept(AppState(), tmp_path).recent == ("/a.png",)
+        store_preferences(replace(state, recent=("/b.png",)), tmp_path)
+    assert load_preferences(AppState(), tmp_path).recent == ("/a.png",)
     assert len(list(tmp_path.iterdir())) == 2
 
 

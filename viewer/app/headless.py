@@ -1,4 +1,4 @@
-"""The viewer without a window: the same worker's job, state, stage and panels, drawn into an image."""
+"""The viewer without a window: the same worker's job, state, scene_view and panels, drawn into an image."""
 
 from __future__ import annotations
 
@@ -11,18 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
-from viewer.app.image_export import drawn_pixels
-from viewer.background.comparison_worker import Looker
-from viewer.background.scene_worker import Request, SceneReady, results_of
-from viewer.display.inspection_view import LightTable
-from viewer.display.scene_view import Stage
-from viewer.gpu.context import Backend, create_headless
+from viewer.app.image_export import render_pixels
+from viewer.background.comparison_worker import ComparisonJob
+from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
+from viewer.display.inspection_view import InspectionView
+from viewer.display.scene_view import SceneView
+from viewer.gpu.headless_context import Backend, create_headless
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened
-from viewer.model.inspection_request import NO_AIDS, Aids, beside_of, wanted_inquiry
-from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterboxed
-from viewer.model.reducers.root import apply
+from viewer.model.inspection_request import (
+    NO_INSPECTION_TEXTURES,
+    InspectionTextures,
+    beside_of,
+    make_inspection_request,
+)
+from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterbox
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import CENTRE, AppState, Progress, Source
-from viewer.model.state.depth_editing import DepthWork
+from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import Probed
 
 LAYOUT_FRAMES = 3
@@ -36,9 +41,9 @@ class HeadlessViewer:
         """Make a GL context without a display. Raises InputError where that cannot be."""
         self.state = AppState()
         self._gl = create_headless(backend)
-        self._stage = Stage(self._gl)
-        self._table = LightTable(self._gl, self._stage)
-        self._looker = Looker()
+        self._scene_view = SceneView(self._gl)
+        self._inspection_view = InspectionView(self._gl, self._scene_view)
+        self._comparison_job = ComparisonJob()
 
     def __enter__(self) -> HeadlessViewer:
         """Nothing more to do."""
@@ -46,8 +51,8 @@ class HeadlessViewer:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """Free everything."""
-        self._table.release()
-        self._stage.release()
+        self._inspection_view.release()
+        self._scene_view.release()
         self._gl.release()
 
     @property
@@ -69,29 +74,29 @@ class HeadlessViewer:
         self.state = AppState(depth_strength=depth_strength)
         self.do(OpenPath(source))
         on_progress(self.state.progress)
-        work = DepthWork(source.refine, edits)
-        request = Request(self.state.generation, source, depth_strength, work=work)
+        depth_settings = DepthSettings(source.refine, edits)
+        request = SceneRequest(self.state.generation, source, depth_strength, depth_settings=depth_settings)
         for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
             if isinstance(result, SceneReady):
-                self._stage.open(result)
-                self._table.open()
+                self._scene_view.open(result)
+                self._inspection_view.open()
                 self.do(SceneOpened(result.generation, result.scene))
-                self.state = replace(self.state, depth=work)
+                self.state = replace(self.state, depth=depth_settings)
             else:
-                self._stage.add(result.view)
-                self._table.add(result.view)
+                self._scene_view.add(result.view)
+                self._inspection_view.add(result.view)
                 self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
                 on_progress(result.progress)
-            self._stage.upload_all()
+            self._scene_view.upload_all()
 
     def pick(self, x_px: float, y_px: float) -> float | None:
         """Disparity seen at a pixel of the picture from the present viewpoint; None where the scene has none."""
-        return self._stage.pick(self.state.optics.eye, x_px, y_px)
+        return self._scene_view.pick(self.state.optics.eye, x_px, y_px)
 
     def do(self, *actions: Action) -> None:
         """Change the state."""
         for action in actions:
-            self.state = apply(self.state, action)
+            self.state = reduce(self.state, action)
 
     def picture(self, size: tuple[int, int] | None = None, as_float: bool = False) -> NDArray[Any]:
         """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3).
@@ -101,14 +106,14 @@ class HeadlessViewer:
         scene = self.state.scene
         assert scene is not None
         width, height = size or (scene.width, scene.height)
-        box = letterboxed(Rect(0, 0, width, height), (scene.width, scene.height))
+        box = letterbox(Rect(0, 0, width, height), (scene.width, scene.height))
         assert box is not None
         layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
         image = np.empty((height, width, 3), np.float32 if as_float else np.uint8)
         image[:] = BACKGROUND[:3] if as_float else np.round(np.array(BACKGROUND[:3]) * 255)
         assert layout.picture_px is not None
         x, y, box_width, box_height = layout.picture_px
-        pixels = drawn_pixels(self._stage, self.state, (box_width, box_height), as_float)
+        pixels = render_pixels(self._scene_view, self.state, (box_width, box_height), as_float)
         image[y : y + box_height, x : x + box_width] = pixels
         return image
 
@@ -122,15 +127,15 @@ class HeadlessViewer:
         look = Look(preferences.font_scale, preferences.theme)
         picture_size = (scene.width, scene.height) if scene else None
         layout = layout_of(size, picture_size, ui_scale=look.ui_scale, beside=beside_of(self.state))
-        has_picture = layout.picture_px and self._stage.converge(self.state, layout.picture_px[2:])
-        texture = self._stage.texture if has_picture else None
-        aids = self._inspected(layout) if has_picture else NO_AIDS
+        has_picture = layout.picture_px and self._scene_view.converge(self.state, layout.picture_px[2:])
+        texture = self._scene_view.texture if has_picture else None
+        textures = self._inspected(layout) if has_picture else NO_INSPECTION_TEXTURES
         target = self._gl.ctx.simple_framebuffer(size, 4)
         ui = UiHost(look)
         try:
             for _ in range(LAYOUT_FRAMES):
                 ui.begin(layout, look)
-                build_screen(self.state, layout, texture, aids)
+                build_screen(self.state, layout, texture, textures)
                 ui.end()
                 target.use()
                 ui.draw()
@@ -140,12 +145,12 @@ class HeadlessViewer:
             target.release()
         return rows.reshape(size[1], size[0], 3)[::-1]
 
-    def _inspected(self, layout: Layout) -> Aids:
+    def _inspected(self, layout: Layout) -> InspectionTextures:
         """What inspection shows, worked out to the end. The pointer is where the state says."""
-        inquiry = wanted_inquiry(self.state, is_moving=False, before=None)
-        inputs = self._table.inputs(inquiry, self.state)
-        if inquiry is not None and inputs is not None:
-            for seen in self._looker.seen(inquiry, inputs, lambda: False):
-                self.do(*self._table.take(seen))
-        self.do(Probed(self._table.probe(self.state)))
-        return self._table.draw(self.state, layout)
+        request = make_inspection_request(self.state, is_moving=False, before=None)
+        inputs = self._inspection_view.inputs(request, self.state)
+        if request is not None and inputs is not None:
+            for seen in self._comparison_job.seen(request, inputs, lambda: False):
+                self.do(*self._inspection_view.take(seen))
+        self.do(Probed(self._inspection_view.probe(self.state)))
+        return self._inspection_view.draw(self.state, layout)

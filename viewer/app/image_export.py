@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import srgb_from_linear
 from iibr_core.types import InputError
-from viewer.display.scene_view import Stage
+from viewer.display.scene_view import SceneView
 from viewer.model.saved_settings import ATTRIBUTE, settings_text
 from viewer.model.state.app_state import AppState, SavedSettings, SaveTask
 
@@ -30,18 +30,18 @@ def settings_of(state: AppState, size_px: tuple[int, int]) -> SavedSettings:
     return SavedSettings(state.optics, state.depth_strength, source, size_px, state.depth.edits)
 
 
-def save_map(stage: Stage, task: SaveTask) -> str:
-    """Write the disparity map of the scene on the stage, edits included, in px per view step as given.
+def save_map(scene_view: SceneView, task: SaveTask) -> str:
+    """Write the disparity map of the scene on the screen, edits included, in px per view step as given.
 
     Returns a sentence for people. Raises AlreadyThereError, and InputError as `write_map` does and where there is none.
     """
     from iibr_core.formats.maps.writer import write_map
 
     path = _path_of(task, ".pfm")
-    if stage.loaded is None:
+    if scene_view.loaded is None:
         raise InputError(f"{path}: this scene has no disparity map of its own")
     _require_leave(path, task)
-    note = write_map(path, stage.loaded.disparity.values)
+    note = write_map(path, scene_view.loaded.disparity.values)
     return f"Saved {path}. {note}".strip()
 
 
@@ -58,7 +58,7 @@ def _require_leave(path: Path, task: SaveTask) -> None:
         raise AlreadyThereError(f"{path}: there is a file of this name already")
 
 
-def save_picture(stage: Stage, state: AppState, task: SaveTask) -> Path:
+def save_picture(scene_view: SceneView, state: AppState, task: SaveTask) -> Path:
     """Draw the picture in the size asked for and write it; returns the path written.
 
     Raises AlreadyThereError, and InputError for other endings, sizes beyond the graphics card, and unwritable places.
@@ -67,7 +67,7 @@ def save_picture(stage: Stage, state: AppState, task: SaveTask) -> Path:
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: can be written as .png or .exr only")
     _require_leave(path, task)
-    write_picture(path, drawn_pixels(stage, state, task.size_px, is_float(path)), state, task.size_px)
+    write_picture(path, render_pixels(scene_view, state, task.size_px, is_float(path)), state, task.size_px)
     return path
 
 
@@ -83,7 +83,9 @@ def write_picture(path: Path, pixels: NDArray[Any], state: AppState, size_px: tu
     write_image(path, pixels, {ATTRIBUTE: settings_text(settings_of(state, size_px))})
 
 
-def drawn_pixels(stage: Stage, state: AppState, size_px: tuple[int, int], as_float: bool = False) -> NDArray[Any]:
+def render_pixels(
+    scene_view: SceneView, state: AppState, size_px: tuple[int, int], as_float: bool = False
+) -> NDArray[Any]:
     """The picture with every sample it will get, (height, width, 3), sRGB-encoded: uint8, or float32 with 1 = white.
 
     Larger pictures than the graphics card can hold are drawn in parts. Raises InputError beyond MAX_PIXELS.
@@ -91,5 +93,5 @@ def drawn_pixels(stage: Stage, state: AppState, size_px: tuple[int, int], as_flo
     width, height = size_px
     if min(size_px) < 1 or width * height > MAX_PIXELS:
         raise InputError(f"{width}x{height} px: a picture may have 1 to {MAX_PIXELS // 10**6} million pixels")
-    pixels = stage.picture(state, size_px, is_linear=as_float)
+    pixels = scene_view.picture(state, size_px, is_linear=as_float)
     return srgb_from_linear(pixels) if as_float else pixels

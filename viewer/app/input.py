@@ -102,7 +102,7 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     if state.inspection.shows_grid:
         return _on_sheet(pointer, layout, scene, picture)
     if is_brushing(state):
-        return _brushed(pointer, layout, state, scene, picture, pick)
+        return _paint_actions(pointer, layout, state, scene, picture, pick)
     if pointer.wheel and picture.contains(pointer.x, pointer.y):
         low, high = focus_limits(scene)
         return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
@@ -111,7 +111,7 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     if pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD:
         return _drag(pointer, layout, state, scene, picture, pick)
     if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
-        if _takes_divider(pointer, layout, state, picture):
+        if _grabs_divider(pointer, layout, state, picture):
             return []
         if pointer.clicks > 1:
             return [ReturnHome()]
@@ -150,7 +150,7 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     """What the keys ask for. Esc closes what is open in the window first."""
     actions: list[Action] = []
     if keys.is_escape:
-        actions.append(_closed(state))
+        actions.append(_escape_action(state))
     actions += [BY_NAME[name].action(state) for name in keys.commands]
     if any(keys.arrows):
         eye = state.optics.eye
@@ -159,7 +159,7 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     return actions
 
 
-def _closed(state: AppState) -> Action:
+def _escape_action(state: AppState) -> Action:
     """What Esc closes: a prompt, the sheet of views, a stroke, the brush, then the program."""
     if state.prompt is not None:
         return ShowPrompt(None)
@@ -192,7 +192,7 @@ def is_brushing(state: AppState) -> bool:
     return state.brush.is_on and state.scene is not None and state.scene.plan is not None
 
 
-def _brushed(
+def _paint_actions(
     pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
 ) -> list[Action]:
     """Paint on the surface under the pointer, wherever it lies in the photo; the wheel makes the brush larger."""
@@ -209,16 +209,16 @@ def _brushed(
 
 def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:
     """The divider or a tilt handle where one was taken, else the viewpoint."""
-    if _takes_divider(pointer, layout, state, picture):
+    if _grabs_divider(pointer, layout, state, picture):
         return [MoveDivider((pointer.x - picture.x) / picture.width)]
-    index = _taken_handle(pointer, layout, state, picture)
+    index = _grabbed_handle(pointer, layout, state, picture)
     if index is not None:
         at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
         return [MoveTiltHandle(index, place_of(*at, scene), pick(*at))]
     return _eye_drag(pointer, layout, scene, state.optics.eye)
 
 
-def _takes_divider(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> bool:
+def _grabs_divider(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> bool:
     """Whether the press was close to the divider, or it is dragged already."""
     inspection = state.inspection
     if inspection.comparison is None:
@@ -234,7 +234,7 @@ def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, picture: Rect) -> 
     return [] if view is None else [MoveEye(scene.grid.offset(*view))]
 
 
-def _taken_handle(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> int | None:
+def _grabbed_handle(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> int | None:
     """Which tilt handle is dragged: the one taken already, else the nearer one the press was close to."""
     handles = state.tilt_handles
     if handles is None:

@@ -19,14 +19,14 @@ from viewer.app.input import (
     read_keys,
     read_pointer,
 )
-from viewer.app.preferences_store import keep, with_kept
-from viewer.app.side_effects import Errands
+from viewer.app.preferences_store import load_preferences, store_preferences
+from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
-from viewer.background.comparison_worker import SecondLook
-from viewer.background.scene_worker import Doing, Request, Result, SceneReady, ViewReady, Worker
+from viewer.background.comparison_worker import ComparisonWorker
+from viewer.background.scene_worker import ProgressReport, SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
 from viewer.display.depth_preview import DepthPreview
-from viewer.display.inspection_view import LightTable
-from viewer.display.scene_view import VIEW_REFRESH_S, Stage
+from viewer.display.inspection_view import InspectionView
+from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
 from viewer.model.actions import (
     Action,
@@ -42,12 +42,17 @@ from viewer.model.actions import (
     Tick,
     WorkerLost,
 )
-from viewer.model.inspection_request import NO_AIDS, Aids, beside_of, wanted_inquiry
+from viewer.model.inspection_request import (
+    NO_INSPECTION_TEXTURES,
+    InspectionTextures,
+    beside_of,
+    make_inspection_request,
+)
 from viewer.model.layout import Layout, layout_of
-from viewer.model.reducers.depth_editing import is_depth_ahead, work_asked_for
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask
-from viewer.model.state.depth_editing import DepthWork, DropStroke
+from viewer.model.state.depth_editing import DepthSettings, DropStroke
 from viewer.model.state.inspection import Probed
 from viewer.ui.host import UiHost
 from viewer.ui.screen import build_screen
@@ -74,7 +79,7 @@ class Frame:
     """
 
     picture: Picture | None
-    aids: Aids
+    textures: InspectionTextures
     panels: bytes
     layout: Layout
     look: Look
@@ -82,14 +87,14 @@ class Frame:
 
 
 class App:
-    """The viewer: one window, one worker. state changes only through `apply`; frames_shown counts what was shown."""
+    """The viewer: one window, one worker. state changes only through `reduce`; frames_shown counts what was shown."""
 
     def __init__(self, state: AppState = EMPTY, kept_in: Path | None = None) -> None:
         """Open the window. kept_in: folder of preferences and recent files; None keeps nothing.
 
         Raises InputError where no window can be opened.
         """
-        self.state = with_kept(state, kept_in) if kept_in else state
+        self.state = load_preferences(state, kept_in) if kept_in else state
         self.frames_shown = 0
         self.window = Window("iibr", self.state.preferences.window)
         try:
@@ -97,17 +102,17 @@ class App:
         except InputError:
             self.window.close()
             raise
-        self.stage = Stage(self._gl)
-        self.table = LightTable(self._gl, self.stage)
-        self._depth = DepthPreview(self.stage)
-        self._second_look = SecondLook(wake)
+        self.scene_view = SceneView(self._gl)
+        self.inspection_view = InspectionView(self._gl, self.scene_view)
+        self._depth = DepthPreview(self.scene_view)
+        self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
-        self._worker = Worker(wake)
-        self._errands = Errands(self.stage)
+        self._worker = SceneWorker(wake)
+        self._side_effects = SideEffects(self.scene_view)
         self._kept_in = kept_in
         self._kept_recent = self.state.recent
         self._submitted = 0
-        self._work = DepthWork()
+        self._depth_settings = DepthSettings()
         self._stopped: int | None = None
         self._stepped_at = 0.0
         self._shown: Frame | None = None
@@ -124,19 +129,19 @@ class App:
         self.window.poll(self.wait_s)
         heard = self._drained() + self._dropped() + self._happened()
         self.do(*heard)
-        self._is_busy = self.stage.upload(UPLOAD_BUDGET_S) or bool(heard)
+        self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(heard)
         self._preview_depth()
         layout, look = self.layout(), self.look()
-        picture = self.stage.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
-        if picture and self.stage.report != self.state.report:
-            self.do(PictureDrawn(self.stage.report))
-        aids = self.table.draw(self.state, layout) if picture else NO_AIDS
+        picture = self.scene_view.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
+        if picture and self.scene_view.report != self.state.report:
+            self.do(PictureDrawn(self.scene_view.report))
+        textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
         self._ui.begin(layout, look)
         pointer = read_pointer()
         actions = gesture_start(pointer, self.state)
-        actions += build_screen(self.state, layout, self.stage.texture if picture else None, aids)
+        actions += build_screen(self.state, layout, self.scene_view.texture if picture else None, textures)
         actions += self._input(pointer, layout)
-        self._show(Frame(picture, aids, self._ui.end(), layout, look, self.window.damages))
+        self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages))
         self.do(*actions)
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self._is_busy |= bool(actions)
@@ -150,9 +155,9 @@ class App:
             return max(self._stepped_at + MOTION_FRAME_S - time.perf_counter(), 0.0)
         if self._is_busy or self._same_frames < SETTLING_FRAMES:
             return 0.0
-        if self._errands.is_waiting:
+        if self._side_effects.is_waiting:
             return DIALOG_LOOK_S
-        return IDLE_WAIT_S if self.stage.shows_all_views() else VIEW_REFRESH_S
+        return IDLE_WAIT_S if self.scene_view.shows_all_views() else VIEW_REFRESH_S
 
     def layout(self) -> Layout:
         """Where things lie in the window as it is now."""
@@ -169,11 +174,11 @@ class App:
     def close(self) -> None:
         """Stop the worker, keep what is kept, and free everything."""
         self._worker.close()
-        self._second_look.close()
+        self._comparisons.close()
         self._keep()
         self._ui.release()
-        self.table.release()
-        self.stage.release()
+        self.inspection_view.release()
+        self.scene_view.release()
         self._gl.release()
         self.window.close()
 
@@ -182,15 +187,15 @@ class App:
         if actions:
             self._same_frames = 0
         for action in actions:
-            self.state = apply(self.state, action)
+            self.state = reduce(self.state, action)
         self._worker.eye = self.state.optics.eye
 
     def _happened(self) -> list[Action]:
-        """What neither user nor worker says: the clock, errands done, the window moved, the worker lost."""
+        """What neither user nor worker says: the clock, side effects done, the window moved, the worker lost."""
         self._stepped_at = time.perf_counter()
-        actions = self._errands.run(self.state)
-        for seen in self._second_look.found():
-            actions += self.table.take(seen)
+        actions = self._side_effects.run(self.state)
+        for seen in self._comparisons.found():
+            actions += self.inspection_view.take(seen)
         if self.state.motion.is_running:
             actions.append(Tick(self._stepped_at))
         place = self.window.place
@@ -203,23 +208,23 @@ class App:
     def _drained(self) -> list[Action]:
         """The worker's results, as actions; the one place where they arrive."""
         actions: list[Action] = []
-        while self.stage.has_room and (result := self._worker.next_result()) is not None:
+        while self.scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._taken(result)
         return actions
 
-    def _taken(self, result: Result) -> list[Action]:
+    def _taken(self, result: SceneResult) -> list[Action]:
         try:
             if isinstance(result, SceneReady):
-                self.stage.open(result)
-                self.table.open()
+                self.scene_view.open(result)
+                self.inspection_view.open()
                 self.window.set_title(f"{result.scene.name} - iibr")
                 return [SceneOpened(result.generation, result.scene)]
             if isinstance(result, ViewReady):
-                self.stage.add(result.view)
-                self.table.add(result.view)
+                self.scene_view.add(result.view)
+                self.inspection_view.add(result.view)
                 view = result.view.row, result.view.column
                 return [ProgressMade(result.generation, result.progress, view)]
-            if isinstance(result, Doing):
+            if isinstance(result, ProgressReport):
                 return [ProgressMade(result.generation, result.progress)]
         except InputError as error:  # no room on the graphics card: there is no use in more views
             self._worker.cancel()
@@ -233,7 +238,7 @@ class App:
         return actions_from_drop(paths, self.state, is_inspecting and on_panel) if paths else []
 
     def _input(self, pointer: Pointer, layout: Layout) -> list[Action]:
-        pick = partial(self.stage.pick, self.state.optics.eye)
+        pick = partial(self.scene_view.pick, self.state.optics.eye)
         actions = actions_from_pointer(pointer, layout, self.state, pick)
         actions += actions_from_hover(pointer, layout, self.state, pick)
         actions += actions_from_keys(read_keys(), self.state)
@@ -242,13 +247,13 @@ class App:
 
     def _inspect(self, is_moving: bool) -> None:
         """Tell what is under the pointer, and have worked out what else is looked at."""
-        probe = self.table.probe(self.state)
+        probe = self.inspection_view.probe(self.state)
         if probe != self.state.inspection.probe:
             self.do(Probed(probe))
-        before = self._second_look.wanted
-        inquiry = wanted_inquiry(self.state, is_moving, before)
-        if inquiry != before:
-            self._second_look.want(inquiry, self.table.inputs(inquiry, self.state))
+        before = self._comparisons.wanted
+        request = make_inspection_request(self.state, is_moving, before)
+        if request != before:
+            self._comparisons.want(request, self.inspection_view.inputs(request, self.state))
 
     def _direct_worker(self) -> None:
         """A new generation is a new job, a stopped one is cancelled. The photo is read again only if one was opened."""
@@ -258,16 +263,18 @@ class App:
         if self.state.generation == self._submitted or self.state.source is None:
             return
         scene = self.state.scene
-        loaded = self.stage.loaded if scene and scene.source is self.state.source else None
+        loaded = self.scene_view.loaded if scene and scene.source is self.state.source else None
         if self.state.stroke is not None:
             return  # it will be another one
-        self._submitted, self._work = self.state.generation, work_asked_for(self.state)
+        self._submitted, self._depth_settings = self.state.generation, depth_settings_for_worker(self.state)
         strength = self.state.depth_strength
-        self._worker.submit(Request(self.state.generation, self.state.source, strength, loaded, self._work))
+        self._worker.submit(
+            SceneRequest(self.state.generation, self.state.source, strength, loaded, self._depth_settings)
+        )
 
     def _preview_depth(self) -> None:
         """While depth is edited, show it; the views of what it was before need not be made."""
-        if not is_depth_ahead(self.state, self._work):
+        if not is_depth_ahead(self.state, self._depth_settings):
             return
         self._worker.cancel()
         try:
@@ -285,7 +292,7 @@ class App:
         if self._kept_in is None:
             return
         try:
-            keep(self.state, self._kept_in)
+            store_preferences(self.state, self._kept_in)
         except InputError as error:
             self.do(Notify(Notice(str(error), is_error=True)))
 
@@ -309,7 +316,7 @@ def run(state: AppState, kept_in: Path | None = None) -> None:
         app.close()
 
 
-def opening(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
+def initial_state(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
     """The state to start with: nothing open yet, this asked for, and this light field to compare with."""
-    state = apply(AppState(depth_strength=depth_strength), action)
-    return apply(state, DoTask(ReadTruthTask(ground_truth))) if ground_truth else state
+    state = reduce(AppState(depth_strength=depth_strength), action)
+    return reduce(state, DoTask(ReadTruthTask(ground_truth))) if ground_truth else state

@@ -9,9 +9,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import written_whole
+from iibr_core.formats.files import atomic_write
 from iibr_core.types import InputError
-from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamped
+from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
 from viewer.model.reducers.worker_events import RECENT_KEPT
 from viewer.model.state.app_state import SECTIONS, AppState, Notice, Preferences
 
@@ -27,7 +27,7 @@ def user_folder() -> Path:
     return user_config_path("iibr", appauthor=False)
 
 
-def with_kept(state: AppState, folder: Path) -> AppState:
+def load_preferences(state: AppState, folder: Path) -> AppState:
     """The state with what was kept; a damaged file is left out, with a notice."""
     preferences, recent, notices = state.preferences, state.recent, state.notices
     try:
@@ -41,7 +41,7 @@ def with_kept(state: AppState, folder: Path) -> AppState:
     return dataclasses.replace(state, preferences=preferences, recent=recent, notices=notices)
 
 
-def keep(state: AppState, folder: Path) -> None:
+def store_preferences(state: AppState, folder: Path) -> None:
     """Write preferences and recent files. Raises InputError where that cannot be."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -53,7 +53,7 @@ def keep(state: AppState, folder: Path) -> None:
 
 
 def _write(path: Path, value: Any) -> None:
-    with written_whole(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(json.dumps(value, indent=1), "utf-8")
 
 
@@ -78,7 +78,7 @@ def _preferences(kept: Any) -> Preferences:
     is_scale = isinstance(scale, int | float) and 0 < scale < math.inf
     return Preferences(
         theme="light" if theme == "light" else "dark",
-        font_scale=clamped(float(scale or 1), *FONT_SCALE_LIMITS) if is_scale else usual.font_scale,
+        font_scale=clamp(float(scale or 1), *FONT_SCALE_LIMITS) if is_scale else usual.font_scale,
         open_sections=tuple(s for s in SECTIONS if s in sections)
         if isinstance(sections, list)
         else usual.open_sections,

@@ -8,9 +8,9 @@ from pathlib import Path
 from iibr_core.types import InputError
 from viewer.app.dialogs import Dialog, has_dialogs
 from viewer.app.image_export import MAX_PIXELS, AlreadyThereError, save_map, save_picture
-from viewer.display.scene_view import Stage
+from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, AskForPath, DismissNotice, Notify, SetApertureShape, ShowPrompt, TaskTaken
-from viewer.model.opening import chosen
+from viewer.model.opening import action_for_path
 from viewer.model.state.app_state import (
     AppState,
     ChooseTask,
@@ -30,14 +30,14 @@ TURNS_ANNOUNCED = 4
 """ImGui lays out in two frames; so many turns later a notice is on the screen for certain."""
 
 
-class Errands:
+class SideEffects:
     """Carries out tasks in the window's thread; the one that takes long, a file dialog, is asked again each turn.
 
     A large picture is announced first: while it is drawn and written the window stands still.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, scene_view: SceneView) -> None:
+        self._scene_view = scene_view
         self._dialog: Dialog | None = None
         self._announced: tuple[SaveTask, int] | None = None
 
@@ -66,9 +66,9 @@ class Errands:
                 self._dialog = self._dialog or Dialog(what)
                 return []
             case ReadMaskTask(path):
-                return _mask_read(path, state)
+                return _load_mask(path, state)
             case ReadTruthTask(path):
-                return _truth_read(path)
+                return _read_truth(path)
             case SaveTask():
                 self._announced = None
                 return [DismissNotice(saving_notice(task)), *self._saved(task, state)]
@@ -87,10 +87,10 @@ class Errands:
             return []
         try:
             if task.what == "map":
-                if self._stage.generation != state.generation:
+                if self._scene_view.generation != state.generation:
                     return [Notify(Notice("The map is still being made; save it again in a moment."))]
-                return [Notify(Notice(save_map(self._stage, task)))]
-            path = save_picture(self._stage, state, task)
+                return [Notify(Notice(save_map(self._scene_view, task)))]
+            path = save_picture(self._scene_view, state, task)
         except AlreadyThereError:
             return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, what=task.what))]
         except InputError as error:
@@ -104,7 +104,7 @@ class Errands:
         what, self._dialog = self._dialog.what, None
         if not answer:
             return []
-        return [chosen(what, answer, state)]
+        return [action_for_path(what, answer, state)]
 
 
 def saving_notice(task: SaveTask) -> Notice:
@@ -118,7 +118,7 @@ def is_scene_open(state: AppState) -> bool:
     return state.scene is not None and state.scene.source is state.source
 
 
-def _truth_read(path: str) -> list[Action]:
+def _read_truth(path: str) -> list[Action]:
     from iibr_core.formats.light_fields.hci import read_light_field
 
     try:
@@ -128,7 +128,7 @@ def _truth_read(path: str) -> list[Action]:
     return [TruthRead(GroundTruth(path, header.name, header.grid, header.width, header.height))]
 
 
-def _mask_read(path: str, state: AppState) -> list[Action]:
+def _load_mask(path: str, state: AppState) -> list[Action]:
     from viewer.model.lens.aperture_mask import read_mask
 
     try:

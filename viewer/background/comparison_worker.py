@@ -1,6 +1,6 @@
 """Work beside the worker's: single views for comparisons, their scores, the entropy of weights. One thread.
 
-The newest inquiry wins. Rays and images are kept only as long as something is looked at. The core's heavy imports
+The newest request wins. Rays and images are kept only as long as something is looked at. The core's heavy imports
 happen in the thread.
 """
 
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from iibr_core.color import stored_from_encoded
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
-from viewer.background.loaded_photo import Loaded
+from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import message_of
-from viewer.model.inspection_request import Inquiry
+from viewer.model.inspection_request import InspectionRequest
 
 if TYPE_CHECKING:
     from iibr_core.rendering.ray_set import RaySet
@@ -32,14 +32,14 @@ EQUAL_PSNR_DB = float("inf")
 
 
 @dataclass(frozen=True, eq=False)
-class Inputs:
-    """What inquiries are made from: the photo and its plan, or the stored view (H, W, 3) of a light field from disk.
+class ComparisonInputs:
+    """What requests are made from: the photo and its plan, or the stored view (H, W, 3) of a light field from disk.
 
     quality: of the scene's own views.
     """
 
     quality: Quality
-    loaded: Loaded | None = None
+    loaded: LoadedPhoto | None = None
     plan: ScenePlan | None = None
     stored: StoredColors | None = None
 
@@ -48,37 +48,37 @@ class Inputs:
 class PairReady:
     """Two images (H, W, 3), sRGB bytes, of the same view."""
 
-    inquiry: Inquiry
+    request: InspectionRequest
     left: Bytes
     right: Bytes
 
 
 @dataclass(frozen=True)
 class PairScored:
-    """How far the pair of this inquiry is apart: PSNR (infinite where equal), and the mean of FLIP."""
+    """How far the pair of this request is apart: PSNR (infinite where equal), and the mean of FLIP."""
 
-    inquiry: Inquiry
+    request: InspectionRequest
     psnr_db: float
     flip: float
 
 
 @dataclass(frozen=True, eq=False)
 class EntropyReady:
-    """Entropy (H, W) of the view of this inquiry, 255 = 1."""
+    """Entropy (H, W) of the view of this request, 255 = 1."""
 
-    inquiry: Inquiry
+    request: InspectionRequest
     entropy: Bytes
 
 
 @dataclass(frozen=True)
-class LookFailed:
+class ComparisonFailed:
     """Nothing came of it; the message is one line for people."""
 
-    inquiry: Inquiry
+    request: InspectionRequest
     message: str
 
 
-Seen = PairReady | PairScored | EntropyReady | LookFailed
+ComparisonResult = PairReady | PairScored | EntropyReady | ComparisonFailed
 
 
 def psnr_db(left: Bytes, right: Bytes) -> float:
@@ -95,8 +95,8 @@ def mean_flip(reference: Bytes, image: Bytes) -> float:
     return float(mean)
 
 
-class Looker:
-    """Carries inquiries out, in whatever thread calls it; keeps rays and the last pair from one inquiry to the next."""
+class ComparisonJob:
+    """Carries requests out, in whatever thread calls it; keeps rays and the last pair from one request to the next."""
 
     def __init__(self) -> None:
         self._rays: RaySet | None = None
@@ -107,37 +107,41 @@ class Looker:
         """Free what is kept."""
         self._rays = self._rays_of = self._pair = None
 
-    def seen(self, inquiry: Inquiry, inputs: Inputs, should_stop: Callable[[], bool]) -> Iterator[Seen]:
-        """What comes of a inquiry, in order. Raises InputError, or Cancelled once should_stop is true."""
-        if inquiry.kind == "entropy":
-            view = self._made(inquiry, inputs, "fast", should_stop)
+    def seen(
+        self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
+    ) -> Iterator[ComparisonResult]:
+        """What comes of a request, in order. Raises InputError, or Cancelled once should_stop is true."""
+        if request.kind == "entropy":
+            view = self._made(request, inputs, "fast", should_stop)
             assert view.entropy is not None
-            yield EntropyReady(inquiry, np.rint(np.clip(view.entropy, 0, 1) * 255).astype(np.uint8))
+            yield EntropyReady(request, np.rint(np.clip(view.entropy, 0, 1) * 255).astype(np.uint8))
             return
-        unscored = replace(inquiry, is_scored=False)
-        if self._pair is None or self._pair.inquiry != unscored:
-            self._pair = PairReady(unscored, *self._pair_of(inquiry, inputs, should_stop))
+        unscored = replace(request, is_scored=False)
+        if self._pair is None or self._pair.request != unscored:
+            self._pair = PairReady(unscored, *self._pair_of(request, inputs, should_stop))
             yield self._pair
-        if inquiry.is_scored and not should_stop():
+        if request.is_scored and not should_stop():
             left, right = self._pair.left, self._pair.right
-            yield PairScored(inquiry, psnr_db(left, right), mean_flip(right, left))
+            yield PairScored(request, psnr_db(left, right), mean_flip(right, left))
 
-    def _pair_of(self, inquiry: Inquiry, inputs: Inputs, should_stop: Callable[[], bool]) -> tuple[Bytes, Bytes]:
-        if inquiry.truth is not None:
+    def _pair_of(
+        self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
+    ) -> tuple[Bytes, Bytes]:
+        if request.truth is not None:
             from iibr_core.formats.light_fields.hci import read_view
 
-            truth = read_view(Path(inquiry.truth.path).expanduser(), *inquiry.view)
+            truth = read_view(Path(request.truth.path).expanduser(), *request.view)
             made = inputs.stored
             if made is None:
-                made = _bytes_of(self._made(inquiry, inputs, inputs.quality, should_stop).colors)
+                made = _bytes_of(self._made(request, inputs, inputs.quality, should_stop).colors)
             if truth.shape != made.shape:
-                raise InputError(f"{inquiry.truth.path}: its views have changed; choose the folder again")
+                raise InputError(f"{request.truth.path}: its views have changed; choose the folder again")
             return _bytes_of(made), _bytes_of(truth)
-        fast, exact = (self._made(inquiry, inputs, quality, should_stop) for quality in ("fast", "exact"))
+        fast, exact = (self._made(request, inputs, quality, should_stop) for quality in ("fast", "exact"))
         return _bytes_of(fast.colors), _bytes_of(exact.colors)
 
     def _made(
-        self, inquiry: Inquiry, inputs: Inputs, quality: Quality, should_stop: Callable[[], bool]
+        self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality, should_stop: Callable[[], bool]
     ) -> RenderedView:
         """The view by the ray set of the scene's plan, or at the ground truth's places; the middle one is the photo."""
         from iibr_core.generation.light_field import ray_set, transformer_for
@@ -146,74 +150,74 @@ class Looker:
         loaded, plan = inputs.loaded, inputs.plan
         assert loaded is not None
         assert plan is not None
-        grid = inquiry.truth.grid if inquiry.truth is not None else None
+        grid = request.truth.grid if request.truth is not None else None
         if grid is not None:
             plan = plan_literal(loaded.photo, loaded.disparity, grid)
-        if inquiry.view == plan.grid.centre:
+        if request.view == plan.grid.centre:
             nothing = np.zeros(loaded.photo.size, np.float32)
             nowhere = nothing.astype(np.bool_)
             return RenderedView(loaded.photo.pixels, nothing, nowhere, nowhere, nothing)
-        if self._rays is None or self._rays_of != (inquiry.generation, grid):
+        if self._rays is None or self._rays_of != (request.generation, grid):
             self._rays = None  # two sets would be large
             rays, farthest_views = ray_set(loaded.photo, plan.field_disparity(loaded.disparity), plan, should_stop)
             for _ in farthest_views:
                 pass
-            self._rays, self._rays_of = rays, (inquiry.generation, grid)
+            self._rays, self._rays_of = rays, (request.generation, grid)
         transformer, every = transformer_for(quality), quality == "exact"
-        with ViewSynthesis(should_stop, transformer, every, keeps_entropy=inquiry.kind == "entropy") as synthesis:
-            return synthesis.render(self._rays, plan.grid.offset(*inquiry.view))
+        with ViewSynthesis(should_stop, transformer, every, keeps_entropy=request.kind == "entropy") as synthesis:
+            return synthesis.render(self._rays, plan.grid.offset(*request.view))
 
 
-class SecondLook:
-    """The thread that carries out the newest inquiry. wake is called, in that thread, when something was found."""
+class ComparisonWorker:
+    """The thread that carries out the newest request. wake is called, in that thread, when something was found."""
 
     def __init__(self, wake: Callable[[], None]) -> None:
-        self.wanted: Inquiry | None = None
+        self.wanted: InspectionRequest | None = None
         self._wake = wake
-        self._looker = Looker()
-        self._found: queue.SimpleQueue[Seen] = queue.SimpleQueue()
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="iibr-second-inquiry")
+        self._comparison_job = ComparisonJob()
+        self._found: queue.SimpleQueue[ComparisonResult] = queue.SimpleQueue()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="iibr-comparison")
 
-    def want(self, inquiry: Inquiry | None, inputs: Inputs | None) -> None:
+    def want(self, request: InspectionRequest | None, inputs: ComparisonInputs | None) -> None:
         """Find this out instead of anything else; nothing happens if it is wanted already, or inputs are missing."""
-        if inquiry == self.wanted or (inquiry is not None and inputs is None):
+        if request == self.wanted or (request is not None and inputs is None):
             return
-        self.wanted = inquiry
-        if inquiry is not None and inputs is not None:
-            self._thread.submit(self._carry_out, inquiry, inputs)
+        self.wanted = request
+        if request is not None and inputs is not None:
+            self._thread.submit(self._carry_out, request, inputs)
         else:
-            self._thread.submit(self._looker.forget)
+            self._thread.submit(self._comparison_job.forget)
 
-    def found(self) -> list[Seen]:
-        """What came of the newest inquiry since the last call."""
+    def found(self) -> list[ComparisonResult]:
+        """What came of the newest request since the last call."""
         found = []
         while not self._found.empty():
             found.append(self._found.get())
-        return [seen for seen in found if _is_of(seen.inquiry, self.wanted)]
+        return [seen for seen in found if _is_of(seen.request, self.wanted)]
 
     def close(self) -> None:
         """Stop, and wait for the thread to end."""
         self.wanted = None
         self._thread.shutdown(cancel_futures=True)
 
-    def _carry_out(self, inquiry: Inquiry, inputs: Inputs) -> None:
+    def _carry_out(self, request: InspectionRequest, inputs: ComparisonInputs) -> None:
         from iibr_core.runtime.tiling import Cancelled
 
         try:
-            for seen in self._looker.seen(inquiry, inputs, lambda: self.wanted != inquiry):
-                self._tell(seen)
+            for seen in self._comparison_job.seen(request, inputs, lambda: self.wanted != request):
+                self._post(seen)
         except Cancelled:
             return
         except Exception as error:  # the one place where it can still be shown to the user
-            self._tell(LookFailed(inquiry, message_of(error)))
+            self._post(ComparisonFailed(request, message_of(error)))
 
-    def _tell(self, seen: Seen) -> None:
+    def _post(self, seen: ComparisonResult) -> None:
         self._found.put(seen)
         self._wake()
 
 
-def _is_of(inquiry: Inquiry, wanted: Inquiry | None) -> bool:
-    return wanted is not None and replace(inquiry, is_scored=wanted.is_scored) == wanted
+def _is_of(request: InspectionRequest, wanted: InspectionRequest | None) -> bool:
+    return wanted is not None and replace(request, is_scored=wanted.is_scored) == wanted
 
 
 def _bytes_of(colors: StoredColors | FloatImage) -> Bytes:

@@ -18,7 +18,7 @@ from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import Disparity, FloatImage, Photo
 from viewer.model.saved_settings import settings_text_in
 from viewer.model.state.app_state import Progress, Source
-from viewer.model.state.depth_editing import DepthWork
+from viewer.model.state.depth_editing import DepthSettings
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.brush import DepthCanvas
@@ -30,12 +30,12 @@ NOT_YET = 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class Loaded:
+class LoadedPhoto:
     """A photo as read and its disparity, kept so that another plan does not read them again.
 
-    disparity: what `work` made of what was `found`, by way of what was `refined`. origin: where it was found. settings:
-    text of the settings the photo was saved with by this program, "" without. models: names of the depth models on this
-    machine. levels: of what was refined. canvas: what the worker edits on; nobody else touches it.
+    disparity: what `depth_settings` made of what was `found`, by way of what was `refined`. origin: where it was found.
+    settings: text of the settings the photo was saved with by this program, "" without. models: names of the depth
+    models on this machine. levels: of what was refined. canvas: what the worker edits on; nobody else touches it.
     """
 
     photo: Photo
@@ -43,22 +43,22 @@ class Loaded:
     origin: DepthOrigin
     settings: str
     models: tuple[str, ...]
-    work: DepthWork
+    depth_settings: DepthSettings
     found: Disparity
     refined: Disparity
     levels: Levels
     canvas: DepthCanvas
 
 
-def load(
+def load_photo(
     source: Source,
     should_stop: ShouldStop = never,
-    tell: Callable[[Progress], None] = lambda progress: None,
-    work: DepthWork | None = None,
-) -> Loaded:
+    report_progress: Callable[[Progress], None] = lambda progress: None,
+    depth_settings: DepthSettings | None = None,
+) -> LoadedPhoto:
     """Read a photo and find its disparity, telling what is going on, not more often than people can see.
 
-    work: what to make of the disparity, None for what the source says. Raises InputError, and Cancelled once
+    depth_settings: what to make of the disparity, None for what the source says. Raises InputError, and Cancelled once
     should_stop is true.
     """
     from iibr_core.depth.search import open_with_depth
@@ -71,7 +71,7 @@ def load(
         now = time.perf_counter()
         if now - said_at.get(doing, -math.inf) >= TELL_EVERY_S:
             said_at[doing] = now
-            tell(Progress(doing=f"{doing}, {share:.0%}" if share else doing))
+            report_progress(Progress(doing=f"{doing}, {share:.0%}" if share else doing))
 
     path = Path(source.path)
     found = open_with_depth(
@@ -91,30 +91,32 @@ def load(
     )
     # This program saves no HEIC.
     settings = "" if is_heic(path) else settings_text_in(path)
-    return _with_work(found, settings, _models_here(), work or DepthWork(source.refine), should_stop)
+    return _prepare(found, settings, _models_here(), depth_settings or DepthSettings(source.refine), should_stop)
 
 
-def worked(loaded: Loaded, work: DepthWork, should_stop: ShouldStop = never) -> Loaded:
+def apply_depth_settings(
+    loaded: LoadedPhoto, depth_settings: DepthSettings, should_stop: ShouldStop = never
+) -> LoadedPhoto:
     """The same with something else made of its disparity; only what changed is worked out.
 
     Raises InputError, and Cancelled once should_stop is true.
     """
-    if loaded.work == work:
+    if loaded.depth_settings == depth_settings:
         return loaded
-    if loaded.work.refine != work.refine:
-        loaded = _refined(loaded, work.refine, should_stop)
-    values = loaded.canvas.shown(work.edits)
-    return replace(loaded, work=work, disparity=replace(loaded.refined, values=values))
+    if loaded.depth_settings.refine != depth_settings.refine:
+        loaded = _refine(loaded, depth_settings.refine, should_stop)
+    values = loaded.canvas.shown(depth_settings.edits)
+    return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
 
 
-def planned(source: Source, loaded: Loaded, depth_strength: float) -> ScenePlan:
+def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> ScenePlan:
     """The plan for viewing. What was not edited keeps its parallax: clips and strokes must not move all the rest.
 
     Raises InputError where an override is out of range.
     """
     zero = source.focus_disparity
-    if loaded.work.edits != UNEDITED:
-        zero = still_disparity(source, loaded.canvas.before_strokes(loaded.work.edits))
+    if loaded.depth_settings.edits != UNEDITED:
+        zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
         range_px, edited_px = (_robust_range(map_.values) for map_ in (loaded.refined, loaded.disparity))
         depth_strength *= edited_px / range_px if range_px else 1.0
     overrides = PlanOverrides(source.grid, depth_strength, zero, source.memory_bytes)
@@ -135,20 +137,24 @@ def prepare_brush() -> None:
     DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).shown(DepthEdits(strokes=strokes))
 
 
-def _with_work(
-    found: PhotoWithDepth, settings: str, models: tuple[str, ...], work: DepthWork, should_stop: ShouldStop
-) -> Loaded:
+def _prepare(
+    found: PhotoWithDepth,
+    settings: str,
+    models: tuple[str, ...],
+    depth_settings: DepthSettings,
+    should_stop: ShouldStop,
+) -> LoadedPhoto:
     from iibr_core.depth.editing.brush import DepthCanvas
 
     values = found.disparity
     canvas = DepthCanvas(found.photo.pixels, values.values)
-    as_found = DepthWork(NOT_YET)
+    as_found = DepthSettings(NOT_YET)
     levels = levels_of(values.values)
-    loaded = Loaded(found.photo, values, found.origin, settings, models, as_found, values, values, levels, canvas)
-    return worked(loaded, work, should_stop)
+    loaded = LoadedPhoto(found.photo, values, found.origin, settings, models, as_found, values, values, levels, canvas)
+    return apply_depth_settings(loaded, depth_settings, should_stop)
 
 
-def _refined(loaded: Loaded, strength: float, should_stop: ShouldStop) -> Loaded:
+def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> LoadedPhoto:
     from iibr_core.depth.editing.brush import DepthCanvas
     from iibr_core.depth.refine import refine
 

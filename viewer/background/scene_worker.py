@@ -1,8 +1,8 @@
 """The worker thread: reads a scene, plans it and makes its views, and hands each result over as soon as it is there.
 
-A frozen `Request` carries all the inputs, so there is nothing to lock. The newest request wins: the job before it stops
-at its next row band, and whatever it still had to say is dropped. The core's heavy imports happen in this thread, so
-the window comes first.
+A frozen `SceneRequest` carries all the inputs, so there is nothing to lock. The newest request wins: the job before it
+stops at its next row band, and whatever it still had to say is dropped. The core's heavy imports happen in this
+thread, so the window comes first.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 from iibr_core.color import stored_from_encoded
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import FloatImage, InputError, Photo, ViewOffset, ViewUpdate
-from viewer.background.loaded_photo import Loaded, load, planned, prepare_brush, worked
+from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
 from viewer.model.state.app_state import CENTRE, Progress, Scene, Source
-from viewer.model.state.depth_editing import DepthWork
+from viewer.model.state.depth_editing import DepthSettings
 
 QUEUED_RESULTS = 8
 """Results that may wait for the window: enough to keep the worker busy, few enough to cost no memory."""
@@ -35,14 +35,14 @@ POST_RETRY_S = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Request:
-    """One job with all its inputs. work: what is made of the photo's depth, None for what the source says."""
+class SceneRequest:
+    """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says."""
 
     generation: int
     source: Source
     depth_strength: float = 1.0
-    loaded: Loaded | None = None
-    work: DepthWork | None = None
+    loaded: LoadedPhoto | None = None
+    depth_settings: DepthSettings | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class SceneReady:
 
     generation: int
     scene: Scene
-    loaded: Loaded | None
+    loaded: LoadedPhoto | None
     centre: ViewUpdate
 
 
@@ -65,7 +65,7 @@ class ViewReady:
 
 
 @dataclass(frozen=True, eq=False)
-class Doing:
+class ProgressReport:
     """What the job is busy with before there is a scene."""
 
     generation: int
@@ -80,12 +80,12 @@ class Failed:
     message: str
 
 
-Result = SceneReady | ViewReady | Doing | Failed
-Work = Callable[[Request, Callable[[], bool], Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
+SceneResult = SceneReady | ViewReady | ProgressReport | Failed
+Work = Callable[[SceneRequest, Callable[[], bool], Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
 """What a job does: (request, should_stop, where the user looks) -> its results, in order. See `results_of`."""
 
 
-class Worker:
+class SceneWorker:
     """One thread that carries out the newest request.
 
     wake is called (in that thread) when a result was posted. work is what a job does, `results_of` by default.
@@ -98,13 +98,13 @@ class Worker:
         """Whether the thread ended unasked. The next request starts another one."""
         self._wake = wake
         self._work = work or self._results_of
-        self._results: queue.Queue[Result] = queue.Queue(QUEUED_RESULTS)
+        self._results: queue.Queue[SceneResult] = queue.Queue(QUEUED_RESULTS)
         self._changed = threading.Condition()
-        self._wanted: Request | None = None
+        self._wanted: SceneRequest | None = None
         self._is_closed = False
         self._thread = self._started_thread()
 
-    def submit(self, request: Request) -> None:
+    def submit(self, request: SceneRequest) -> None:
         """Start this job; the one before it is cancelled. A lost thread is replaced."""
         with self._changed:
             self._wanted = request
@@ -120,7 +120,7 @@ class Worker:
             self._wanted = None
             self._changed.notify()
 
-    def next_result(self) -> Result | None:
+    def next_result(self) -> SceneResult | None:
         """The next result of the newest request, or None. Results of earlier requests are dropped here."""
         while True:
             try:
@@ -151,7 +151,7 @@ class Worker:
             self._wake()
 
     def _run(self) -> None:
-        request: Request | None = None
+        request: SceneRequest | None = None
         while True:
             with self._changed:
                 while self._wanted is request and not self._is_closed:
@@ -162,7 +162,7 @@ class Worker:
             if request is not None:
                 self._carry_out(request)
 
-    def _carry_out(self, request: Request) -> None:
+    def _carry_out(self, request: SceneRequest) -> None:
         def should_stop() -> bool:
             return self._is_closed or self._wanted is not request
 
@@ -175,16 +175,16 @@ class Worker:
             self._post(Failed(request.generation, message_of(error)), should_stop)
 
     def _results_of(
-        self, request: Request, should_stop: Callable[[], bool], nearest_to: Callable[[], ViewOffset]
+        self, request: SceneRequest, should_stop: Callable[[], bool], nearest_to: Callable[[], ViewOffset]
     ) -> Iterator[SceneReady | ViewReady]:
         """`results_of`, what it is busy with posted as it goes."""
 
-        def tell(progress: Progress) -> None:
-            self._post(Doing(request.generation, progress), should_stop)
+        def report_progress(progress: Progress) -> None:
+            self._post(ProgressReport(request.generation, progress), should_stop)
 
-        return results_of(request, should_stop, nearest_to, tell)
+        return results_of(request, should_stop, nearest_to, report_progress)
 
-    def _post(self, result: Result, should_stop: Callable[[], bool]) -> None:
+    def _post(self, result: SceneResult, should_stop: Callable[[], bool]) -> None:
         while not should_stop():
             try:
                 self._results.put(result, timeout=POST_RETRY_S)
@@ -201,10 +201,10 @@ def message_of(error: Exception) -> str:
 
 
 def results_of(
-    request: Request,
+    request: SceneRequest,
     should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
-    tell: Callable[[Progress], None] = lambda progress: None,
+    report_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Iterator[SceneReady | ViewReady]:
     """Everything a job has to say, in order: the scene, then each of its views. tell: what it does until then.
 
@@ -215,10 +215,10 @@ def results_of(
     if is_light_field_folder(Path(request.source.path)):
         yield from _results_of_folder(request, should_stop)
     else:
-        yield from _results_of_photo(request, should_stop, nearest_to, tell)
+        yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
 
 
-def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
+def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:
     """What the viewer says about a photo and its plan."""
     height, width = loaded.photo.size
     return Scene(
@@ -233,7 +233,7 @@ def scene_of_photo(source: Source, loaded: Loaded, plan: ScenePlan) -> Scene:
         plan=plan,
         notes=loaded.photo.notes + loaded.disparity.notes,
         focal_px=_known_focal_px(loaded.photo),
-        subject_disparity_px=_middle(plan.field_disparity(loaded.disparity).values),
+        subject_disparity_px=_centre_first(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
         depth_origin=loaded.origin,
         levels=loaded.levels,
@@ -248,7 +248,7 @@ def _known_focal_px(photo: Photo) -> float | None:
     return None if photo.focal_px == focal_px_from_fov(photo.size[1]) else photo.focal_px
 
 
-def _middle(disparity: FloatImage) -> float:
+def _centre_first(disparity: FloatImage) -> float:
     """The median of the middle ninth of the picture."""
     height, width = disparity.shape
     part = disparity[height // 3 : height - height // 3, width // 3 : width - width // 3]
@@ -256,17 +256,19 @@ def _middle(disparity: FloatImage) -> float:
 
 
 def _results_of_photo(
-    request: Request,
+    request: SceneRequest,
     should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
-    tell: Callable[[Progress], None],
+    report_progress: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
-    work = request.work or DepthWork(source.refine)
+    depth_settings = request.depth_settings or DepthSettings(source.refine)
     loaded = (
-        load(source, should_stop, tell, work) if request.loaded is None else worked(request.loaded, work, should_stop)
+        load_photo(source, should_stop, report_progress, depth_settings)
+        if request.loaded is None
+        else apply_depth_settings(request.loaded, depth_settings, should_stop)
     )
-    plan = planned(source, loaded, request.depth_strength)
+    plan = make_plan(source, loaded, request.depth_strength)
     disparity = plan.field_disparity(loaded.disparity)
     colors = stored_from_encoded(loaded.photo.pixels, loaded.photo.is_hdr)
     centre = ViewUpdate(*plan.grid.centre, colors, disparity.values)
@@ -275,12 +277,12 @@ def _results_of_photo(
     from iibr_core.generation.light_field import generate
 
     views = generate(loaded.photo, disparity, plan, should_stop, nearest_to, source.quality)
-    yield from _counted(request.generation, views, plan.grid.rows * plan.grid.columns)
+    yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
     if not should_stop():
         prepare_brush()
 
 
-def _results_of_folder(request: Request, should_stop: Callable[[], bool]) -> Iterator[SceneReady | ViewReady]:
+def _results_of_folder(request: SceneRequest, should_stop: Callable[[], bool]) -> Iterator[SceneReady | ViewReady]:
     """The light field of a folder. Its first two views tell whether each brings its disparity."""
     from iibr_core.formats.light_fields.hci import read_light_field
 
@@ -296,11 +298,11 @@ def _results_of_folder(request: Request, should_stop: Callable[[], bool]) -> Ite
         depth_source="light field" if first[0].disparity is not None else "none",
         is_hdr=header.is_hdr,
         has_view_disparity=all(view.disparity is not None for view in first),
-        subject_disparity_px=_middle(first[0].disparity) if first[0].disparity is not None else 0.0,
+        subject_disparity_px=_centre_first(first[0].disparity) if first[0].disparity is not None else 0.0,
     )
     yield SceneReady(request.generation, scene, None, first[0])
     rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain(first, views))
-    yield from _counted(request.generation, rest, header.grid.rows * header.grid.columns)
+    yield from _count_views(request.generation, rest, header.grid.rows * header.grid.columns)
 
 
 def _range_of(disparity: FloatImage | None) -> tuple[float, float]:
@@ -309,7 +311,7 @@ def _range_of(disparity: FloatImage | None) -> tuple[float, float]:
     return float(disparity.min()), float(disparity.max())
 
 
-def _counted(generation: int, views: Iterator[ViewUpdate], total: int) -> Iterator[ViewReady]:
+def _count_views(generation: int, views: Iterator[ViewUpdate], total: int) -> Iterator[ViewReady]:
     start = time.perf_counter()
     for done, view in enumerate(views, 1):
         yield ViewReady(generation, view, Progress(done, total, time.perf_counter() - start))

@@ -12,7 +12,7 @@ import typer
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.types import InputError, Quality
 from viewer.cli.options import DepthModel, MaxPixels, Refine, quality_from_text
-from viewer.cli.terminal import print_notes, progress_shown
+from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
     from iibr_core.evaluation.trials import DisparityFrom
@@ -75,12 +75,12 @@ def evaluate(
     require_report_folder(out)
     chosen: tuple[Quality, ...] = tuple(dict.fromkeys(quality)) if quality else QUALITIES
     options = Options(
-        _source(disparity), DepthChoice(model=depth_model, refine=refine), chosen,
+        _disparity_source(disparity), DepthChoice(model=depth_model, refine=refine), chosen,
         max_pixels or DEFAULT_MAX_PIXELS, views, lpips,
     )  # fmt: skip
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
     judgements = []
-    with progress_shown("reading") as show:
+    with show_progress("reading") as show:
         for scene in scenes:
             found = judge(scene, options, lambda done, total, doing: show(done, total, doing))
             judgements += found
@@ -92,7 +92,7 @@ def evaluate(
     print(out / "index.html")
 
 
-def _source(text: str) -> DisparityFrom | Path:
+def _disparity_source(text: str) -> DisparityFrom | Path:
     """Where disparity comes from. Raises InputError for what is neither a word nor a file."""
     from iibr_core.evaluation.trials import DisparityFrom
 

@@ -38,7 +38,7 @@ from viewer.cli.options import (
     size_from_text,
     view_from_text,
 )
-from viewer.cli.terminal import Commands, print_depth, print_notes, progress_shown
+from viewer.cli.terminal import Commands, print_depth, print_notes, show_progress
 
 if TYPE_CHECKING:
     from viewer.model.state.app_state import Source
@@ -143,12 +143,12 @@ def view(
     _require_existing(source)
     if ground_truth is not None and not ground_truth.is_dir():
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
-    from viewer.app.main_loop import opening, run
+    from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath
 
     truth = str(ground_truth.absolute()) if ground_truth else None
-    run(opening(OpenPath(source), depth_strength, truth), user_folder())
+    run(initial_state(OpenPath(source), depth_strength, truth), user_folder())
 
 
 @app.command()
@@ -174,17 +174,19 @@ def generate(
     from iibr_core.formats.light_fields.hci import HciWriter
     from iibr_core.generation.light_field import generate as generated
     from iibr_core.generation.plan import plan_literal
-    from viewer.background.scene_worker import load
+    from viewer.background.loaded_photo import load_photo
 
     ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
-    with progress_shown("reading") as show:
-        loaded = load(_source(photo, ways, grid, None, max_pixels), tell=lambda progress: show(0, 0, progress.doing))
+    with show_progress("reading") as show:
+        loaded = load_photo(
+            _source(photo, ways, grid, None, max_pixels), report_progress=lambda progress: show(0, 0, progress.doing)
+        )
     print_notes(loaded.photo.notes + loaded.disparity.notes)
     plan = plan_literal(loaded.photo, loaded.disparity, grid, memory)
     total = grid.rows * grid.columns
     with (
         HciWriter(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
-        progress_shown("making views") as show,
+        show_progress("making views") as show,
         closing(generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality)) as views,
     ):
         seconds = 0.0
@@ -251,13 +253,13 @@ def screenshot(
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import is_float, write_picture
     from viewer.model.actions import Action, MoveEye, SetAperture, SetFocus, TakeSettings
-    from viewer.model.saved_settings import decided_like, read_settings
+    from viewer.model.saved_settings import read_settings, source_like
 
     actions: list[Action] = []
     edits = UNEDITED
     if like is not None:
         saved, given = read_settings(like), given_options(context)
-        source = decided_like(source, saved, given)
+        source = source_like(source, saved, given)
         size = size or (None if ui else Size(*saved.size_px))
         depth_strength = depth_strength if "depth_strength" in given else saved.depth_strength
         edits = saved.depth_edits
@@ -268,7 +270,7 @@ def screenshot(
     with HeadlessViewer(backend.value) as viewer:
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
-        with progress_shown("reading") as show:
+        with show_progress("reading") as show:
             viewer.open(source, depth_strength, lambda made: show(made.done, made.total, made.doing), edits)
         if viewer.state.scene is not None:
             print_depth(viewer.state.scene.depth_origin)
@@ -301,10 +303,10 @@ def plan(
     Example: iibr plan photo.png --disparity photo.pfm
     """
     from iibr_core.generation.plan import PlanOverrides, plan_for_viewing
-    from viewer.background.scene_worker import load
+    from viewer.background.loaded_photo import load_photo
 
     ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
-    loaded = load(_source(photo, ways, grid, focus_disparity, max_pixels))
+    loaded = load_photo(_source(photo, ways, grid, focus_disparity, max_pixels))
     chosen = plan_for_viewing(
         loaded.photo, loaded.disparity, PlanOverrides(grid, depth_strength, focus_disparity, memory)
     )
@@ -348,14 +350,14 @@ def demo() -> None:
 
     Example: iibr demo
     """
-    from viewer.app.main_loop import App, opening
+    from viewer.app.main_loop import App, initial_state
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath
     from viewer.model.state.app_state import Source
 
     source = Source(str(_demo_photo()))
     try:
-        window = App(opening(OpenPath(source)), user_folder())
+        window = App(initial_state(OpenPath(source)), user_folder())
     except InputError as error:
         print(f"{error}. Rendering without one.")
         _demo_pictures(source)
@@ -373,7 +375,7 @@ def _demo_pictures(source: Source) -> None:
 
     DEMO_FOLDER.mkdir(exist_ok=True)
     with HeadlessViewer() as viewer:
-        with progress_shown("reading") as show:
+        with show_progress("reading") as show:
             viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total, progress.doing))
         write_image(DEMO_FOLDER / "demo.png", viewer.screen(DEMO_SIZE) if viewer.has_panels else viewer.picture())
         write_image(DEMO_FOLDER / "demo-views.png", contact_sheet(viewer))

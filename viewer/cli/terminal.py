@@ -37,7 +37,7 @@ def print_depth(origin: DepthOrigin | None) -> None:
 
 
 @contextmanager
-def progress_shown(doing: str) -> Iterator[Callable[..., None]]:
+def show_progress(doing: str) -> Iterator[Callable[..., None]]:
     """A bar on stderr while the block runs; call what is yielded with (done, total, what is being done)."""
     from rich.console import Console
     from rich.progress import Progress

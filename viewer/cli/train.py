@@ -50,26 +50,26 @@ def train_weights(
         return training_batch(step, seed)
 
     try:
-        with _bar_shown() as show:
+        with _show_bar() as show:
             trainer.train(model, batches, config, out, resume=resume, metadata={"command": published}, progress=show)
     except KeyboardInterrupt:
         if not trainer.checkpoint_path(out).is_file():
-            return _ended("interrupted before the first step was done", EXIT_INTERRUPTED)
+            return _report_end("interrupted before the first step was done", EXIT_INTERRUPTED)
         again = command if resume else f"{command} --resume"
-        return _ended(f"interrupted; what was learned is saved, go on with: {again}", EXIT_INTERRUPTED)
+        return _report_end(f"interrupted; what was learned is saved, go on with: {again}", EXIT_INTERRUPTED)
     except trainer.TrainingDiverged as error:
-        return _ended(str(error), EXIT_DIVERGED)
+        return _report_end(str(error), EXIT_DIVERGED)
     print(f"{out}: {out.stat().st_size / 1000:.1f} kB after {steps} steps")
     return 0
 
 
-def _ended(message: str, code: int) -> int:
+def _report_end(message: str, code: int) -> int:
     print(f"iibr: {message}", file=sys.stderr)
     return code
 
 
 @contextmanager
-def _bar_shown() -> Iterator[Callable[[int, int, float], None]]:
+def _show_bar() -> Iterator[Callable[[int, int, float], None]]:
     """A bar on stderr while the block runs; call what is yielded with (step, steps, loss)."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn

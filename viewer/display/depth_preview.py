@@ -1,6 +1,6 @@
 """Shows what is being done to the depth at once: the photo, warped by the edited disparity, in place of its views.
 
-Which edits the views on the stage were made with is compared with those the state wants; that decides everything.
+Which edits the views on the screen were made with is compared with those the state wants; that decides everything.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.depth.editing.edits import DepthEdits
-from viewer.background.loaded_photo import Loaded, still_disparity
-from viewer.display.scene_view import Stage
-from viewer.model.reducers.depth_editing import wanted_work
+from viewer.background.loaded_photo import LoadedPhoto, still_disparity
+from viewer.display.scene_view import SceneView
+from viewer.model.reducers.depth_editing import current_depth_settings
 from viewer.model.state.app_state import AppState, Scene
 
 if TYPE_CHECKING:
@@ -22,28 +22,28 @@ if TYPE_CHECKING:
 class DepthPreview:
     """Keeps a canvas of its own, of the scene on the stage; called from the one GL thread."""
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
-        self._loaded: Loaded | None = None
+    def __init__(self, scene_view: SceneView) -> None:
+        self._scene_view = scene_view
+        self._loaded: LoadedPhoto | None = None
         self._canvas: DepthCanvas | None = None
         self._shown: DepthEdits | None = None
         self._still: tuple[DepthEdits, float] | None = None
 
     def update(self, state: AppState) -> None:
-        """Show the edits this state wants, if the stage shows others. Raises InputError where they make no sense."""
-        loaded, scene = self._stage.loaded, state.scene
-        if loaded is None or scene is None or scene.plan is None or self._stage.generation > state.generation:
+        """Show the edits this state wants, if the screen shows others. Raises InputError where they make no sense."""
+        loaded, scene = self._scene_view.loaded, state.scene
+        if loaded is None or scene is None or scene.plan is None or self._scene_view.generation > state.generation:
             return
         if loaded is not self._loaded:
             if self._loaded is None or loaded.refined is not self._loaded.refined:
                 self._canvas = self._still = None
-            self._loaded, self._shown = loaded, loaded.work.edits
-        wanted = wanted_work(state).edits
+            self._loaded, self._shown = loaded, loaded.depth_settings.edits
+        wanted = current_depth_settings(state).edits
         if wanted != self._shown and scene.source is state.source:
-            self._stage.show_disparity(self._field_disparity(wanted, scene, loaded))
+            self._scene_view.show_disparity(self._field_disparity(wanted, scene, loaded))
             self._shown = wanted
 
-    def _field_disparity(self, edits: DepthEdits, scene: Scene, loaded: Loaded) -> np.ndarray:
+    def _field_disparity(self, edits: DepthEdits, scene: Scene, loaded: LoadedPhoto) -> np.ndarray:
         """In px per view step of the plan that the views before were made with."""
         from iibr_core.depth.editing.brush import DepthCanvas
 

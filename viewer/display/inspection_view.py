@@ -13,15 +13,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.types import ViewUpdate
-from viewer.background.comparison_worker import EntropyReady, Inputs, LookFailed, PairReady, PairScored, Seen
-from viewer.display.scene_view import Stage
+from viewer.background.comparison_worker import (
+    ComparisonFailed,
+    ComparisonInputs,
+    ComparisonResult,
+    EntropyReady,
+    PairReady,
+    PairScored,
+)
+from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
-from viewer.gpu.inspection_passes import Cell, InspectionPasses, Line, OverlayStyle
+from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle, SheetCell
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model.actions import Action, Notify
 from viewer.model.colormap import VIRIDIS
-from viewer.model.inspection_request import NO_AIDS, Aids, Inquiry, sheet_cells, view_near
+from viewer.model.inspection_request import (
+    NO_INSPECTION_TEXTURES,
+    InspectionRequest,
+    InspectionTextures,
+    sheet_cells,
+    view_near,
+)
 from viewer.model.layout import Layout, Rect
 from viewer.model.state.app_state import AppState, Hover, Notice, Scene
 from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
@@ -30,7 +43,7 @@ INPAINTED_RGB = (255, 184, 60)
 
 
 @dataclass(frozen=True)
-class _Base:
+class _ViewImage:
     """What images depend on: the field, how many of its views are there, brightness as a factor, how often edited depth
     was shown in its place.
     """
@@ -41,12 +54,12 @@ class _Base:
     previews: int
 
 
-class LightTable:
+class InspectionView:
     """Draws what the state asks for, and keeps what views say beside their colours."""
 
-    def __init__(self, gl: GLContext, stage: Stage) -> None:
-        self._stage = stage
-        self._passes = InspectionPasses(gl.ctx, stage.renderer.programs)
+    def __init__(self, gl: GLContext, scene_view: SceneView) -> None:
+        self._scene_view = scene_view
+        self._passes = InspectionPasses(gl.ctx, scene_view.renderer.programs)
         self._drawn: dict[str, tuple[object, int]] = {}
         self._on_sheet: frozenset[ViewIndex] = frozenset()
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
@@ -55,7 +68,7 @@ class LightTable:
         self._probed: tuple[object, Probe | None] = (None, None)
 
     def open(self) -> None:
-        """Another scene is on the stage."""
+        """Another scene is on the screen."""
         self._inpainted.clear()
         self._drawn.clear()
         self._entropy = self._pair = None
@@ -65,58 +78,71 @@ class LightTable:
         if view.inpainted is not None:
             self._inpainted[view.row, view.column] = np.packbits(view.inpainted, axis=1)
 
-    def draw(self, state: AppState, layout: Layout) -> Aids:
+    def draw(self, state: AppState, layout: Layout) -> InspectionTextures:
         """Draw what changed and say where it is."""
-        scene, field = state.scene, self._stage.renderer.field
+        scene, field = state.scene, self._scene_view.renderer.field
         if scene is None or field is None or layout.picture_px is None or not field.present.any():
-            return NO_AIDS
+            return NO_INSPECTION_TEXTURES
         exposure = 2.0**state.optics.exposure_stops
-        base = _Base(self._stage.generation, self._stage.views_present, exposure, self._stage.previews)
+        base = _ViewImage(
+            self._scene_view.generation, self._scene_view.views_present, exposure, self._scene_view.previews
+        )
         if field.grid != scene.grid:  # only the photo's own view is there, or what is being done to its depth
             overlay = self._overlay(state, scene, field, layout.picture_px[2:], base)
-            return Aids(overlay=overlay, shown=(self._drawn["overlay"][0],) if overlay else ())
+            return InspectionTextures(overlay=overlay, shown=(self._drawn["overlay"][0],) if overlay else ())
         names = self._strips(state, scene, field, layout, base)
         names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
         names["overlay"] = self._overlay(state, scene, field, layout.picture_px[2:], base)
         names |= self._compared(state, scene, field, base)
-        return Aids(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
+        return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
 
     def probe(self, state: AppState) -> Probe | None:
         """What is known of the picture under the pointer, where that is asked for."""
-        scene, hover, field = state.scene, state.hover, self._stage.renderer.field
+        scene, hover, field = state.scene, state.hover, self._scene_view.renderer.field
         if scene is None or hover is None or field is None or not state.inspection.shows_values:
             return None
-        asked = hover, state.optics, self._stage.generation, self._stage.views_present, self._stage.report
+        asked = (
+            hover,
+            state.optics,
+            self._scene_view.generation,
+            self._scene_view.views_present,
+            self._scene_view.report,
+        )
         if self._probed[0] != asked:
             self._probed = asked, self._found_at(hover, state, scene, field)
         return self._probed[1]
 
-    def inputs(self, inquiry: Inquiry | None, state: AppState) -> Inputs | None:
-        """What this inquiry is made from; None while that is not there."""
-        scene, stage = state.scene, self._stage
-        if inquiry is None or scene is None or stage.generation != inquiry.generation or stage.renderer.field is None:
+    def inputs(self, request: InspectionRequest | None, state: AppState) -> ComparisonInputs | None:
+        """What this request is made from; None while that is not there."""
+        scene, scene_view = state.scene, self._scene_view
+        if (
+            request is None
+            or scene is None
+            or scene_view.generation != request.generation
+            or scene_view.renderer.field is None
+        ):
             return None
-        if stage.loaded is not None and scene.plan is not None:
-            return Inputs(scene.source.quality, stage.loaded, scene.plan)
-        if stage.renderer.field.grid != scene.grid:
+        if scene_view.loaded is not None and scene.plan is not None:
+            return ComparisonInputs(scene.source.quality, scene_view.loaded, scene.plan)
+        if scene_view.renderer.field.grid != scene.grid:
             return None
-        stored = self._passes.read_view(stage.renderer.field, *inquiry.view)
-        return None if stored is None else Inputs(scene.source.quality, stored=stored)
+        stored = self._passes.read_view(scene_view.renderer.field, *request.view)
+        return None if stored is None else ComparisonInputs(scene.source.quality, stored=stored)
 
-    def take(self, seen: Seen) -> list[Action]:
-        """Show what the second inquiry found."""
-        inquiry = seen.inquiry
+    def take(self, seen: ComparisonResult) -> list[Action]:
+        """Show what the second request found."""
+        request = seen.request
         match seen:
             case PairReady():
                 self._pair = seen
-                return [PairCompared(Pair(inquiry.generation, _comparison_of(inquiry), inquiry.view))]
+                return [PairCompared(Pair(request.generation, _comparison_of(request), request.view))]
             case PairScored(_, psnr_db, flip):
-                return [PairCompared(Pair(inquiry.generation, _comparison_of(inquiry), inquiry.view, psnr_db, flip))]
+                return [PairCompared(Pair(request.generation, _comparison_of(request), request.view, psnr_db, flip))]
             case EntropyReady():
                 self._entropy = seen
                 return []
-            case LookFailed(_, message):
-                off = SetOverlay(None) if inquiry.kind == "entropy" else Compare(None)
+            case ComparisonFailed(_, message):
+                off = SetOverlay(None) if request.kind == "entropy" else Compare(None)
                 return [Notify(Notice(message, is_error=True)), off]
 
     def release(self) -> None:
@@ -130,7 +156,7 @@ class LightTable:
         return self._drawn[name][1]
 
     def _strips(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _Base
+        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _ViewImage
     ) -> dict[str, int | None]:
         names: dict[str, int | None] = {"strip_across": None, "strip_down": None}
         x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
@@ -146,7 +172,7 @@ class LightTable:
                 names[name] = self._once(name, (base, line, size_px), draw)
         return names
 
-    def _sheet(self, field: LightFieldTexture, layout: Layout, base: _Base) -> int:
+    def _sheet(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int:
         """All views; those that came since the last time are added."""
         assert layout.picture is not None
         size_px = layout.in_pixels(layout.picture)[2:]
@@ -165,7 +191,7 @@ class LightTable:
         return name
 
     def _overlay(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, size_px: tuple[int, int], base: _Base
+        self, state: AppState, scene: Scene, field: LightFieldTexture, size_px: tuple[int, int], base: _ViewImage
     ) -> int | None:
         kind, optics = state.inspection.overlay, state.optics
         row, column = view_near(optics.eye, field.grid)
@@ -177,9 +203,9 @@ class LightTable:
         if kind == "inpainted":
             values = self._mask_of(view, field)
         elif kind == "entropy":
-            if self._entropy is None or self._entropy.inquiry.generation != base.generation:
+            if self._entropy is None or self._entropy.request.generation != base.generation:
                 return None
-            looked_up, values = self._entropy.inquiry, self._entropy.entropy
+            looked_up, values = self._entropy.request, self._entropy.entropy
             view = looked_up.view
         colors = (INPAINTED_RGB,) * len(VIRIDIS) if kind == "inpainted" else VIRIDIS
         ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
@@ -200,15 +226,17 @@ class LightTable:
             return np.zeros((field.height, field.width), np.uint8)
         return np.unpackbits(packed, axis=1, count=field.width) * np.uint8(255)
 
-    def _compared(self, state: AppState, scene: Scene, field: LightFieldTexture, base: _Base) -> dict[str, int | None]:
+    def _compared(
+        self, state: AppState, scene: Scene, field: LightFieldTexture, base: _ViewImage
+    ) -> dict[str, int | None]:
         kind, pair = state.inspection.comparison, self._pair
         if kind == "photo":
             draw = partial(self._passes.draw_view, field, *scene.grid.centre, "photo", base.exposure)
             return {"left": self._once("left", (base.generation, base.exposure), draw), "right": None}
-        if kind is None or pair is None or (pair.inquiry.generation, pair.inquiry.kind) != (base.generation, kind):
+        if kind is None or pair is None or (pair.request.generation, pair.request.kind) != (base.generation, kind):
             return {"left": None, "right": None}
-        left = self._once("left", (pair.inquiry, "left"), lambda: self._passes.show("left", pair.left))
-        right = self._once("right", (pair.inquiry, "right"), lambda: self._passes.show("right", pair.right))
+        left = self._once("left", (pair.request, "left"), lambda: self._passes.show("left", pair.left))
+        right = self._once("right", (pair.request, "right"), lambda: self._passes.show("right", pair.right))
         return {"left": left, "right": right}
 
     def _found_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
@@ -217,7 +245,7 @@ class LightTable:
             shows = self._passes.seen_in(field, state.optics.eye, hover.x_px, hover.y_px, hover.disparity)
             seen = int(shows.sum())
         at = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
-        rgb = self._stage.renderer.read_pixel(*at)
+        rgb = self._scene_view.renderer.read_pixel(*at)
         return Probe(rgb, seen, int(field.present.sum()), self._origin(hover, state, scene, field))
 
     def _origin(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Origin:
@@ -237,11 +265,11 @@ class LightTable:
         return "photo" if eye == scene.grid.offset(*scene.grid.centre) else "generated"
 
 
-def _comparison_of(inquiry: Inquiry) -> Comparison:
-    assert inquiry.kind != "entropy"
-    return inquiry.kind
+def _comparison_of(request: InspectionRequest) -> Comparison:
+    assert request.kind != "entropy"
+    return request.kind
 
 
-def _whole(cell: Rect) -> Cell:
+def _whole(cell: Rect) -> SheetCell:
     left, top = round(cell.x), round(cell.y)
-    return Cell(left, top, max(round(cell.x + cell.width) - left, 1), max(round(cell.y + cell.height) - top, 1))
+    return SheetCell(left, top, max(round(cell.x + cell.width) - left, 1), max(round(cell.y + cell.height) - top, 1))

@@ -28,10 +28,10 @@ def pick_disparity(maps: Mapping[ViewOffset, FloatImage], eye: ViewOffset, x_px:
         return None
     offset = min(maps, key=lambda o: (o.t - eye.t) ** 2 + (o.s - eye.s) ** 2)
     step = ViewOffset(eye.t - offset.t, eye.s - offset.s)
-    return _seen_at(maps[offset], step, x_px, y_px)
+    return _disparity_at(maps[offset], step, x_px, y_px)
 
 
-def _seen_at(disparity: FloatImage, step: ViewOffset, x_px: float, y_px: float) -> float:
+def _disparity_at(disparity: FloatImage, step: ViewOffset, x_px: float, y_px: float) -> float:
     rows, columns = _rows_and_columns_that_may_land(disparity, step, x_px, y_px)
     values = disparity[rows, columns]
     y, x = np.mgrid[rows, columns]

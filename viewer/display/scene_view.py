@@ -14,7 +14,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
-from viewer.background.loaded_photo import Loaded
+from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.gpu.context import GLContext
@@ -34,7 +34,7 @@ WAITING_VIEWS = 4
 PREVIEW_GRID = GridShape(1, 1)
 
 
-class Stage:
+class SceneView:
     """Holds the renderer and the views of the scene that is shown.
 
     generation: whose views these are. previews: of edited depth shown so far. views_present: uploaded so far.
@@ -45,7 +45,7 @@ class Stage:
         self._gl = gl
         self.renderer = Renderer(gl)
         self.generation = 0
-        self.loaded: Loaded | None = None
+        self.loaded: LoadedPhoto | None = None
         self.views_present = 0
         self.pictures_drawn = 0
         self.previews = 0

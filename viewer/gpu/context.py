@@ -1,15 +1,12 @@
-"""OpenGL 3.3 core contexts: what they can do, and those without a window (EGL, else OSMesa, a software renderer)."""
+"""An OpenGL 3.3 core context and what it can do."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import moderngl
 
-from iibr_core.types import InputError
-
-Backend = Literal["auto", "egl", "osmesa"]
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader", "swr", "software", "basic render")
 
 
@@ -44,11 +41,6 @@ class GLContext:
         """First guess at what reading a texel costs a pixel; what is measured then replaces it."""
         return 3e-9 if self.is_software else 4e-11
 
-    def clear_screen(self, red: float = 0.0, green: float = 0.0, blue: float = 0.0) -> None:
-        """Fill the window with one colour and leave it bound for drawing."""
-        self.ctx.screen.use()
-        self.ctx.screen.clear(red, green, blue, 1.0)
-
     def release(self) -> None:
         """Free the context; a second call does nothing."""
         if self.ctx is None:
@@ -57,34 +49,3 @@ class GLContext:
         self.ctx = None
         if self._close is not None:
             self._close()
-
-
-def create_headless(backend: Backend = "auto") -> GLContext:
-    """A GL 3.3 core context without a display, current on return: EGL, else OSMesa.
-
-    Raises InputError where none can be made, naming what was tried and the packages to install.
-    """
-    makers = {"egl": _create_egl, "osmesa": _create_osmesa}
-    failures = []
-    for name in makers if backend == "auto" else (backend,):
-        try:
-            return makers[name]()
-        except InputError as error:
-            failures.append(str(error))
-    raise InputError("no OpenGL 3.3 without a display: " + "; ".join(failures))
-
-
-def _create_egl() -> GLContext:
-    try:
-        settings: dict[str, Any] = {"backend": "egl"}
-        ctx = moderngl.create_context(require=330, standalone=True, **settings)
-    except Exception as error:  # the loader raises plain Exception, whatever went wrong
-        reason = str(error).partition("\n")[0]
-        raise InputError(f"egl: {reason} (install libegl1 and libgl1-mesa-dri)") from error
-    return GLContext(ctx, "egl")
-
-
-def _create_osmesa() -> GLContext:
-    from viewer.gpu.glfw_context import create_osmesa  # GLFW takes its time, and the usual way needs none of it
-
-    return create_osmesa()

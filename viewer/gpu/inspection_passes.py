@@ -45,7 +45,7 @@ class Line(NamedTuple):
     is_upright: bool = False
 
 
-class Cell(NamedTuple):
+class SheetCell(NamedTuple):
     """A rectangle of the sheet in pixels, rows counted from the top."""
 
     x: int
@@ -91,7 +91,7 @@ class InspectionPasses:
         self._ctx.clear(0.0, 0.0, 0.0, 1.0)
         return texture
 
-    def draw_on_sheet(self, field: LightFieldTexture, row: int, column: int, cell: Cell, exposure: float) -> None:
+    def draw_on_sheet(self, field: LightFieldTexture, row: int, column: int, cell: SheetCell, exposure: float) -> None:
         """Draw one view, or that it is not there, into its cell of the sheet."""
         _, framebuffer = self._images["sheet"]
         framebuffer.use()

@@ -122,7 +122,7 @@ def load_program(
         program = ctx.program(vertex_shader=stages["vertex"].text, fragment_shader=stages["fragment"].text)
     except moderngl.Error as error:
         raise ShaderError(_explain(str(error), stages, fragment)) from error
-    declared = frozenset(name for stage in stages.values() for name in declared_uniforms(stage.text))
+    declared = frozenset(name for scene_view in stages.values() for name in declared_uniforms(scene_view.text))
     return Program(program, declared, fragment)
 
 
@@ -135,12 +135,12 @@ def declared_uniforms(source: str) -> set[str]:
 
 def _explain(message: str, stages: Mapping[str, FlatSource], fragment: str) -> str:
     """The driver's message with its line numbers turned into file:line; drivers write 0:12(3), 0(12) or ERROR: 0:12."""
-    stage = stages["vertex" if "vertex_shader" in message else "fragment"]
-    found = [(match, stage.locate(int(match[1]))) for match in _MESSAGE_LINE.finditer(message)]
+    scene_view = stages["vertex" if "vertex_shader" in message else "fragment"]
+    found = [(match, scene_view.locate(int(match[1]))) for match in _MESSAGE_LINE.finditer(message)]
     if not found:
         return f"{fragment}: {message.strip()}"
     first = found[0][1]
-    body = _MESSAGE_LINE.sub(lambda match: f"{stage.locate(int(match[1]))}:", message[found[0][0].start() :])
+    body = _MESSAGE_LINE.sub(lambda match: f"{scene_view.locate(int(match[1]))}:", message[found[0][0].start() :])
     return f"{first}: the shader does not compile\n{body.strip()}"
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import moderngl
 
 
-class Target:
+class RenderTarget:
     """Textures of one size that a pass draws into together."""
 
     def __init__(self, ctx: moderngl.Context, textures: list[moderngl.Texture]) -> None:
@@ -47,7 +47,7 @@ class Target:
             texture.release()
 
 
-class Targets:
+class RenderTargets:
     """The targets of one picture size.
 
     light: all of it, or what is sharp. blurred: in front, behind, and all weights, at half size, see
@@ -60,14 +60,14 @@ class Targets:
         width, height = self.size_px = size_px
         half = (width + 1) // 2, (height + 1) // 2
         tiles = -(-width // tile_px), -(-height // tile_px)
-        self.image = Target(ctx, [ctx.texture(size_px, 4)])
-        self.light = Target(ctx, [_light(ctx, size_px)])
-        self.blurred = Target(ctx, [_light(ctx, half), _light(ctx, half), _light(ctx, half, 2)])
-        self.half_across = Target(ctx, [_light(ctx, half) for _ in range(2)])
-        self.half_smooth = Target(ctx, [_light(ctx, half) for _ in range(2)])
-        self.tiles = Target(ctx, [_light(ctx, tiles)])
-        self.wide_tiles = Target(ctx, [_light(ctx, tiles)])
-        self.spans = Target(ctx, [_light(ctx, tiles) for _ in range(2)])
+        self.image = RenderTarget(ctx, [ctx.texture(size_px, 4)])
+        self.light = RenderTarget(ctx, [_light(ctx, size_px)])
+        self.blurred = RenderTarget(ctx, [_light(ctx, half), _light(ctx, half), _light(ctx, half, 2)])
+        self.half_across = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
+        self.half_smooth = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
+        self.tiles = RenderTarget(ctx, [_light(ctx, tiles)])
+        self.wide_tiles = RenderTarget(ctx, [_light(ctx, tiles)])
+        self.spans = RenderTarget(ctx, [_light(ctx, tiles) for _ in range(2)])
 
     def release(self) -> None:
         """Free framebuffers and textures."""

@@ -23,8 +23,8 @@ from viewer.model.state.app_state import (
     Task,
     Theme,
 )
-from viewer.model.state.depth_editing import DepthEdit
-from viewer.model.state.inspection import InspectionEdit
+from viewer.model.state.depth_editing import DepthAction
+from viewer.model.state.inspection import InspectionAction
 
 # The viewpoint
 
@@ -343,7 +343,7 @@ class Quit:
     """Close the window."""
 
 
-OpticsEdit = (
+LensAction = (
     MoveEye
     | SetDolly
     | SetFocus
@@ -360,17 +360,17 @@ OpticsEdit = (
 )
 """Edits of the optics alone."""
 
-MotionEdit = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
-WorkerNews = SceneOpened | ProgressMade | OpenFailed
-SettingsEdit = SetTheme | SetFontScale | ToggleSection | PlaceWindow
+MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
+WorkerEvent = SceneOpened | ProgressMade | OpenFailed
+PreferencesAction = SetTheme | SetFontScale | ToggleSection | PlaceWindow
 
 Action = (
-    OpticsEdit
-    | MotionEdit
-    | WorkerNews
-    | SettingsEdit
-    | InspectionEdit
-    | DepthEdit
+    LensAction
+    | MotionAction
+    | WorkerEvent
+    | PreferencesAction
+    | InspectionAction
+    | DepthAction
     | ShowTiltHandles
     | SetDepthStrength
     | TakeSettings

@@ -77,27 +77,27 @@ def _always(action: Action) -> Callable[[AppState], Action]:
     return lambda state: action
 
 
-def _scaled(factor: float) -> Callable[[AppState], Action]:
+def _scale_text(factor: float) -> Callable[[AppState], Action]:
     return lambda state: SetFontScale(state.preferences.font_scale * factor)
 
 
-def _help_toggled(state: AppState) -> Action:
+def _toggle_help(state: AppState) -> Action:
     return ShowPrompt(None if state.prompt == "help" else "help")
 
 
-def _palette_toggled(state: AppState) -> Action:
+def _toggle_palette(state: AppState) -> Action:
     return ShowPrompt(None if isinstance(state.prompt, PalettePrompt) else PalettePrompt())
 
 
-def _overlay_toggled(kind: OverlayKind) -> Callable[[AppState], Action]:
+def _toggle_overlay(kind: OverlayKind) -> Callable[[AppState], Action]:
     return lambda state: SetOverlay(None if state.inspection.overlay == kind else kind)
 
 
-def _comparison_toggled(kind: Comparison) -> Callable[[AppState], Action]:
+def _toggle_comparison(kind: Comparison) -> Callable[[AppState], Action]:
     return lambda state: Compare(None if state.inspection.comparison == kind else kind)
 
 
-def _brush_toggled(state: AppState) -> Action:
+def _toggle_brush(state: AppState) -> Action:
     return SetBrush(replace(state.brush, is_on=not state.brush.is_on))
 
 
@@ -105,7 +105,7 @@ def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
     return lambda state: SetBrush(replace(state.brush, tool=tool, is_on=True))
 
 
-def _inverted(state: AppState) -> Action:
+def _invert_depth(state: AppState) -> Action:
     edits = state.depth.edits
     return SetTone(replace(edits, is_inverted=not edits.is_inverted), is_finished=True)
 
@@ -123,9 +123,9 @@ COMMANDS: tuple[Command, ...] = (
     Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
     Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
-    Command("Depth brush", _brush_toggled, (Chord("b"),)),
+    Command("Depth brush", _toggle_brush, (Chord("b"),)),
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
-    Command("Invert depth", _inverted),
+    Command("Invert depth", _invert_depth),
     Command("Reset depth edits", _always(ResetDepth())),
     Command("Open a depth map…", _always(DoTask(ChooseTask("map")))),
     Command("Open a depth model…", _always(DoTask(ChooseTask("model")))),
@@ -134,21 +134,21 @@ COMMANDS: tuple[Command, ...] = (
     Command("All views", lambda s: ShowGrid(not s.inspection.shows_grid), (Chord("g"),)),
     Command("Values under the pointer", lambda s: ShowValues(not s.inspection.shows_values), (Chord("v"),)),
     *(
-        Command(f"Overlay: {kind}", _overlay_toggled(kind), (Chord("d"),) if kind == "disparity" else ())
+        Command(f"Overlay: {kind}", _toggle_overlay(kind), (Chord("d"),) if kind == "disparity" else ())
         for kind in OVERLAYS
     ),
     *(
-        Command(COMPARE_WORDS[kind], _comparison_toggled(kind), (Chord("p"),) if kind == "photo" else ())
+        Command(COMPARE_WORDS[kind], _toggle_comparison(kind), (Chord("p"),) if kind == "photo" else ())
         for kind in COMPARISONS
     ),
     Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
     Command("Stop making views", _always(StopWork())),
     Command("Light or dark", lambda s: SetTheme("dark" if s.preferences.theme == "light" else "light")),
-    Command("Larger text", _scaled(FONT_STEP), (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True))),
-    Command("Smaller text", _scaled(1 / FONT_STEP), (Chord("minus", ctrl=True),)),
+    Command("Larger text", _scale_text(FONT_STEP), (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True))),
+    Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),)),
     Command("Usual text size", _always(SetFontScale(1.0)), (Chord("_0", ctrl=True),)),
-    Command("All commands", _palette_toggled, (Chord("p", ctrl=True),)),
-    Command("Mouse and keys", _help_toggled, (Chord("f1"),)),
+    Command("All commands", _toggle_palette, (Chord("p", ctrl=True),)),
+    Command("Mouse and keys", _toggle_help, (Chord("f1"),)),
     Command("Quit", _always(Quit()), (Chord("q", ctrl=True),)),
 )
 BY_NAME = {command.name: command for command in COMMANDS}

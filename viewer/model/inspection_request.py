@@ -14,7 +14,7 @@ SHEET_GAP = 3.0
 
 
 @dataclass(frozen=True)
-class Inquiry:
+class InspectionRequest:
     """Something to be worked out in the background.
 
     view: in the scene's grid, or the ground truth's ("truth"). is_scored: whether PSNR and FLIP are wanted too.
@@ -28,10 +28,10 @@ class Inquiry:
 
 
 @dataclass(frozen=True)
-class Aids:
+class InspectionTextures:
     """GL names of the textures that inspection shows; None where nothing is shown, or not yet. Rows top-down.
 
-    shown: records of what is in them: they inquiry different when these differ.
+    shown: records of what is in them: they look different when these differ.
     """
 
     strip_across: int | None = None
@@ -43,7 +43,7 @@ class Aids:
     shown: tuple[object, ...] = ()
 
 
-NO_AIDS = Aids()
+NO_INSPECTION_TEXTURES = InspectionTextures()
 
 
 def beside_of(state: AppState) -> Beside:
@@ -61,7 +61,7 @@ def view_near(eye: ViewOffset, grid: GridShape) -> ViewIndex:
     return row, column
 
 
-def view_words(view: ViewIndex, grid: GridShape) -> str:
+def view_label(view: ViewIndex, grid: GridShape) -> str:
     """Where a view stands, seen from the middle: "view 2 → 1 ↑", "middle view"."""
     t, s = (round(value) for value in grid.offset(*view))
     parts = [
@@ -70,7 +70,7 @@ def view_words(view: ViewIndex, grid: GridShape) -> str:
     return f"view {' '.join(parts)}" if parts else "middle view"
 
 
-def compared_view(scene: Scene, eye: ViewOffset, kind: Comparison, truth: GroundTruth | None) -> ViewIndex:
+def view_to_compare(scene: Scene, eye: ViewOffset, kind: Comparison, truth: GroundTruth | None) -> ViewIndex:
     """Which view is compared from this viewpoint. The ground truth's own grid may have another size."""
     if kind == "photo":
         return scene.grid.centre
@@ -81,23 +81,27 @@ def compared_view(scene: Scene, eye: ViewOffset, kind: Comparison, truth: Ground
     return view_near(ViewOffset(t, s), truth.grid)
 
 
-def compared_grid(scene: Scene, kind: Comparison, truth: GroundTruth | None) -> GridShape:
+def grid_to_compare(scene: Scene, kind: Comparison, truth: GroundTruth | None) -> GridShape:
     """The grid that compared views belong to."""
     return truth.grid if kind == "truth" and truth is not None else scene.grid
 
 
-def wanted_inquiry(state: AppState, is_moving: bool, before: Inquiry | None) -> Inquiry | None:
+def make_inspection_request(
+    state: AppState, is_moving: bool, before: InspectionRequest | None
+) -> InspectionRequest | None:
     """What is to be worked out now. While the viewpoint moves nothing slow is begun: what is there stays."""
     scene, inspection = state.scene, state.inspection
     if scene is None:
         return None
     kind = inspection.comparison
     if inspection.overlay == "entropy":
-        return Inquiry(state.generation, "entropy", view_near(state.optics.eye, scene.grid))
+        return InspectionRequest(state.generation, "entropy", view_near(state.optics.eye, scene.grid))
     if kind is None or kind == "photo":
         return None
-    view = compared_view(scene, state.optics.eye, kind, inspection.truth)
-    wanted = Inquiry(state.generation, kind, view, inspection.truth if kind == "truth" else None, not is_moving)
+    view = view_to_compare(scene, state.optics.eye, kind, inspection.truth)
+    wanted = InspectionRequest(
+        state.generation, kind, view, inspection.truth if kind == "truth" else None, not is_moving
+    )
     if is_moving and kind == "quality":
         return before if before is not None and (before.generation, before.kind) == (state.generation, kind) else None
     return before if is_moving and before == replace(wanted, is_scored=True) else wanted

@@ -90,7 +90,7 @@ def layout_of(
     status_height = STATUS_HEIGHT * ui_scale if beside.has_status else 0.0
     room_height = height - 2 * margin - (across + gap if across else 0) - status_height
     room = Rect(margin, margin, width - panel_width - 2 * margin - (down + gap if down else 0), room_height)
-    picture = letterboxed(room, picture_size) if picture_size else None
+    picture = letterbox(room, picture_size) if picture_size else None
     layout = Layout(
         window=Rect(0, 0, width, height),
         panel=Rect(width - panel_width, 0, panel_width, height),
@@ -114,7 +114,7 @@ def _thickness(views: int, ui_scale: float) -> float:
     return min(max(views * STRIP_UNITS_PER_VIEW, LEAST_STRIP), MOST_STRIP) * ui_scale if views else 0.0
 
 
-def letterboxed(room: Rect, picture_size: tuple[int, int]) -> Rect | None:
+def letterbox(room: Rect, picture_size: tuple[int, int]) -> Rect | None:
     """The largest rectangle of the picture's shape centred in the room; None where there is no room."""
     width, height = picture_size
     scale = min(room.width / width, room.height / height)

@@ -14,7 +14,7 @@ from viewer.model.state.app_state import (
 )
 
 
-def chosen(what: ChoiceOf, path: str, state: AppState) -> Action:
+def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
     """What a path that the user chose is for."""
     match what:
         case "mask":

@@ -90,7 +90,7 @@ def settings_text_in(path: Path) -> str:
         source.close()
 
 
-def decided_like(source: Source, saved: SavedSettings, given: Collection[str]) -> Source:
+def source_like(source: Source, saved: SavedSettings, given: Collection[str]) -> Source:
     """The source with what was decided for the saved picture, except for the fields named in `given`."""
     taken = {name: getattr(saved.source, name) for name in _SOURCE_FIELDS if name not in given}
     return dataclasses.replace(source, **taken)

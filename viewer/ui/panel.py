@@ -64,11 +64,11 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
         actions += _progress(state, layout)
     else:
         imgui.text_wrapped(state.scene.name)
-        quiet(size_words(state.scene))
+        quiet(size_text(state.scene))
         depth_line(state.scene, layout)
         actions += _progress(state, layout)
         if state.report is not None:
-            quiet(report_words(state.report))
+            quiet(report_text(state.report))
         actions += _presets(state.scene, layout)
         for section in SECTIONS:
             actions += _section(section, state, state.scene, layout, palette)
@@ -76,16 +76,16 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
     return actions
 
 
-def progress_words(progress: Progress) -> str:
+def progress_text(progress: Progress) -> str:
     """The progress in one line, "23 of 81 views, 1.2 s, 3 s left"; empty where nothing was asked for."""
     if not progress.total:
         return progress.doing
-    words = f"{progress.done} of {counted_views(progress.total)}, {progress.seconds:.1f} s"
+    words = f"{progress.done} of {view_count_text(progress.total)}, {progress.seconds:.1f} s"
     left_s = seconds_left(progress)
-    return words if left_s < 1 else f"{words}, {time_words(left_s)} left"
+    return words if left_s < 1 else f"{words}, {time_text(left_s)} left"
 
 
-def report_words(report: DrawReport) -> str:
+def report_text(report: DrawReport) -> str:
     """How long drawing took and how far it is from the final picture: "Drawn in 12 ms, error 0.3 %"."""
     words = f"Drawn in {report.draw_ms:.0f} ms"
     if report.samples >= report.samples_converged:
@@ -98,17 +98,17 @@ def seconds_left(progress: Progress) -> float:
     return progress.seconds / progress.done * (progress.total - progress.done) if progress.done else 0.0
 
 
-def time_words(seconds: float) -> str:
+def time_text(seconds: float) -> str:
     """Seconds for people: "12 s", "3 min"."""
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
-def counted_views(number: int) -> str:
+def view_count_text(number: int) -> str:
     """A number of views in words: "1 view", "81 views"."""
     return f"{number} view" if number == 1 else f"{number} views"
 
 
-def size_words(scene: Scene) -> str:
+def size_text(scene: Scene) -> str:
     """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, exact"."""
     words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
     is_made_here = scene.plan is not None
@@ -165,7 +165,7 @@ def _last_part(path: str) -> str:
 def _progress(state: AppState, layout: Layout) -> list[Action]:
     """A bar that stays when the work is done, so that nothing below it jumps; a button stops the work."""
     progress = state.progress
-    words = progress_words(progress)
+    words = progress_text(progress)
     if not words:
         return []
     actions: list[Action] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action
-from viewer.model.inspection_request import NO_AIDS, Aids
+from viewer.model.inspection_request import NO_INSPECTION_TEXTURES, InspectionTextures
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
@@ -13,20 +13,22 @@ from viewer.ui.overlays.notices import notices
 from viewer.ui.overlays.prompts import prompts
 from viewer.ui.overlays.reticle import overlays
 from viewer.ui.panel import panel
-from viewer.ui.style import packed, palette_of
+from viewer.ui.style import pack_color, palette_of
 
 
-def build_screen(state: AppState, layout: Layout, picture_texture: int | None, aids: Aids = NO_AIDS) -> list[Action]:
-    """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up. aids: what
-    inspection shows.
+def build_screen(
+    state: AppState, layout: Layout, picture_texture: int | None, textures: InspectionTextures = NO_INSPECTION_TEXTURES
+) -> list[Action]:
+    """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up. textures:
+    what inspection shows.
     """
     window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
-    imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, packed(palette.background))
+    imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, pack_color(palette.background))
     if picture_texture is not None and layout.picture is not None:
         _picture(layout, picture_texture)
-        draw_over_picture(state, layout, aids)
-        draw_beside_picture(state, layout, aids)
+        draw_over_picture(state, layout, textures)
+        draw_beside_picture(state, layout, textures)
         if not state.inspection.shows_grid:
             overlays(state, layout)
     return panel(state, layout) + notices(state, layout) + prompts(state, layout)

@@ -73,7 +73,7 @@ def palette_of(theme: Theme) -> Palette:
     return LIGHT if theme == "light" else DARK
 
 
-def packed(color: Color, alpha: float = 1.0) -> int:
+def pack_color(color: Color, alpha: float = 1.0) -> int:
     """A colour for draw lists."""
     return int(imgui.get_color_u32(imgui.ImVec4(color[0], color[1], color[2], color[3] * alpha)))
 

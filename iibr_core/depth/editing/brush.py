@@ -10,7 +10,7 @@ from math import ceil, exp, floor, hypot, sqrt
 
 import numpy as np
 
-from iibr_core.depth.editing.edits import UNEDITED, BrushTool, DepthEdits, Stroke, extent_of, require_sound, toned
+from iibr_core.depth.editing.edits import UNEDITED, BrushTool, DepthEdits, Stroke, apply_tone, extent_of, require_sound
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage
 
@@ -42,7 +42,7 @@ _SIGNS: dict[BrushTool, float] = {"nearer": 1.0, "farther": -1.0, "smooth": 1.0}
 MOST = float(np.finfo(np.float32).max)
 
 
-def edited(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
+def apply_edits(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
     """The map with all its edits: (H, W) float32, finite; the map itself where nothing is edited.
 
     photo: (H, W, 3), sRGB-encoded, guides the strokes. disparity: (H, W), any unit in which larger is closer.
@@ -54,7 +54,7 @@ def edited(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> Float
 class DepthCanvas:
     """A map that follows its edits: where they only go on, only what is new is worked out.
 
-    `shown` gives the same as `edited`, to the bit, whatever was shown before.
+    `shown` gives the same as `apply_edits`, to the bit, whatever was shown before.
     """
 
     def __init__(self, photo: FloatImage, disparity: FloatImage) -> None:
@@ -72,13 +72,13 @@ class DepthCanvas:
         self._trail: list[tuple[int, FloatImage]] = []  # (strokes, map) before the last ones, to go back to
 
     def shown(self, edits: DepthEdits) -> FloatImage:
-        """The map with these edits, (H, W) float32; not to be written to. Raises InputError as `edited` does."""
+        """The map with these edits, (H, W) float32; not to be written to. Raises InputError as `apply_edits` does."""
         if edits == UNEDITED and self._is_known:
             return self._given
         require_sound(edits)
         self._extent = self._extent or extent_of(self._given)
         if self._toned is None or self._edits.tone != edits.tone:
-            self._toned = toned(self._given, edits, self._extent)
+            self._toned = apply_tone(self._given, edits, self._extent)
             self._forget(edits)
         self._return_to(edits)
         for stroke in edits.strokes[len(self._edits.strokes) :]:
@@ -117,7 +117,7 @@ class DepthCanvas:
         target, under = None, self._values
         self._trail = [*self._trail, (len(self._edits.strokes), under)][-MAPS_KEPT:]
         if stroke.tool == "smooth":
-            target = smoothed(self._photo, under, radius_px(stroke, under), self._texture())
+            target = smooth_within_contours(self._photo, under, radius_px(stroke, under), self._texture())
         self._open = _OpenStroke(under, np.ones(under.shape, np.float32), target)
         self._edits = replace(self._edits, strokes=(*self._edits.strokes, stroke))
         self._paint(stroke, first=0)
@@ -186,7 +186,7 @@ def stroke_distance(photo: FloatImage, stroke: Stroke) -> FloatImage:
     return distance
 
 
-def touched_colours(photo: FloatImage, stroke: Stroke, index: int) -> FloatImage:
+def stroke_colours(photo: FloatImage, stroke: Stroke, index: int) -> FloatImage:
     """Colours (N, 3) that a stroke touched on its way to the point of this index; a few that stand for all."""
     height, width = photo.shape[:2]
     reach = max(TOUCH_RADII * radius_px(stroke, photo[..., 0]), 1.0)
@@ -204,7 +204,7 @@ def touched_colours(photo: FloatImage, stroke: Stroke, index: int) -> FloatImage
     return (sums / counts[:, None]).astype(np.float32)
 
 
-def smoothed(photo: FloatImage, disparity: FloatImage, radius: float, noise: float) -> FloatImage:
+def smooth_within_contours(photo: FloatImage, disparity: FloatImage, radius: float, noise: float) -> FloatImage:
     """The map (H, W), smoothed over about `radius` px, not across the photo's contours.
 
     The recursive filter of Gastal and Oliveira, "Domain transform for edge-aware image and video processing" (2011).
@@ -244,7 +244,7 @@ def _measure_from(photo: FloatImage, stroke: Stroke, index: int, distance: Float
     _seed(distance, x0, y0, x1, y1, radius)
     if distance[window].size:
         unlike = np.zeros(distance[window].shape, np.float32)
-        _tell_unlike(photo[window], touched_colours(photo, stroke, index), unlike)
+        _tell_unlike(photo[window], stroke_colours(photo, stroke, index), unlike)
         _without_specks(unlike)
         _measure(unlike, distance[window], radius, MOST_SWEEPS)
     return window

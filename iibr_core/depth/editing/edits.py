@@ -113,7 +113,7 @@ def extent_of(disparity: FloatImage) -> tuple[float, float]:
     return low - span / 2, low + span / 2
 
 
-def toned(disparity: FloatImage, edits: DepthEdits, extent: tuple[float, float] | None = None) -> FloatImage:
+def apply_tone(disparity: FloatImage, edits: DepthEdits, extent: tuple[float, float] | None = None) -> FloatImage:
     """The map (H, W), inverted, clipped and bent; its strokes are left to `brush.edited`. Edits must be sound.
 
     extent: see `extent_of`, of this map where None. What is not finite is the far end. Values keep their order
@@ -127,16 +127,16 @@ def toned(disparity: FloatImage, edits: DepthEdits, extent: tuple[float, float] 
         return values
     share = (values.astype(np.float64) - low) / (high - low)
     limit = np.finfo(np.float32).max
-    return np.clip(low + _bent(share, edits) * (high - low), -limit, limit).astype(np.float32)
+    return np.clip(low + _bend_curve(share, edits) * (high - low), -limit, limit).astype(np.float32)
 
 
-def toned_share(share: float, edits: DepthEdits) -> float:
-    """Where `toned` puts one value, both as shares of the extent (0 = far end)."""
-    return float(_bent(np.float64(share), edits))
+def tone_curve(share: float, edits: DepthEdits) -> float:
+    """Where `apply_tone` puts one value, both as shares of the extent (0 = far end)."""
+    return float(_bend_curve(np.float64(share), edits))
 
 
-def share_before_tone(share: float, edits: DepthEdits) -> float:
-    """The inverse of `toned_share`, inversion left as it is; exact for what was not clipped."""
+def invert_tone_curve(share: float, edits: DepthEdits) -> float:
+    """The inverse of `tone_curve`, inversion left as it is; exact for what was not clipped."""
     return share ** (1 / edits.gamma) if 0 < share < 1 else share if share <= 0 else 1 + (share - 1) / edits.gamma
 
 
@@ -151,7 +151,7 @@ def levels_of(disparity: FloatImage) -> Levels:
     return Levels(low, high, tuple(counts.tolist()))
 
 
-def _bent(share: np.ndarray | np.float64, edits: DepthEdits) -> np.ndarray:
+def _bend_curve(share: np.ndarray | np.float64, edits: DepthEdits) -> np.ndarray:
     """Shares after inversion, clips and gamma; beyond 0 and 1 the curve goes on straight."""
     share = 1 - share if edits.is_inverted else share
     low = -inf if edits.far_clip == 0 else edits.far_clip

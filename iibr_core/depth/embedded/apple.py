@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from iibr_core.depth.embedded.images import decoded_map
+from iibr_core.depth.embedded.images import decode_map
 from iibr_core.depth.embedded.xmp import jpeg_layout, xmp_of
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.types import FloatImage, InputError
@@ -54,7 +54,7 @@ def appended_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
             xmp = xmp_of(layout)
             kind = (xmp.value(PIXEL_DATA, "AuxiliaryImageType") or "").strip()
             if kind in ("disparity", "depth"):
-                stored = decoded_map(data[start : layout.end], "the depth map behind the photo")
+                stored = decode_map(data[start : layout.end], "the depth map behind the photo")
                 low, high = (_number(xmp.value(PIXEL_DATA, f"Float{side}Value")) for side in ("Min", "Max"))
                 return (_linear_in_inverse if kind == "disparity" else _linear_in_distance)(stored, low, high)
         end = max(layout.end, start + 2)

@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from iibr_core.depth.embedded.images import JPEG_START, PNG_START, decoded_map
+from iibr_core.depth.embedded.images import JPEG_START, PNG_START, decode_map
 from iibr_core.depth.embedded.xmp import JpegLayout, Xmp, value_in
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.types import FloatImage, InputError
@@ -52,9 +52,9 @@ def gdepth_estimate(xmp: Xmp) -> Estimate | None:
             raise InputError("GDepth names a depth map and holds none")
         return None
     depth_range = _depth_range({name: xmp.value(GDEPTH, name) for name in ("Format", "Near", "Far", "Units")})
-    stored = decoded_map(_from_base64(encoded, "GDepth:Data"), "the depth map of GDepth")
+    stored = decode_map(_from_base64(encoded, "GDepth:Data"), "the depth map of GDepth")
     confidence = xmp.value(GDEPTH, "Confidence")
-    sure = decoded_map(_from_base64(confidence, "GDepth:Confidence"), "its confidence") if confidence else None
+    sure = decode_map(_from_base64(confidence, "GDepth:Confidence"), "its confidence") if confidence else None
     return _estimate(stored, sure, depth_range)
 
 
@@ -75,11 +75,11 @@ def dynamic_depth_estimate(xmp: Xmp, data: bytes, layout: JpegLayout) -> Estimat
         raise InputError("Dynamic Depth names a depth map that its container does not list")
     depth_range = _depth_range(described)
     content = _content(items, items.index(depth_item), data, layout)
-    stored = decoded_map(content, "the depth map of Dynamic Depth")
+    stored = decode_map(content, "the depth map of Dynamic Depth")
     sure_item = _item_of(items, described["ConfidenceURI"], "confidence")
     sure = None
     if sure_item is not None:
-        sure = decoded_map(_content(items, items.index(sure_item), data, layout), "its confidence")
+        sure = decode_map(_content(items, items.index(sure_item), data, layout), "its confidence")
     return _estimate(stored, sure, depth_range)
 
 

@@ -54,7 +54,7 @@ def picture_file(data: bytes, what: str) -> Iterator[Path]:
             raise InputError(f"{what}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
-def decoded_map(data: bytes, what: str) -> FloatImage:
+def decode_map(data: bytes, what: str) -> FloatImage:
     """A grey picture's values as (H, W) float32, 0..1. Raises InputError where it is damaged, coloured or absurd.
 
     Decoded by Pillow: libpng, as OpenImageIO calls it, tells of damage on stderr, where it would spoil our one line.

@@ -11,7 +11,7 @@ from iibr_core.depth.embedded.google import all_in_focus, dynamic_depth_estimate
 from iibr_core.depth.embedded.samsung import samsung_estimate
 from iibr_core.depth.embedded.xmp import Xmp, is_jpeg, jpeg_layout, xmp_of
 from iibr_core.depth.estimates import Estimate
-from iibr_core.formats.files import opened_file
+from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.heic import is_heic, read_heic_depth
 from iibr_core.types import InputError
 
@@ -50,7 +50,7 @@ def _of_heic(path: Path) -> EmbeddedDepth | None:
 
 
 def _of_jpeg(path: Path) -> EmbeddedDepth | None:
-    with opened_file(path) as file:
+    with open_binary(path) as file:
         start = file.read(3)
         data = start + file.read() if is_jpeg(start) and path.stat().st_size <= MAX_FILE_BYTES else b""
     return embedded_in_jpeg(data) if data else None

@@ -12,7 +12,7 @@ import struct
 import numpy as np
 
 from iibr_core.depth.estimates import RelativeInverseDepth
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 
 DIRECTORY_START, DIRECTORY_END, AUDIO_BLOCK_END = b"SEFH", b"SEFT", b"QDIOBS"
 MAX_DIRECTORY_BYTES = 0x10000
@@ -34,7 +34,7 @@ def samsung_estimate(data: bytes) -> RelativeInverseDepth | None:
     size = _map_size(size_info)
     if size is None:
         return None
-    width, height = size
+    height, width = size
     if width < 1 or height < 1 or width * height != len(depth_map):
         raise InputError(f"Samsung's depth map of {width}x{height} pixels holds {len(depth_map):,} bytes")
     stored = np.frombuffer(depth_map, np.uint8).reshape(height, width)
@@ -50,12 +50,12 @@ def _blocks(data: bytes) -> dict[tuple[int, bytes], bytes]:
             break
         start = end - 8 - length
         if data[end - 4 : end] == DIRECTORY_END:
-            return _listed_blocks(data, start, length)
+            return _directory_blocks(data, start, length)
         end = start
     return {}
 
 
-def _listed_blocks(data: bytes, start: int, length: int) -> dict[tuple[int, bytes], bytes]:
+def _directory_blocks(data: bytes, start: int, length: int) -> dict[tuple[int, bytes], bytes]:
     """What the directory at `start` lists: type, how far before the directory the block begins, its size."""
     directory = data[start : start + length]
     if not directory.startswith(DIRECTORY_START) or length < 12:
@@ -76,10 +76,10 @@ def _first(blocks: dict[tuple[int, bytes], bytes], kind: int) -> bytes | None:
     return next((block for (other, _), block in blocks.items() if other == kind), None)
 
 
-def _map_size(size_info: bytes) -> tuple[int, int] | None:
-    """(width, height) from the block that holds it somewhere."""
+def _map_size(size_info: bytes) -> ImageSize | None:
+    """The size from the block that holds it somewhere."""
     for mark in SIZE_MARK.finditer(size_info, 32, 96):
         if mark.start() % 4 == 0 and mark.end() + 8 <= len(size_info):
             width, height = struct.unpack("<II", size_info[mark.end() : mark.end() + 8])
-            return width, height
+            return ImageSize(height, width)
     return None

@@ -134,15 +134,15 @@ def xmp_of(layout: JpegLayout) -> Xmp:
     """
     if not layout.xmp:
         return Xmp()
-    standard = parsed(layout.xmp)
+    standard = parse_packet(layout.xmp)
     guid = value_in(standard, NOTE, "HasExtendedXMP")
     if guid is None:
         return Xmp((standard,))
     parts = layout.extended.get(guid.strip().upper().encode("ascii", "replace"), [])
-    return Xmp((standard, parsed(_joined(parts))))
+    return Xmp((standard, parse_packet(_join_parts(parts))))
 
 
-def _joined(parts: list[tuple[int, int, bytes]]) -> bytes:
+def _join_parts(parts: list[tuple[int, int, bytes]]) -> bytes:
     """An extended packet from its parts, whatever their order in the file."""
     if not parts:
         raise InputError("extended XMP is missing")
@@ -159,7 +159,7 @@ def _joined(parts: list[tuple[int, int, bytes]]) -> bytes:
     return bytes(packet)
 
 
-def parsed(packet: bytes) -> Element:
+def parse_packet(packet: bytes) -> Element:
     """The XML tree of a packet. Raises InputError where it is no XML, declares a document type, or is too large."""
     builder = TreeBuilder()
     parser = expat.ParserCreate(namespace_separator="}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
 MAX_CONFIG_BYTES = 2**20
@@ -28,7 +28,7 @@ class Preparation:
     of it. pads: whether mirrored borders are added first (ZoeDepth). mean, std: of each channel, 0..1.
     """
 
-    size: tuple[int, int]
+    size: ImageSize
     keeps_aspect: bool
     multiple: int
     pads: bool
@@ -96,13 +96,13 @@ def _json_object(folder: Path, name: str) -> dict[str, Any]:
     return told
 
 
-def _size(told: Any) -> tuple[int, int]:
+def _size(told: Any) -> ImageSize:
     if isinstance(told, int):
-        return told, told
+        return ImageSize(told, told)
     if isinstance(told, dict):
-        return int(told["height"]), int(told["width"])
+        return ImageSize(int(told["height"]), int(told["width"]))
     height, width = told
-    return int(height), int(width)
+    return ImageSize(int(height), int(width))
 
 
 def _channels(told: Any) -> tuple[float, ...]:

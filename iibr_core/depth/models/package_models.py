@@ -59,7 +59,7 @@ def _moge(model: LocalModel, photo: Photo) -> MetricDepth:
     with torch.inference_mode():
         said = network.infer(torch.from_numpy(np.clip(photo.pixels, 0, 1)).permute(2, 0, 1))
     # MoGe's intrinsics count in widths of the picture.
-    return MetricDepth(_positive(_array(said["depth"])), float(_array(said["intrinsics"])[0, 0]) * photo.size[1])
+    return MetricDepth(_positive(_array(said["depth"])), float(_array(said["intrinsics"])[0, 0]) * photo.size.width)
 
 
 def _bytes(photo: Photo) -> Any:

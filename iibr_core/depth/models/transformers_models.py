@@ -22,8 +22,8 @@ from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
 from iibr_core.depth.models.config import Preparation, read_config, read_preparation
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.runtime.tiling import ShouldStop, go_on, never
-from iibr_core.types import FloatImage, InputError, Photo
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo, image_size
 
 if TYPE_CHECKING:
     import torch
@@ -61,7 +61,7 @@ def estimate_with(
     photo: Photo,
     memory_bytes: int | None = None,
     should_stop: ShouldStop = never,
-    tell: Tell = lambda doing, share: None,
+    report_progress: Tell = lambda doing, share: None,
 ) -> Estimate:
     """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
 
@@ -69,7 +69,7 @@ def estimate_with(
     be used or its result is of no use, Cancelled where should_stop says so.
     """
     _require_weights(model.folder)
-    tell(f"looking for what {model.title} said before", 0.0)
+    report_progress(f"looking for what {model.title} said before", 0.0)
     network_input = None
     if model.package == TRANSFORMERS:
         network_input = _input_of(model, photo.size, memory_bytes or psutil.virtual_memory().total // MEMORY_SHARE)
@@ -78,7 +78,7 @@ def estimate_with(
     if found is not None:
         return found
     if network_input is not None:
-        found = _run(model, photo, network_input, should_stop, tell)
+        found = _run(model, photo, network_input, should_stop, report_progress)
     else:
         from iibr_core.depth.models.package_models import run_package
 
@@ -93,17 +93,17 @@ class _Input:
     """How a photo becomes a model's input, and of which (height, width)."""
 
     preparation: Preparation
-    size: tuple[int, int]
+    size: ImageSize
 
 
-def _input_of(model: LocalModel, size: tuple[int, int], memory_bytes: int) -> _Input:
+def _input_of(model: LocalModel, size: ImageSize, memory_bytes: int) -> _Input:
     """The input for a photo of (height, width) that the memory allows. Raises InputError where it allows none."""
     config = read_config(model.folder)
     preparation = read_preparation(model.folder, config["model_type"])
     per_pixel = ACTIVATION_BYTES * max(_width_of(config), USUAL_WIDTH) / USUAL_WIDTH
     pixels = (memory_bytes - bytes_of(model.folder)) / per_pixel
     is_fixed = config["model_type"] == "depth_pro"
-    needed = preparation.size[0] * preparation.size[1] if is_fixed else (2 * preparation.multiple) ** 2
+    needed = preparation.size.height * preparation.size.width if is_fixed else (2 * preparation.multiple) ** 2
     if pixels < needed:
         least = bytes_of(model.folder) + needed * per_pixel
         raise InputError(
@@ -113,7 +113,7 @@ def _input_of(model: LocalModel, size: tuple[int, int], memory_bytes: int) -> _I
     return _Input(preparation, preparation.size if is_fixed else input_size(preparation, size, pixels))
 
 
-def input_size(preparation: Preparation, size: tuple[int, int], max_pixels: float) -> tuple[int, int]:
+def input_size(preparation: Preparation, size: ImageSize, max_pixels: float) -> ImageSize:
     """(height, width) that a photo is made for its model: as the model asks for, unless that exceeds max_pixels.
 
     The side that has to change least meets the model's size (as the library's own preparation chooses it).
@@ -131,7 +131,7 @@ def input_size(preparation: Preparation, size: tuple[int, int], max_pixels: floa
     # Two patches at least: networks halve what they see once more.
     tall, wide = (max(rounded(side / multiple), 2) * multiple for side in sides)
     longest = max(2, int(limit / min(tall, wide)) // multiple) * multiple
-    return min(tall, longest), min(wide, longest)
+    return ImageSize(min(tall, longest), min(wide, longest))
 
 
 def _width_of(config: dict[str, Any]) -> int:
@@ -142,23 +142,25 @@ def _width_of(config: dict[str, Any]) -> int:
     return width if isinstance(width, int) and width > 0 else 1024
 
 
-def _run(model: LocalModel, photo: Photo, network_input: _Input, should_stop: ShouldStop, tell: Tell) -> Estimate:
-    tell(f"loading {model.title}", 0.0)
+def _run(
+    model: LocalModel, photo: Photo, network_input: _Input, should_stop: ShouldStop, report_progress: Tell
+) -> Estimate:
+    report_progress(f"loading {model.title}", 0.0)
     import torch
 
-    network = _loaded(model)
+    network = _load_network(model)
     device = "cuda" if torch.cuda.is_available() else "cpu"
-    pixels = _prepared(photo.pixels, network_input).to(device)
+    pixels = _network_tensor(photo.pixels, network_input).to(device)
     doing = f"estimating depth with {model.title}"
     try:
-        with torch.inference_mode(), _Watch(network, should_stop, lambda share: tell(doing, share)):
+        with torch.inference_mode(), _LayerProgress(network, should_stop, lambda share: report_progress(doing, share)):
             output = network.to(device)(pixel_values=pixels)
     except (RuntimeError, ValueError, IndexError, TypeError) as error:
         raise InputError(f"{model.title} failed on this photo ({_line(error)})") from error
     return _estimate_of(network.config, output, photo.size, network_input.preparation)
 
 
-def _loaded(model: LocalModel) -> Any:
+def _load_network(model: LocalModel) -> Any:
     """The network, ready to run. Raises InputError where the folder holds something else."""
     from transformers import AutoModelForDepthEstimation
     from transformers.utils import logging
@@ -177,12 +179,14 @@ def _loaded(model: LocalModel) -> Any:
     return network.float().eval()
 
 
-class _Watch:
+class _LayerProgress:
     """While it is entered, a network asks before each of its layers whether to go on, and tells how far it is."""
 
-    def __init__(self, network: torch.nn.Module, should_stop: ShouldStop, tell: Callable[[float], None]) -> None:
+    def __init__(
+        self, network: torch.nn.Module, should_stop: ShouldStop, report_progress: Callable[[float], None]
+    ) -> None:
         self._layers = [layer for layer in network.modules() if not any(layer.children())]
-        self._should_stop, self._tell = should_stop, tell
+        self._should_stop, self._report_progress = should_stop, report_progress
         self._seen = 0
 
     def __enter__(self) -> None:
@@ -193,18 +197,18 @@ class _Watch:
             hook.remove()
 
     def _before(self, *_: object) -> None:
-        go_on(self._should_stop)
+        raise_if_stopped(self._should_stop)
         self._seen += 1
-        self._tell(min(self._seen / len(self._layers), 1.0))
+        self._report_progress(min(self._seen / len(self._layers), 1.0))
 
 
-def _prepared(pixels: FloatImage, network_input: _Input) -> torch.Tensor:
+def _network_tensor(pixels: FloatImage, network_input: _Input) -> torch.Tensor:
     """(1, 3, height, width), normalised as the model was trained; white is 1, HDR is cut off there."""
     import torch
 
     wanted = network_input.preparation
     if wanted.pads:
-        pad_y, pad_x = _padding(pixels.shape[:2])
+        pad_y, pad_x = _padding(image_size(pixels))
         pixels = np.pad(pixels, ((pad_y, pad_y), (pad_x, pad_x), (0, 0)), "reflect")
     image = torch.from_numpy(np.clip(pixels, 0, 1)).permute(2, 0, 1)[None]
     small = torch.nn.functional.interpolate(image, network_input.size, mode="bicubic", antialias=True)
@@ -212,17 +216,17 @@ def _prepared(pixels: FloatImage, network_input: _Input) -> torch.Tensor:
     return (small - mean) / std
 
 
-def _padding(size: tuple[int, ...]) -> tuple[int, int]:
+def _padding(size: ImageSize) -> tuple[int, int]:
     """ZoeDepth's borders, rows and columns: it was trained with them."""
-    return int(math.sqrt(size[0] / 2) * 3), int(math.sqrt(size[1] / 2) * 3)
+    return int(math.sqrt(size.height / 2) * 3), int(math.sqrt(size.width / 2) * 3)
 
 
-def _estimate_of(config: Any, output: Any, size: tuple[int, int], preparation: Preparation) -> Estimate:
+def _estimate_of(config: Any, output: Any, size: ImageSize, preparation: Preparation) -> Estimate:
     """The network's output as what it is; by the kind of network, never by its values. size: of the photo."""
     values = output.predicted_depth[0].float().cpu().numpy()
     match config.model_type:
         case "zoedepth":
-            return MetricDepth(_unpadded(values, size) if preparation.pads else values)
+            return MetricDepth(_remove_padding(values, size) if preparation.pads else values)
         case "depth_pro":
             return _depth_pro_estimate(values, output.field_of_view)
         case "depth_anything" if config.depth_estimation_type == "metric":
@@ -231,10 +235,10 @@ def _estimate_of(config: Any, output: Any, size: tuple[int, int], preparation: P
             return RelativeInverseDepth(values)
 
 
-def _unpadded(values: FloatImage, size: tuple[int, int]) -> FloatImage:
+def _remove_padding(values: FloatImage, size: ImageSize) -> FloatImage:
     pad_y, pad_x = _padding(size)
-    whole = resample_surfaces(values, (size[0] + 2 * pad_y, size[1] + 2 * pad_x))
-    return whole[pad_y : pad_y + size[0], pad_x : pad_x + size[1]]
+    whole = resample_surfaces(values, ImageSize(size.height + 2 * pad_y, size.width + 2 * pad_x))
+    return whole[pad_y : pad_y + size.height, pad_x : pad_x + size.width]
 
 
 def _depth_pro_estimate(canonical: FloatImage, field_of_view: Any) -> Estimate:

@@ -11,7 +11,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import opened_file, refuse_bomb, require_file
+from iibr_core.formats.files import open_binary, refuse_bomb, require_file
 from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS
 from iibr_core.types import FloatImage, InputError
@@ -38,14 +38,14 @@ class HeicDepth:
 
 def is_heic(path: Path) -> bool:
     """Whether a file begins as HEIF files do, whatever its name. Raises InputError where it cannot be read."""
-    with opened_file(path) as file:
+    with open_binary(path) as file:
         start = file.read(12)
     return start[4:8] == b"ftyp" and start[8:12] in BRANDS
 
 
 def read_heic(path: Path) -> Raster:
     """Decode a HEIC's photo, turned upright as the file asks. Raises InputError as `read_raster` does."""
-    file = _opened(path)
+    file = _open(path)
     spec = oiio.ImageSpec(file.size[0], file.size[1], 3, "uint8")
     _describe(spec, file.info)
     pixels = _pixels(path, file)
@@ -59,7 +59,7 @@ def read_heic(path: Path) -> Raster:
 
 def read_heic_depth(path: Path) -> HeicDepth | None:
     """The depth map of a portrait photo, None where it has none. Raises InputError where it is damaged."""
-    maps = _opened(path).info.get("depth_images") or []
+    maps = _open(path).info.get("depth_images") or []
     if not maps:
         return None
     width, height = maps[0].size
@@ -70,7 +70,7 @@ def read_heic_depth(path: Path) -> HeicDepth | None:
     return HeicDepth(np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {}))
 
 
-def _opened(path: Path) -> Any:
+def _open(path: Path) -> Any:
     import pillow_heif
 
     require_file(path)

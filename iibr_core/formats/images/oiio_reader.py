@@ -12,10 +12,10 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import opened_file, refuse_bomb, require_file
+from iibr_core.formats.files import open_binary, refuse_bomb, require_file
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS, read_pfm
-from iibr_core.types import FloatImage, InputError
+from iibr_core.types import FloatImage, ImageSize, InputError
 
 # Some cameras pad their JPEGs; the decoder complains and loses nothing.
 HARMLESS_MESSAGE = "extraneous bytes"
@@ -36,10 +36,10 @@ class Raster:
     spec: Any
 
 
-def read_size(path: Path) -> tuple[int, int]:
-    """(height, width) from a picture file's header. Raises InputError as `read_raster` does."""
+def read_size(path: Path) -> ImageSize:
+    """From a picture file's header. Raises InputError as `read_raster` does."""
     spec = _open(path).spec()
-    return spec.height, spec.width
+    return ImageSize(spec.height, spec.width)
 
 
 def read_orientation(path: Path) -> int:
@@ -128,7 +128,7 @@ def require_whole_png(path: Path) -> None:
 
     libpng reports a cut-off file on stderr, where it would spoil our one line, and a disk that is full not at all.
     """
-    with opened_file(path) as file:
+    with open_binary(path) as file:
         end = path.stat().st_size
         start = file.read(len(PNG_START))
         if start != PNG_START[: len(start)]:

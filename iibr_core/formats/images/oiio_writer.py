@@ -10,14 +10,14 @@ from typing import Any
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import written_whole
+from iibr_core.formats.files import atomic_write
 from iibr_core.formats.images.oiio_reader import complaint_of, require_whole_png
 from iibr_core.types import InputError
 
 
-def write_picture(path: Path, spec: Any, values: NDArray[Any]) -> None:
+def write_image_file(path: Path, spec: Any, values: NDArray[Any]) -> None:
     """Write values (H, W, C) with OpenImageIO's header. Raises InputError where that cannot be done."""
-    with written_whole(path) as temporary:
+    with atomic_write(path) as temporary:
         target = oiio.ImageOutput.create(str(temporary))
         # Writing to an output that did not open crashes OpenImageIO.
         if target is None or not (target.open(str(temporary), spec) and target.write_image(values) and target.close()):

@@ -18,9 +18,9 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file
 from iibr_core.formats.images.heic import is_heic, read_heic
 from iibr_core.formats.images.oiio_reader import Raster, read_raster, text_attribute
-from iibr_core.formats.images.oiio_writer import write_picture
+from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.runtime.jit import kernel
-from iibr_core.types import FloatImage, InputError, Photo
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo, image_size
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
@@ -45,20 +45,20 @@ def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float 
     raster = read_heic(path) if is_heic(path) else read_raster(path)
     notes = _color_notes(raster.spec) + _alpha_notes(raster)
     raster, finite_notes = _finite(raster)
-    stored_size = raster.pixels.shape[:2]
+    stored_size = image_size(raster.pixels)
     size = size_within(stored_size, max_pixels)
     if size == stored_size:
-        encoded = _encoded(raster)
+        encoded = _encode(raster)
     else:
         encoded = srgb_from_linear(_downsampled_linear(raster, size))
-        said = f"{stored_size[1]}x{stored_size[0]} to {size[1]}x{size[0]}"
+        said = f"{stored_size} to {size}"
         notes += (f"Made smaller by area averaging, from {said} (--max-pixels {max_pixels}).",)
     pixels = upright(encoded, raster.spec.get_int_attribute("Orientation", 1))
     focal_px = _exif_focal_px(raster.spec)
     if focal_px is None:
         focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
     else:
-        focal_px *= math.sqrt(size[0] * size[1] / (stored_size[0] * stored_size[1]))
+        focal_px *= math.sqrt(size.height * size.width / (stored_size.height * stored_size.width))
     return Photo(pixels, focal_px, path.stem, bool(pixels.max() > 1), notes + finite_notes)
 
 
@@ -78,7 +78,7 @@ def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | i
     spec.attribute("png:filter", PNG_FILTER_AVERAGE)
     for name, value in (metadata or {}).items():
         spec.attribute(name, value)
-    write_picture(path, spec, stored)
+    write_image_file(path, spec, stored)
 
 
 def focal_px_from_fov(width: int, fov_deg: float = DEFAULT_FOV_DEG) -> float:
@@ -86,14 +86,14 @@ def focal_px_from_fov(width: int, fov_deg: float = DEFAULT_FOV_DEG) -> float:
     return width / 2 / math.tan(math.radians(fov_deg) / 2)
 
 
-def size_within(size: tuple[int, int], max_pixels: int) -> tuple[int, int]:
+def size_within(size: ImageSize, max_pixels: int) -> ImageSize:
     """The (height, width) of the same shape that holds at most max_pixels; `size` itself where that is small enough."""
     height, width = size
     if height * width <= max_pixels:
-        return height, width
+        return size
     factor = math.sqrt(max_pixels / (height * width))
     new_height = min(max(1, math.floor(height * factor)), max_pixels)
-    return new_height, min(max(1, math.floor(width * factor)), max_pixels // new_height)
+    return ImageSize(new_height, min(max(1, math.floor(width * factor)), max_pixels // new_height))
 
 
 def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
@@ -107,7 +107,7 @@ def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     return np.ascontiguousarray(pixels)
 
 
-def _encoded(raster: Raster) -> FloatImage:
+def _encode(raster: Raster) -> FloatImage:
     """sRGB-encoded (H, W, 3) at the stored size. Opaque integer files pass untouched: they are encoded already."""
     if raster.pixels.dtype.kind == "u" and raster.alpha is None:
         encoded = raster.pixels.astype(np.float32) * np.float32(1 / np.iinfo(raster.pixels.dtype).max)
@@ -130,15 +130,15 @@ def _linear(raster: Raster, rows: slice) -> FloatImage:
     return np.ascontiguousarray(np.broadcast_to(linear, (*linear.shape[:2], 3)), np.float32)
 
 
-def _downsampled_linear(raster: Raster, size: tuple[int, int]) -> FloatImage:
+def _downsampled_linear(raster: Raster, size: ImageSize) -> FloatImage:
     """Area averages of linear light, in bands of rows so that a huge file never exists as floats."""
     stored_height = raster.pixels.shape[0]
     result = np.empty((*size, 3), np.float32)
-    for top in range(0, size[0], BAND_ROWS):
-        bottom = min(top + BAND_ROWS, size[0])
-        first = top * stored_height // size[0]
-        last = min(stored_height, -(-bottom * stored_height // size[0]))
-        _average_areas(_linear(raster, slice(first, last)), first, stored_height / size[0], top, result[top:bottom])
+    for top in range(0, size.height, BAND_ROWS):
+        bottom = min(top + BAND_ROWS, size.height)
+        first = top * stored_height // size.height
+        last = min(stored_height, -(-bottom * stored_height // size.height))
+        _average_areas(_linear(raster, slice(first, last)), first, stored_height / size.height, top, result[top:bottom])
     return result
 
 

@@ -21,12 +21,12 @@ from types import TracebackType
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
-from iibr_core.formats.files import opened_file, temporary_sibling
+from iibr_core.formats.files import open_binary, temporary_sibling
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import focal_px_from_fov, read_photo, write_image
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS, write_pfm
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewUpdate
+from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
 
 VIEW_EXTENSIONS = (".png", ".jpg", ".jpeg", ".exr")
 CAM_NAME = re.compile(r"input_Cam(\d{2,6})$")
@@ -68,7 +68,7 @@ class HciWriter:
         self.name = name
         self.with_disparity = with_disparity
         self._added: set[tuple[int, int]] = set()
-        self._size = (0, 0)
+        self._size = ImageSize(0, 0)
         self._range = (math.inf, -math.inf)
         self._pending: list[Future[None]] = []
 
@@ -89,12 +89,12 @@ class HciWriter:
 
     def add(self, update: ViewUpdate) -> None:
         """Write one view; returns once at most PENDING_VIEWS wait. Raises InputError if an earlier one failed."""
-        size = update.colors.shape[:2]
+        size = image_size(update.colors)
         if self._added and size != self._size:
             raise ValueError(f"view ({update.row}, {update.column}) is {size}, the others are {self._size}")
         if (update.row, update.column) in self._added:
             raise ValueError(f"view ({update.row}, {update.column}) was added before")
-        self._size = (size[0], size[1])
+        self._size = size
         self._added.add((update.row, update.column))
         if update.disparity is not None:
             low, high = float(update.disparity.min()), float(update.disparity.max())
@@ -171,10 +171,16 @@ def read_light_field(folder: Path) -> tuple[LightFieldHeader, Iterator[ViewUpdat
     size = read_size(paths[0])
     for path in paths:
         if (found := read_size(path)) != size:
-            raise InputError(f"{path}: is {found[1]}x{found[0]}, but {paths[0].name} is {size[1]}x{size[0]}")
+            raise InputError(f"{path}: is {found}, but {paths[0].name} is {size}")
     is_hdr = any(path.suffix.lower() == ".exr" for path in paths)
     header = LightFieldHeader(
-        folder.resolve().name, grid, size[1], size[0], _focal_px(parameters, size), _disparity_range(parameters), is_hdr
+        folder.resolve().name,
+        grid,
+        size.width,
+        size.height,
+        _focal_px(parameters, size),
+        _disparity_range(parameters),
+        is_hdr,
     )
     return header, _iterate_views(folder, header, paths)
 
@@ -208,7 +214,7 @@ def _read_view_disparity(folder: Path, header: LightFieldHeader, index: int) -> 
         names.append("gt_disp_lowres.pfm")
     for name in names:
         if (folder / name).is_file():
-            return read_disparity(folder / name, (header.height, header.width)).values
+            return read_disparity(folder / name, ImageSize(header.height, header.width)).values
     return None
 
 
@@ -281,7 +287,7 @@ def _read_parameters(path: Path) -> dict[str, float]:
     """Every number of the file by name, whatever its section; empty if there is no file."""
     if not path.is_file() or path.stat().st_size == 0:
         return {}
-    with opened_file(path) as file:
+    with open_binary(path) as file:
         data = file.read(MOST_PARAMETER_BYTES + 1)
     if len(data) > MOST_PARAMETER_BYTES:
         raise InputError(f"{path}: more than {MOST_PARAMETER_BYTES:,} bytes are no parameters; correct or remove it")
@@ -301,7 +307,7 @@ def _read_parameters(path: Path) -> dict[str, float]:
 
 
 def _write_parameters(
-    path: Path, name: str, grid: GridShape, size: tuple[int, int], focal_px: float, disparity_range: tuple[float, float]
+    path: Path, name: str, grid: GridShape, size: ImageSize, focal_px: float, disparity_range: tuple[float, float]
 ) -> None:
     """The benchmark's parameters.cfg. One photo tells no baseline: 1 mm by decree, which fixes the scale of depths."""
     low, high = disparity_range if math.isfinite(disparity_range[0]) else (0.0, 0.0)
@@ -310,8 +316,8 @@ def _write_parameters(
     parser = configparser.ConfigParser(interpolation=None)
     parser["intrinsics"] = {
         "focal_length_mm": repr(focal_px * SENSOR_SIZE_MM / max(size)),
-        "image_resolution_x_px": str(size[1]),
-        "image_resolution_y_px": str(size[0]),
+        "image_resolution_x_px": str(size.width),
+        "image_resolution_y_px": str(size.height),
         "sensor_size_mm": repr(SENSOR_SIZE_MM),
         "fstop": "100.0",
     }
@@ -334,11 +340,11 @@ def _write_parameters(
         parser.write(file)
 
 
-def _focal_px(parameters: dict[str, float], size: tuple[int, int]) -> float:
+def _focal_px(parameters: dict[str, float], size: ImageSize) -> float:
     focal_mm, sensor_mm = parameters.get("focal_length_mm", 0.0), parameters.get("sensor_size_mm", 0.0)
     if focal_mm > 0 and sensor_mm > 0 and math.isfinite(focal_px := focal_mm / sensor_mm * max(size)):
         return focal_px
-    return focal_px_from_fov(size[1])
+    return focal_px_from_fov(size.width)
 
 
 def _disparity_range(parameters: dict[str, float]) -> tuple[float, float] | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.light_fields.scene import MOST_VIEWS, KnownView, MultiView, pictures_in
 from iibr_core.formats.maps.npy import read_array
-from iibr_core.types import InputError, ViewOffset
+from iibr_core.types import ImageSize, InputError, ViewOffset
 
 FOLDERS = ("images_8", "images_4", "images")
 """Smaller copies first: the papers evaluate on them."""
@@ -45,9 +45,9 @@ def read_llff(folder: Path) -> MultiView | None:
         KnownView(picture.stem, ViewOffset(float(y / step), float(x / step)), picture)
         for picture, (x, y, _) in zip(pictures, local)
     )
-    height, width = read_size(pictures[central])
-    focal_px = float(shapes[central, 2] * width / shapes[central, 1])
-    turned = _turned(rotations, central, focal_px, (height, width))
+    size = read_size(pictures[central])
+    focal_px = float(shapes[central, 2] * size.width / shapes[central, 1])
+    turned = _relative_homographies(rotations, central, focal_px, size)
     views = tuple(replace(view, turned=matrix) for view, matrix in zip(views, turned))
     depths = bounds[central]
     notes = (
@@ -86,7 +86,7 @@ def _neighbour_distance(points: Doubles) -> float:
     return float(np.sqrt(squared.min(axis=1)).mean()) or 1.0
 
 
-def _turned(rotations: Doubles, central: int, focal_px: float, size: tuple[int, int]) -> list[Doubles]:
+def _relative_homographies(rotations: Doubles, central: int, focal_px: float, size: ImageSize) -> list[Doubles]:
     """For each camera the matrix from pixels of a camera that looks as the central one does to its own."""
     height, width = size
     camera = np.array([[focal_px, 0.0, (width - 1) / 2], [0.0, focal_px, (height - 1) / 2], [0.0, 0.0, 1.0]])

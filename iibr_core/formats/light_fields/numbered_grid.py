@@ -30,7 +30,7 @@ HEBER_GRID = GridShape(11, 11)
 Index = tuple[int, int]
 
 
-def read_grid_folder(folder: Path) -> MultiView | None:
+def read_numbered_grid(folder: Path) -> MultiView | None:
     """The views of a grid folder, None where its pictures are not numbered as a grid.
 
     Ground truth: gt_disp_uUU_vVV.*, HCI's gt_disp_lowres.pfm and gt_disp_lowres_CamNNN.pfm, or the one map of the

@@ -109,7 +109,7 @@ def with_equal_sizes(scene: MultiView) -> MultiView:
     size = read_size(first)
     for view in scene.views[1:]:
         if (found := read_size(view.path)) != size:
-            raise InputError(f"{view.path}: is {found[1]}x{found[0]}, but {first.name} is {size[1]}x{size[0]}")
+            raise InputError(f"{view.path}: is {found}, but {first.name} is {size}")
     return scene
 
 

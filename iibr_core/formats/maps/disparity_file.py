@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.images.oiio_reader import read_map
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.inpainting.disparity_holes import fill_from_background
-from iibr_core.types import Disparity, FloatImage, InputError
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
 
 DoubleImage = NDArray[np.float64]  # scaling must not overflow before the limit is looked at
 
@@ -26,7 +26,7 @@ DEPTH_SPAN_WIDTHS = 0.01
 FLAT_DEPTH_SHARE = 1e-4
 
 
-def read_disparity(path: Path, size: tuple[int, int], scale: float = 1.0) -> Disparity:
+def read_disparity(path: Path, size: ImageSize, scale: float = 1.0) -> Disparity:
     """Read a PFM, EXR, NPY or PNG map for a photo of (height, width); `scale` multiplies its values.
 
     Unknown values (NaN, infinite, 0 in 8- and 16-bit pictures, alpha 0, absurdly large) are filled from their
@@ -37,22 +37,22 @@ def read_disparity(path: Path, size: tuple[int, int], scale: float = 1.0) -> Dis
     if not math.isfinite(scale) or scale == 0:
         raise InputError(f"--disparity-scale {scale}: must be a number other than 0")
     stored = read_map(path)
-    _require_aspect(path, stored.shape[:2], size)
+    _require_aspect(path, image_size(stored), size)
     if path.stem.endswith("_depth"):
-        scaled, notes = _disparity_from_depth(stored, size[1], scale), _depth_notes(path)
+        scaled, notes = _disparity_from_depth(stored, size.width, scale), _depth_notes(path)
     else:
-        scaled, notes = stored.astype(np.float64) * (scale * size[1] / stored.shape[1]), ()
-    values, limit_notes = _without_absurd(path, scaled, MAX_DISPARITY_WIDTHS * size[1])
+        scaled, notes = stored.astype(np.float64) * (scale * size.width / stored.shape[1]), ()
+    values, limit_notes = _without_absurd(path, scaled, MAX_DISPARITY_WIDTHS * size.width)
     if values.shape != size:
-        notes += (f"{path.name} was resampled from {stored.shape[1]}x{stored.shape[0]} to {size[1]}x{size[0]}.",)
+        notes += (f"{path.name} was resampled from {stored.shape[1]}x{stored.shape[0]} to {size}.",)
         values = resample_surfaces(values, size)
     unknown = np.isnan(values).mean()
     if unknown > 0:
         notes += (f"{100 * unknown:.2g} % of {path.name} is unknown and was filled from the background side.",)
-    return Disparity(_filled(path, values), path.name, notes + limit_notes)
+    return Disparity(_fill_unknown(path, values), path.name, notes + limit_notes)
 
 
-def _require_aspect(path: Path, map_size: tuple[int, ...], size: tuple[int, int]) -> None:
+def _require_aspect(path: Path, map_size: ImageSize, size: ImageSize) -> None:
     (map_height, map_width), (height, width) = map_size, size
     if map_size != size and abs(map_width * height / (map_height * width) - 1) > MAX_ASPECT_DIFFERENCE:
         raise InputError(
@@ -96,8 +96,8 @@ def _without_absurd(path: Path, values: DoubleImage, limit_px: float) -> tuple[F
     return known, notes
 
 
-def _filled(path: Path, values: FloatImage) -> FloatImage:
+def _fill_unknown(path: Path, values: FloatImage) -> FloatImage:
     try:
-        return fill_from_background(values)
+        return fill_disparity_holes(values)
     except ValueError as error:
         raise InputError(f"{path}: too few known values survive at the photo's size; give a denser map") from error

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import opened_file
+from iibr_core.formats.files import open_binary
 from iibr_core.types import InputError
 
 HEADERS = {(1, 0): npy_format.read_array_header_1_0, (2, 0): npy_format.read_array_header_2_0}
@@ -23,7 +23,7 @@ MISREADINGS = (ValueError, EOFError, OverflowError, TypeError, SyntaxError, toke
 
 def read_array(path: Path, most_values: int) -> NDArray[Any]:
     """The array of an NPY file. Raises InputError where there is none, one of other than numbers, or a larger one."""
-    with opened_file(path) as file:
+    with open_binary(path) as file:
         shape, dtype = _header(path, file)
         count = math.prod(shape)
         if dtype.kind not in "fiu":

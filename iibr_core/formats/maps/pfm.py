@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import opened_file, written_whole
+from iibr_core.formats.files import atomic_write, open_binary
 from iibr_core.types import FloatImage, InputError
 
 MAX_FILE_PIXELS = 400_000_000
@@ -25,7 +25,7 @@ def read_pfm(path: Path) -> FloatImage:
     that makes no sense, and files that are missing or cut off.
     """
     path = Path(path)
-    with opened_file(path) as file:
+    with open_binary(path) as file:
         match = HEADER.match(file.read(HEADER_BYTES))
         if match is None:
             raise InputError(f"{path}: is not a PFM file (no header 'Pf width height scale')")
@@ -48,7 +48,7 @@ def read_pfm(path: Path) -> FloatImage:
 def write_pfm(path: Path, values: FloatImage) -> None:
     """Write an (H, W) map, little-endian float32, whole or not at all. Raises InputError where it cannot be written."""
     height, width = values.shape
-    with written_whole(Path(path)) as temporary:
+    with atomic_write(Path(path)) as temporary:
         header = f"Pf\n{width} {height}\n-1.0\n".encode()
         temporary.write_bytes(header + values[::-1].astype("<f4").tobytes())
 

@@ -9,13 +9,13 @@ import math
 import numpy as np
 
 from iibr_core.runtime.jit import kernel
-from iibr_core.types import FloatImage
+from iibr_core.types import FloatImage, ImageSize
 
 # Values under one filter footprint that differ by more than this share of the map's range belong to different surfaces.
 SURFACE_SHARE = 0.02
 
 
-def resample_surfaces(values: FloatImage, size: tuple[int, int]) -> FloatImage:
+def resample_surfaces(values: FloatImage, size: ImageSize) -> FloatImage:
     """An (H, W) map at another (height, width); values keep their unit, NaN is unknown before and after.
 
     Linear interpolation (a tent as wide as the size ratio asks for). Where the footprint spans a depth edge, the

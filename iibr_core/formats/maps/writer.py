@@ -8,8 +8,8 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import written_whole
-from iibr_core.formats.images.oiio_writer import write_picture
+from iibr_core.formats.files import atomic_write
+from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import FloatImage, InputError
 
@@ -34,7 +34,7 @@ def write_map(path: Path, values: FloatImage) -> str:
     if kind == ".pfm":
         write_pfm(path, values)
     elif kind == ".npy":
-        with written_whole(path) as temporary:
+        with atomic_write(path) as temporary:
             np.save(temporary, np.asarray(values, np.float32))
     elif kind == ".exr":
         _write_picture(path, np.asarray(values, np.float32), "float")
@@ -54,4 +54,4 @@ def _write_png(path: Path, values: FloatImage) -> str:
 def _write_picture(path: Path, values: FloatImage | NDArray[np.uint16], dtype: str) -> None:
     spec = oiio.ImageSpec(values.shape[1], values.shape[0], 1, dtype)
     spec.channelnames = ("Y",)
-    write_picture(path, spec, values[..., None])
+    write_image_file(path, spec, values[..., None])

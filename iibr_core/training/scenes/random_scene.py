@@ -19,16 +19,17 @@ from iibr_core.training.scenes.raycast import (
     PLANE,
     PRIMITIVE,
     WIRE,
-    Scene,
+    RaycastScene,
     cast,
     disparity_at,
+    is_visible_from,
     render,
     sample_places,
-    seen_from,
 )
 from iibr_core.training.scenes.textures import DISC, FRAME, LACE, LEAVES, MESH, PATTERNS, WHOLE
+from iibr_core.types import ImageSize
 
-__all__ = ["Scene", "cast", "disparity_at", "random_scene", "render", "sample_places", "seen_from"]
+__all__ = ["RaycastScene", "cast", "disparity_at", "is_visible_from", "random_scene", "render", "sample_places"]
 
 OBJECTS = (3, 60)
 DEPTH_RATIO = (1.25, 5.0)
@@ -41,7 +42,7 @@ Primitive = NDArray[np.void]
 Vector = NDArray[np.float64]
 
 
-def random_scene(rng: np.random.Generator, size: tuple[int, int], largest_disparity: float) -> Scene:
+def random_scene(rng: np.random.Generator, size: ImageSize, largest_disparity: float) -> RaycastScene:
     """A scene for pictures of (height, width); none of its disparities, in any view, exceeds +-largest_disparity.
 
     largest_disparity: px per view step, the limit on one side of the zero plane; on the other it is some part of it.
@@ -49,32 +50,32 @@ def random_scene(rng: np.random.Generator, size: tuple[int, int], largest_dispar
     """
     if min(size) < 1 or not 0 <= largest_disparity < np.inf:
         raise ValueError(f"size {size}, largest disparity {largest_disparity}: give pixels, and 0 or more")
-    stage = _stage(rng, size, largest_disparity)
-    primitives = _backdrop_planes(stage)
+    bounds = _random_bounds(rng, size, largest_disparity)
+    primitives = _backdrop_planes(bounds)
     if largest_disparity > 0:
         makers = rng.choice(len(MAKERS), int(_log_uniform(rng, *OBJECTS)), p=MAKER_SHARES)
         for maker in makers:
-            primitives += MAKERS[maker](stage)
+            primitives += MAKERS[maker](bounds)
     kept = sorted(primitives, key=lambda p: float(p["nearest_z"]))
     light = rng.normal(size=3) * (1.0, 0.4, 0.4) + (0.0, -1.0, -1.0)
     light /= np.linalg.norm(light)
-    return Scene(
-        primitives=np.array([*kept, _last_plane(stage)], PRIMITIVE),
-        centre_px=stage.centre_px,
-        focal_px=stage.focal_px,
-        infinity_px=stage.infinity_px,
-        depths=(stage.least_z, stage.greatest_z),
+    return RaycastScene(
+        primitives=np.array([*kept, _last_plane(bounds)], PRIMITIVE),
+        centre_px=bounds.centre_px,
+        focal_px=bounds.focal_px,
+        infinity_px=bounds.infinity_px,
+        depths=(bounds.least_z, bounds.greatest_z),
         light=(float(light[0]), float(light[1]), float(light[2])),
         ambient=float(rng.uniform(0.4, 0.9)),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Stage:
+class _SceneBounds:
     """Where things can stand: a picture, its lens, a range of disparities; and the colours they share."""
 
     rng: np.random.Generator
-    size: tuple[int, int]
+    size: ImageSize
     focal_px: float
     infinity_px: float
     least: float
@@ -83,7 +84,7 @@ class _Stage:
 
     @property
     def centre_px(self) -> tuple[float, float]:
-        return (self.size[1] - 1) / 2, (self.size[0] - 1) / 2
+        return (self.size.width - 1) / 2, (self.size.height - 1) / 2
 
     @property
     def least_z(self) -> float:
@@ -112,13 +113,13 @@ class _Stage:
         return self.point(x, y, self.rng.uniform(self.least, self.greatest))
 
 
-def _stage(rng: np.random.Generator, size: tuple[int, int], largest: float) -> _Stage:
+def _random_bounds(rng: np.random.Generator, size: ImageSize, largest: float) -> _SceneBounds:
     other = largest * min(float(rng.uniform(-0.1, 1.0)), 1.0)
     least, greatest = (-max(other, 0.0), largest) if rng.random() < 0.75 else (-largest, max(other, 0.0))
     span = max(greatest - least, 1e-3)
     infinity = span / (_log_uniform(rng, *DEPTH_RATIO) - 1) - least
     focal = max(size) * float(rng.uniform(*FOCAL_WIDTHS))
-    return _Stage(rng, size, focal, infinity, least, greatest, rng.random(5))
+    return _SceneBounds(rng, size, focal, infinity, least, greatest, rng.random(5))
 
 
 def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -144,30 +145,30 @@ def _axes_about(third: Vector, roll: float) -> NDArray[np.float64]:
     return np.stack([np.cos(roll) * first + np.sin(roll) * second, np.cos(roll) * second - np.sin(roll) * first, third])
 
 
-def _painted(stage: _Stage, shape: int, centre: Vector, axes: NDArray[np.float64], half: Vector) -> Primitive:
+def _paint(bounds: _SceneBounds, shape: int, centre: Vector, axes: NDArray[np.float64], half: Vector) -> Primitive:
     """A primitive with a random pattern in random colours, as fine as pixels and as coarse as the picture."""
-    rng = stage.rng
-    pixel = centre[2] / stage.focal_px
+    rng = bounds.rng
+    pixel = centre[2] / bounds.focal_px
     p = np.zeros((), PRIMITIVE)
     p["shape"], p["centre"], p["axes"], p["half"] = shape, centre, axes, np.maximum(half, THINNEST)
     reach = np.abs(p["axes"][:, 2]) @ p["half"]
-    p["nearest_z"] = max(centre[2] - reach, stage.least_z)
+    p["nearest_z"] = max(centre[2] - reach, bounds.least_z)
     p["pattern"] = rng.choice(PATTERNS, p=(0.5, 0.15, 0.12, 0.1, 0.13))
-    p["period"] = pixel * _log_uniform(rng, 3.0, max(stage.side_px / 6, 12.0))
+    p["period"] = pixel * _log_uniform(rng, 3.0, max(bounds.side_px / 6, 12.0))
     p["roughness"] = rng.beta(1.2, 1.2)
-    p["wavelength"] = pixel * _log_uniform(rng, 12.0, max(stage.side_px / 2, 48.0))
+    p["wavelength"] = pixel * _log_uniform(rng, 12.0, max(bounds.side_px / 2, 48.0))
     p["gain"] = rng.uniform(0.5, 0.9)
     p["tint"] = rng.beta(1.0, 2.0)
     p["phase"] = rng.uniform(-1e3, 1e3, 3) * pixel
-    p["palette"] = _palette(stage)
+    p["palette"] = _palette(bounds)
     p["seed"] = rng.integers(1 << 31)
     return p
 
 
-def _palette(stage: _Stage) -> NDArray[np.float32]:
+def _palette(bounds: _SceneBounds) -> NDArray[np.float32]:
     """(3, 3): a dark and a light colour of one hue, and a third, linear light."""
-    rng = stage.rng
-    hues = rng.choice(stage.hues, 2) + rng.normal(0, 0.04, 2)
+    rng = bounds.rng
+    hues = rng.choice(bounds.hues, 2) + rng.normal(0, 0.04, 2)
     middle, contrast = rng.uniform(0.2, 0.85), _log_uniform(rng, 0.2, 1.4)
     values = np.clip([middle - contrast / 2, middle + contrast / 2, rng.uniform(0.1, 0.9)], 0.03, 0.97)
     saturations = rng.beta(1.0, 3.0, 3)
@@ -176,90 +177,96 @@ def _palette(stage: _Stage) -> NDArray[np.float32]:
     return linear_from_srgb(values[:, None] * (1 - saturations[:, None] * (1 - pure)))
 
 
-def _fitted(stage: _Stage, shape: int, centre: Vector, axes: NDArray[np.float64], half: Vector) -> Primitive:
+def _fit_into_depths(
+    bounds: _SceneBounds, shape: int, centre: Vector, axes: NDArray[np.float64], half: Vector
+) -> Primitive:
     """The same, shrunk and moved along its line of sight so that it stays within the scene's depths."""
     reach = float(np.abs(axes[:, 2]) @ half)
-    room = (stage.greatest_z - stage.least_z) / 2
+    room = (bounds.greatest_z - bounds.least_z) / 2
     if reach > 0.99 * room:
         half, reach = half * (0.99 * room / reach), 0.99 * room
-    z = min(max(centre[2], stage.least_z + 1.001 * reach), stage.greatest_z - 1.001 * reach)
-    return _painted(stage, shape, centre * (z / centre[2]), axes, half)
+    z = min(max(centre[2], bounds.least_z + 1.001 * reach), bounds.greatest_z - 1.001 * reach)
+    return _paint(bounds, shape, centre * (z / centre[2]), axes, half)
 
 
-def _last_plane(stage: _Stage) -> Primitive:
+def _last_plane(bounds: _SceneBounds) -> Primitive:
     half = np.array([WITHOUT_END, WITHOUT_END, THINNEST])
-    return _painted(stage, PLANE, np.array([0.0, 0.0, stage.greatest_z]), np.eye(3), half)
+    return _paint(bounds, PLANE, np.array([0.0, 0.0, bounds.greatest_z]), np.eye(3), half)
 
 
-def _backdrop_planes(stage: _Stage) -> list[Primitive]:
+def _backdrop_planes(bounds: _SceneBounds) -> list[Primitive]:
     """Slanted background, floors and walls: up to three planes that cross the whole picture, or none."""
-    if stage.least == stage.greatest:
+    if bounds.least == bounds.greatest:
         return []
-    return [_crossing_plane(stage) for _ in range(stage.rng.choice(4, p=(0.25, 0.4, 0.25, 0.1)))]
+    return [_crossing_plane(bounds) for _ in range(bounds.rng.choice(4, p=(0.25, 0.4, 0.25, 0.1)))]
 
 
-def _crossing_plane(stage: _Stage) -> Primitive:
+def _crossing_plane(bounds: _SceneBounds) -> Primitive:
     """A plane without end whose disparity runs from one value to another across the picture."""
-    rng = stage.rng
+    rng = bounds.rng
     towards = rng.uniform(0, 2 * pi) if rng.random() < 0.4 else pi / 2 + rng.normal(0, 0.15)
     direction = np.array([np.cos(towards), np.sin(towards)])
-    low = stage.least + (stage.greatest - stage.least) * rng.uniform(-0.6, 0.4)
-    high = low + (stage.greatest - stage.least) * rng.uniform(0.1, 1.0)
-    high = min(high, stage.greatest - 0.1 * (stage.greatest - low))
+    low = bounds.least + (bounds.greatest - bounds.least) * rng.uniform(-0.6, 0.4)
+    high = low + (bounds.greatest - bounds.least) * rng.uniform(0.1, 1.0)
+    high = min(high, bounds.greatest - 0.1 * (bounds.greatest - low))
     # focal / z = middle + slope . (x, y) is a plane of the world.
-    slope = direction * (high - low) / stage.side_px
-    middle = max((low + high) / 2 + stage.infinity_px, 0.02 * (stage.greatest + stage.infinity_px))
-    third = np.array([slope[0] * stage.focal_px, slope[1] * stage.focal_px, middle])
+    slope = direction * (high - low) / bounds.side_px
+    middle = max((low + high) / 2 + bounds.infinity_px, 0.02 * (bounds.greatest + bounds.infinity_px))
+    third = np.array([slope[0] * bounds.focal_px, slope[1] * bounds.focal_px, middle])
     third /= np.linalg.norm(third)
-    centre = np.array([0.0, 0.0, stage.focal_px / middle])
-    plane = _painted(
-        stage, PLANE, centre, _axes_about(third, rng.uniform(0, 2 * pi)), np.array([WITHOUT_END, WITHOUT_END, THINNEST])
+    centre = np.array([0.0, 0.0, bounds.focal_px / middle])
+    plane = _paint(
+        bounds,
+        PLANE,
+        centre,
+        _axes_about(third, rng.uniform(0, 2 * pi)),
+        np.array([WITHOUT_END, WITHOUT_END, THINNEST]),
     )
-    plane["nearest_z"] = stage.least_z
+    plane["nearest_z"] = bounds.least_z
     return plane
 
 
-def _plane(stage: _Stage, cut: int = WHOLE, smallest_px: float = 6.0) -> list[Primitive]:
+def _plane(bounds: _SceneBounds, cut: int = WHOLE, smallest_px: float = 6.0) -> list[Primitive]:
     """A rectangle, a third of the time facing the cameras, else at any slant."""
-    rng = stage.rng
-    centre = stage.somewhere()
+    rng = bounds.rng
+    centre = bounds.somewhere()
     slant = 0.0 if rng.random() < 0.35 else np.arccos(rng.uniform(0.1, 1.0))
-    size = _log_uniform(rng, smallest_px, max(stage.side_px * 0.8, smallest_px + 1)) * centre[2] / stage.focal_px
+    size = _log_uniform(rng, smallest_px, max(bounds.side_px * 0.8, smallest_px + 1)) * centre[2] / bounds.focal_px
     half = np.array([size / 2, size / 2 * _log_uniform(rng, 0.25, 1.0), 0.0])
-    plane = _fitted(stage, PLANE, centre, _turn(rng, slant), half)
+    plane = _fit_into_depths(bounds, PLANE, centre, _turn(rng, slant), half)
     plane["cut"] = cut
     return [plane]
 
 
-def _cut_plane(stage: _Stage) -> list[Primitive]:
+def _cut_plane(bounds: _SceneBounds) -> list[Primitive]:
     """A disc, a window frame or ragged lace."""
-    rng = stage.rng
-    [plane] = _plane(stage, int(rng.choice([DISC, FRAME, LACE])), 12.0)
-    pixel = plane["centre"][2] / stage.focal_px
+    rng = bounds.rng
+    [plane] = _plane(bounds, int(rng.choice([DISC, FRAME, LACE])), 12.0)
+    pixel = plane["centre"][2] / bounds.focal_px
     plane["cut_period"] = _log_uniform(rng, 5, 40) * pixel
     plane["cut_width"] = _log_uniform(rng, 1, 12) * pixel
     return [plane]
 
 
-def _mesh(stage: _Stage) -> list[Primitive]:
+def _mesh(bounds: _SceneBounds) -> list[Primitive]:
     """Wires about a pixel wide in both directions of a plane."""
-    rng = stage.rng
-    [plane] = _plane(stage, MESH, 30.0)
-    pixel = plane["centre"][2] / stage.focal_px
+    rng = bounds.rng
+    [plane] = _plane(bounds, MESH, 30.0)
+    pixel = plane["centre"][2] / bounds.focal_px
     plane["cut_width"] = _log_uniform(rng, 0.7, 2.0) * pixel
     plane["cut_period"] = _log_uniform(rng, 5, 24) * pixel
     return [plane]
 
 
-def _leaves(stage: _Stage) -> list[Primitive]:
+def _leaves(bounds: _SceneBounds) -> list[Primitive]:
     """A few layers of leaves, one behind the other."""
-    rng = stage.rng
-    [first] = _plane(stage, LEAVES, 40.0)
-    pixel = first["centre"][2] / stage.focal_px
+    rng = bounds.rng
+    [first] = _plane(bounds, LEAVES, 40.0)
+    pixel = first["centre"][2] / bounds.focal_px
     first["cut_period"] = _log_uniform(rng, 10, 50) * pixel
     layers = [first]
     for _ in range(rng.integers(1, 4)):
-        layer = _fitted(stage, PLANE, first["centre"] * rng.uniform(0.9, 1.1), first["axes"], first["half"])
+        layer = _fit_into_depths(bounds, PLANE, first["centre"] * rng.uniform(0.9, 1.1), first["axes"], first["half"])
         for name in ("pattern", "palette", "wavelength", "period", "cut", "cut_period"):
             layer[name] = first[name]
         layer["palette"] *= rng.uniform(0.6, 1.0)
@@ -267,33 +274,33 @@ def _leaves(stage: _Stage) -> list[Primitive]:
     return layers
 
 
-def _box(stage: _Stage) -> list[Primitive]:
-    rng = stage.rng
-    centre = stage.somewhere()
-    size = _log_uniform(rng, 5.0, max(stage.side_px * 0.4, 6.0)) * centre[2] / stage.focal_px
-    return [_fitted(stage, BOX, centre, _turn(rng), size / 2 * rng.uniform(0.3, 1.0, 3))]
+def _box(bounds: _SceneBounds) -> list[Primitive]:
+    rng = bounds.rng
+    centre = bounds.somewhere()
+    size = _log_uniform(rng, 5.0, max(bounds.side_px * 0.4, 6.0)) * centre[2] / bounds.focal_px
+    return [_fit_into_depths(bounds, BOX, centre, _turn(rng), size / 2 * rng.uniform(0.3, 1.0, 3))]
 
 
-def _ball(stage: _Stage) -> list[Primitive]:
-    rng = stage.rng
-    centre = stage.somewhere()
-    size = _log_uniform(rng, 4.0, max(stage.side_px * 0.4, 5.0)) * centre[2] / stage.focal_px
+def _ball(bounds: _SceneBounds) -> list[Primitive]:
+    rng = bounds.rng
+    centre = bounds.somewhere()
+    size = _log_uniform(rng, 4.0, max(bounds.side_px * 0.4, 5.0)) * centre[2] / bounds.focal_px
     half = np.full(3, size / 2) if rng.random() < 0.5 else size / 2 * rng.uniform(0.3, 1.0, 3)
-    return [_fitted(stage, BALL, centre, _turn(rng), half)]
+    return [_fit_into_depths(bounds, BALL, centre, _turn(rng), half)]
 
 
-def _wires(stage: _Stage) -> list[Primitive]:
+def _wires(bounds: _SceneBounds) -> list[Primitive]:
     """One to five wires, each about a pixel wide; several run side by side."""
-    rng = stage.rng
-    centre = stage.somewhere()
-    pixel = centre[2] / stage.focal_px
+    rng = bounds.rng
+    centre = bounds.somewhere()
+    pixel = centre[2] / bounds.focal_px
     axes = _turn(rng, pi / 2 + float(rng.normal(0, 0.25)))
     radius = _log_uniform(rng, 0.35, 1.2) * pixel
-    length = _log_uniform(rng, 10.0, max(stage.side_px * 1.5, 11.0)) * pixel
+    length = _log_uniform(rng, 10.0, max(bounds.side_px * 1.5, 11.0)) * pixel
     apart = axes[0] * _log_uniform(rng, 4, 20) * pixel
     half = np.array([radius, radius, length / 2])
-    return [_fitted(stage, WIRE, centre + k * apart, axes, half) for k in range(rng.integers(1, 6))]
+    return [_fit_into_depths(bounds, WIRE, centre + k * apart, axes, half) for k in range(rng.integers(1, 6))]
 
 
-MAKERS: list[Callable[[_Stage], list[Primitive]]] = [_plane, _cut_plane, _mesh, _leaves, _box, _ball, _wires]
+MAKERS: list[Callable[[_SceneBounds], list[Primitive]]] = [_plane, _cut_plane, _mesh, _leaves, _box, _ball, _wires]
 MAKER_SHARES = (0.28, 0.12, 0.07, 0.12, 0.17, 0.12, 0.12)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from iibr_core.runtime.jit import kernel, srgb_scalar
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.training.scenes.textures import inside_pattern, is_cut, noise, pattern, rough_noise
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
 PLANE, BOX, BALL, WIRE = range(4)
 """A rectangle, a box, an ellipsoid, the side of a cylinder along its third axis."""
@@ -55,7 +55,7 @@ TENT_STEPS = sqrt(6.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class RaycastScene:
     """What can be seen, and the cameras that see it.
 
     primitives: (N,) PRIMITIVE, nearest first; the last is a plane without bounds at the greatest depth, seen wherever
@@ -74,7 +74,7 @@ class Scene:
 
 
 def render(
-    scene: Scene, size: tuple[int, int], offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
+    scene: RaycastScene, size: ImageSize, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
 ) -> tuple[FloatImage, FloatImage]:
     """The view at an offset: colours (H, W, 3), sRGB-encoded, and disparity (H, W), exact at pixel centres.
 
@@ -86,7 +86,7 @@ def render(
 
 
 def cast(
-    scene: Scene, x: ArrayLike, y: ArrayLike, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
+    scene: RaycastScene, x: ArrayLike, y: ArrayLike, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
 ) -> tuple[FloatImage, FloatImage]:
     """Colours (N, 3), sRGB-encoded, and disparities (N,) of the pixels centred at (x, y), px, of the view at an offset.
 
@@ -94,7 +94,7 @@ def cast(
     blur_px: how much wider the lens spreads a pixel (standard deviation, px). The disparity is that of the pixel's
     centre. Finite whatever the input. Raises ValueError if x and y differ in shape or there is no sample.
     """
-    x, y = np.atleast_1d(_bounded(x)), np.atleast_1d(_bounded(y))
+    x, y = np.atleast_1d(_clamp_finite(x)), np.atleast_1d(_clamp_finite(y))
     if x.shape != y.shape or x.ndim != 1 or samples < 1:
         raise ValueError(f"x is {x.shape}, y {y.shape}, samples {samples}: give equal (N,) and at least one sample")
     colors, disparity = np.empty((len(x), 3), np.float32), np.empty(len(x), np.float32)
@@ -113,13 +113,13 @@ def cast(
     return colors, disparity
 
 
-def disparity_at(scene: Scene, x: ArrayLike, y: ArrayLike, offset: ViewOffset) -> FloatImage:
+def disparity_at(scene: RaycastScene, x: ArrayLike, y: ArrayLike, offset: ViewOffset) -> FloatImage:
     """Disparities (N,) seen at the positions (x, y), (N,), px, of the view at an offset."""
     return cast(scene, x, y, offset, samples=1)[1]
 
 
-def seen_from(
-    scene: Scene,
+def is_visible_from(
+    scene: RaycastScene,
     x: ArrayLike,
     y: ArrayLike,
     disparity: ArrayLike,
@@ -137,7 +137,7 @@ def seen_from(
     return np.abs(there - d) <= tolerance_px
 
 
-def _bounded(values: ArrayLike) -> NDArray[np.float64]:
+def _clamp_finite(values: ArrayLike) -> NDArray[np.float64]:
     """float64; what is not finite or lies too far off counts as 0 or as far off as possible."""
     return np.clip(np.nan_to_num(np.asarray(values, np.float64)), -FARTHEST, FARTHEST)
 
@@ -165,10 +165,10 @@ def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float6
     return np.concatenate([np.zeros((1, 2)), places]), np.r_[0.0, weights]
 
 
-def _view_of(scene: Scene, offset: ViewOffset) -> tuple[Any, ...]:
+def _view_of(scene: RaycastScene, offset: ViewOffset) -> tuple[Any, ...]:
     """What the kernel needs to know of a view."""
     primitives = scene.primitives
-    camera = _bounded([offset.s, offset.t, 0.0])
+    camera = _clamp_finite([offset.s, offset.t, 0.0])
     axes = np.ascontiguousarray(primitives["axes"])
     origins = np.einsum("nij,nj->ni", axes, camera - primitives["centre"])
     lens = np.array([*scene.centre_px, scene.focal_px, scene.infinity_px, *scene.depths])
@@ -176,7 +176,7 @@ def _view_of(scene: Scene, offset: ViewOffset) -> tuple[Any, ...]:
     return primitives, axes, origins, _bounds(scene, camera), camera, lens, light
 
 
-def _bounds(scene: Scene, camera: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bounds(scene: RaycastScene, camera: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 4): each primitive lies within these x and y (first x, last x, first y, last y) of the view, px."""
     primitives = scene.primitives
     signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 1, 3)

@@ -27,7 +27,7 @@ FARTHEST = 1e7
 
 
 @kernel
-def hashed(x, y, z, seed):  # type: ignore[no-untyped-def]
+def hash_lattice(x, y, z, seed):  # type: ignore[no-untyped-def]
     """A number in [0, 1) that depends on four integers and looks random."""
     h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y) * np.uint64(0xC2B2AE3D27D4EB4F)
     h += np.uint64(z) * np.uint64(0x165667B19E3779F9) + np.uint64(seed) * np.uint64(0xD6E8FEB86659FD93)
@@ -55,13 +55,13 @@ def noise(x, y, z, seed):  # type: ignore[no-untyped-def]
     fx, fy, fz = x - i, y - j, z - k
     fx, fy, fz = fx * fx * (3 - 2 * fx), fy * fy * (3 - 2 * fy), fz * fz * (3 - 2 * fz)
     near = _mix(
-        _mix(hashed(i, j, k, seed), hashed(i + 1, j, k, seed), fx),
-        _mix(hashed(i, j + 1, k, seed), hashed(i + 1, j + 1, k, seed), fx),
+        _mix(hash_lattice(i, j, k, seed), hash_lattice(i + 1, j, k, seed), fx),
+        _mix(hash_lattice(i, j + 1, k, seed), hash_lattice(i + 1, j + 1, k, seed), fx),
         fy,
     )
     far = _mix(
-        _mix(hashed(i, j, k + 1, seed), hashed(i + 1, j, k + 1, seed), fx),
-        _mix(hashed(i, j + 1, k + 1, seed), hashed(i + 1, j + 1, k + 1, seed), fx),
+        _mix(hash_lattice(i, j, k + 1, seed), hash_lattice(i + 1, j, k + 1, seed), fx),
+        _mix(hash_lattice(i, j + 1, k + 1, seed), hash_lattice(i + 1, j + 1, k + 1, seed), fx),
         fy,
     )
     return _mix(near, far, fz)
@@ -92,10 +92,10 @@ def _square_wave(position, period, soft):  # type: ignore[no-untyped-def]
 def _spots(x, y, z, period, soft, seed):  # type: ignore[no-untyped-def]
     """1 within a ball in each cell of a grid, 0 outside."""
     i, j, k = floor(x / period), floor(y / period), floor(z / period)
-    radius = 0.2 + 0.28 * hashed(i, j, k, seed)
+    radius = 0.2 + 0.28 * hash_lattice(i, j, k, seed)
     room = 1 - 2 * radius
-    dx = x / period - i - radius - room * hashed(i, j, k, seed + 1)
-    dy = y / period - j - radius - room * hashed(i, j, k, seed + 2)
+    dx = x / period - i - radius - room * hash_lattice(i, j, k, seed + 1)
+    dy = y / period - j - radius - room * hash_lattice(i, j, k, seed + 2)
     dz = (z / period - k - 0.5) * 0.5
     distance = (sqrt(dx * dx + dy * dy + dz * dz) - radius) * period
     return 1 - _ramp(distance, -0.5 * soft, 0.5 * soft)
@@ -133,11 +133,11 @@ def _leaf(x, y, angle, seed):  # type: ignore[no-untyped-def]
     """Whether a point lies on the one leaf of its cell of a turned unit grid."""
     u, v = cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y
     i, j = floor(u), floor(v)
-    turn = 2 * pi * hashed(i, j, 0, seed)
-    du = u - i - 0.35 - 0.3 * hashed(i, j, 1, seed)
-    dv = v - j - 0.35 - 0.3 * hashed(i, j, 2, seed)
+    turn = 2 * pi * hash_lattice(i, j, 0, seed)
+    du = u - i - 0.35 - 0.3 * hash_lattice(i, j, 1, seed)
+    dv = v - j - 0.35 - 0.3 * hash_lattice(i, j, 2, seed)
     along, across = cos(turn) * du + sin(turn) * dv, cos(turn) * dv - sin(turn) * du
-    length = 0.3 + 0.3 * hashed(i, j, 3, seed)
+    length = 0.3 + 0.3 * hash_lattice(i, j, 3, seed)
     tip = 1 - (along / length) ** 2
     return tip > 0 and abs(across) < 0.35 * length * tip
 

@@ -14,11 +14,11 @@ from iibr_core.depth.editing.brush import (
     CONTOUR_CONTRAST,
     LIKENESS,
     DepthCanvas,
-    edited,
+    apply_edits,
     falloff,
-    smoothed,
+    smooth_within_contours,
+    stroke_colours,
     stroke_distance,
-    touched_colours,
 )
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
 from iibr_core.types import InputError
@@ -52,7 +52,7 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
     distance = np.ones((height, width))
     distance[row, column] = hypot(column - (x * width - 0.5), row - (y * height - 0.5)) / radius
     waiting = [(distance[row, column], row, column)]
-    colors = touched_colours(photo, stroke, 0)
+    colors = stroke_colours(photo, stroke, 0)
     away = np.linalg.norm(photo[:, :, None] - colors, axis=3).min(axis=2)
     unlike = np.maximum(away - LIKENESS, 0)  # of blocks of 5 x 5: there are no specks but at the window's border
     while waiting:
@@ -86,7 +86,7 @@ def test_a_dab_moves_its_middle_by_its_strength_and_ends_at_its_radius(tool: Bru
     photo = np.full((61, 81, 3), 0.5, np.float32)
     disparity = np.linspace(0, 10, 61 * 81, dtype=np.float32).reshape(61, 81)
     stroke = Stroke(tool, ((0.5, 0.5),), 10 / 81, 0.25)
-    change = edited(photo, disparity, DepthEdits(strokes=(stroke,))) - disparity
+    change = apply_edits(photo, disparity, DepthEdits(strokes=(stroke,))) - disparity
     assert change[30, 40] == pytest.approx(sign * 0.25 * 10, rel=0.01)
     y, x = np.mgrid[:61, :81]
     away = np.hypot(x - 40, y - 30)
@@ -100,7 +100,7 @@ def test_a_stroke_does_not_cross_a_contour(tool: BrushTool) -> None:
     photo, disparity = plain_photo(), plane()
     disparity[:, WIDTH // 2 :] += 3
     disparity[::2, : WIDTH // 2] += 0.5
-    change = edited(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),))) - disparity
+    change = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),))) - disparity
     assert np.abs(change[:, : WIDTH // 2]).max() > 0.1
     assert not change[:, WIDTH // 2 :].any()
 
@@ -125,18 +125,18 @@ def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
 def test_smoothing_is_its_slow_twin_along_a_row_and_keeps_a_constant() -> None:
     rng = np.random.default_rng(1)
     photo, values = plain_photo(), rng.normal(size=(HEIGHT, WIDTH)).astype(np.float32)
-    smooth = smoothed(photo, values, 5.0, 0.0)
+    smooth = smooth_within_contours(photo, values, 5.0, 0.0)
     for part in (np.s_[:, : WIDTH // 2], np.s_[:, WIDTH // 2 :]):
         assert smooth[part].std() < 0.3 * values[part].std()
         assert smooth[part].mean() == pytest.approx(values[part].mean(), abs=0.1)
     constant = np.full_like(values, 2.5)
-    np.testing.assert_allclose(smoothed(photo, constant, 5.0, 0.0), constant, rtol=1e-6)
+    np.testing.assert_allclose(smooth_within_contours(photo, constant, 5.0, 0.0), constant, rtol=1e-6)
 
 
 def test_smoothing_does_not_mix_what_a_contour_parts() -> None:
     values = np.zeros((HEIGHT, WIDTH), np.float32)
     values[:, WIDTH // 2 :] = 1
-    np.testing.assert_allclose(smoothed(plain_photo(), values, 8.0, 0.0), values, atol=0.02)
+    np.testing.assert_allclose(smooth_within_contours(plain_photo(), values, 8.0, 0.0), values, atol=0.02)
 
 
 strokes = st.builds(
@@ -179,7 +179,7 @@ def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdi
         for step in steps:
             shown = canvas.shown(step)
             before = shown.copy()
-            np.testing.assert_array_equal(shown, edited(photo, plane(), step))
+            np.testing.assert_array_equal(shown, apply_edits(photo, plane(), step))
             canvas.shown(one)
             np.testing.assert_array_equal(shown, before, "what was handed out must not change")
 
@@ -195,7 +195,7 @@ def test_the_map_before_strokes_is_not_painted() -> None:
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (3, 2)])
 def test_tiny_photos_can_be_painted_on(shape: tuple[int, int], tool: BrushTool) -> None:
     photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
-    result = edited(photo, disparity, DepthEdits(strokes=(dab(tool, 0.5, 0.5, 0.25),)))
+    result = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, 0.5, 0.5, 0.25),)))
     assert np.isfinite(result).all()
     assert tool == "smooth" or result.any()
 
@@ -206,13 +206,13 @@ def test_wild_values_stay_finite(wild: float, tool: BrushTool) -> None:
     disparity = plane()
     disparity[10:20, 10:30] = wild
     stroke = Stroke(tool, ((0.1, 0.1), (0.9, 0.9)), 0.2, 1.0)
-    assert np.isfinite(edited(plain_photo(), disparity, DepthEdits(strokes=(stroke, stroke)))).all()
+    assert np.isfinite(apply_edits(plain_photo(), disparity, DepthEdits(strokes=(stroke, stroke)))).all()
 
 
 @pytest.mark.parametrize("place", [(-5.0, 0.5), (1e30, -1e30), (0.5, 40.0)])
 def test_a_stroke_outside_the_photo_changes_nothing(place: tuple[float, float]) -> None:
     disparity = plane()
-    result = edited(plain_photo(), disparity, DepthEdits(strokes=(Stroke("nearer", (place,), 0.1, 1.0),)))
+    result = apply_edits(plain_photo(), disparity, DepthEdits(strokes=(Stroke("nearer", (place,), 0.1, 1.0),)))
     np.testing.assert_array_equal(result, disparity)
 
 
@@ -220,4 +220,4 @@ def test_sizes_must_agree_and_something_must_be_known() -> None:
     with pytest.raises(ValueError, match="disparity"):
         DepthCanvas(plain_photo(), np.zeros((3, 3), np.float32))
     with pytest.raises(InputError, match="no disparity is known"):
-        edited(plain_photo(), np.full((HEIGHT, WIDTH), np.nan, np.float32), DepthEdits(strokes=(dab(),)))
+        apply_edits(plain_photo(), np.full((HEIGHT, WIDTH), np.nan, np.float32), DepthEdits(strokes=(dab(),)))

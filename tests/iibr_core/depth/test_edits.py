@@ -14,12 +14,12 @@ from iibr_core.depth.editing.edits import (
     UNEDITED,
     DepthEdits,
     Stroke,
+    apply_tone,
     extent_of,
+    invert_tone_curve,
     levels_of,
     require_sound,
-    share_before_tone,
-    toned,
-    toned_share,
+    tone_curve,
 )
 from iibr_core.types import InputError
 
@@ -52,32 +52,34 @@ def test_tone_is_its_slow_twin_at_every_pixel(edits: DepthEdits, seed: int) -> N
     disparity = np.random.default_rng(seed).normal(0, 3, (7, 9)).astype(np.float32)
     low, high = extent_of(disparity)
     wanted = [slow_toned(float(value), low, high, edits) for value in disparity.flat]
-    np.testing.assert_allclose(toned(disparity, edits).flat, wanted, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(apply_tone(disparity, edits).flat, wanted, rtol=1e-5, atol=1e-5)
 
 
 @given(tones)
 def test_tone_keeps_the_order_of_values_or_turns_all_of_it(edits: DepthEdits) -> None:
     disparity = np.linspace(-5, 7, 300, dtype=np.float32)[None]
-    steps = np.diff(toned(disparity, edits)[0])
+    steps = np.diff(apply_tone(disparity, edits)[0])
     assert (steps <= 0).all() if edits.is_inverted else (steps >= 0).all()
 
 
 def test_without_edits_the_map_comes_back_as_it_is() -> None:
     disparity = np.random.default_rng(0).normal(size=(5, 6)).astype(np.float32)
-    assert toned(disparity, UNEDITED) is disparity
+    assert apply_tone(disparity, UNEDITED) is disparity
 
 
 def test_inverting_twice_comes_back() -> None:
     disparity = np.random.default_rng(0).normal(size=(50, 60)).astype(np.float32)
     extent = extent_of(disparity)
     inverted = DepthEdits(is_inverted=True)
-    np.testing.assert_allclose(toned(toned(disparity, inverted, extent), inverted, extent), disparity, atol=1e-5)
+    np.testing.assert_allclose(
+        apply_tone(apply_tone(disparity, inverted, extent), inverted, extent), disparity, atol=1e-5
+    )
 
 
 @given(shares, tones)
 def test_a_share_is_found_again_where_it_was_not_clipped(share: float, edits: DepthEdits) -> None:
     edits = replace(edits, is_inverted=False, far_clip=0.0, near_clip=1.0)
-    assert share_before_tone(toned_share(share, edits), edits) == pytest.approx(share, abs=1e-9)
+    assert invert_tone_curve(tone_curve(share, edits), edits) == pytest.approx(share, abs=1e-9)
 
 
 @pytest.mark.parametrize("edits", [UNEDITED, DepthEdits(True, 0.2, 0.8, 2.0), DepthEdits(gamma=0.25)])
@@ -87,7 +89,7 @@ def test_a_share_is_found_again_where_it_was_not_clipped(share: float, edits: De
     ids=str,
 )
 def test_hard_maps_stay_finite(values: list[float], edits: DepthEdits) -> None:
-    result = toned(np.array([values], np.float32), edits)
+    result = apply_tone(np.array([values], np.float32), edits)
     assert result.shape == (1, len(values))
     assert np.isfinite(result).all()
 

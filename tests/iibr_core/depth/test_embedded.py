@@ -11,15 +11,15 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.embedded.apple import heic_estimate
-from iibr_core.depth.embedded.images import MAX_MAP_PIXELS, decoded_map
+from iibr_core.depth.embedded.images import MAX_MAP_PIXELS, decode_map
 from iibr_core.depth.embedded.reader import embedded_in_jpeg, read_embedded
-from iibr_core.depth.embedded.xmp import MAX_ELEMENTS, jpeg_layout, parsed
+from iibr_core.depth.embedded.xmp import MAX_ELEMENTS, jpeg_layout, parse_packet
 from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 
-SIZE = (24, 36)
+SIZE = ImageSize(24, 36)
 RNG = np.random.default_rng(5)
 STORED = RNG.integers(0, 256, SIZE).astype(np.uint8)
 DEEP = RNG.integers(0, 65536, SIZE).astype(np.uint16)
@@ -292,7 +292,7 @@ def test_sizes_are_looked_at_before_memory_is_spent() -> None:
     Image.new("L", (9000, MAX_MAP_PIXELS // 9000 + 1)).save(file, "PNG")
     assert len(file.getvalue()) < 200_000
     with pytest.raises(InputError, match="9000x7112"):
-        decoded_map(file.getvalue(), "a bomb")
+        decode_map(file.getvalue(), "a bomb")
 
 
 @pytest.mark.parametrize("cut", [1, 2, 3, 50])
@@ -320,12 +320,12 @@ def test_entities_are_never_expanded(prolog: str) -> None:
 @pytest.mark.parametrize("packet", [b"", b"<", b"<a><b></a>", b"\xff\xfe\x00", b"<a/><b/>", b"plain text"])
 def test_damaged_xml(packet: bytes) -> None:
     with pytest.raises(InputError):
-        parsed(packet)
+        parse_packet(packet)
 
 
 def test_too_many_elements() -> None:
     with pytest.raises(InputError, match="elements"):
-        parsed(b"<a>" + b"<b/>" * MAX_ELEMENTS + b"</a>")
+        parse_packet(b"<a>" + b"<b/>" * MAX_ELEMENTS + b"</a>")
 
 
 def test_photos_without_depth(tmp_path: Path) -> None:

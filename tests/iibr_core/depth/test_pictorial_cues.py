@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from iibr_core.depth import pictorial_cues
-from iibr_core.depth.pictorial_cues import estimate_offline
+from iibr_core.depth.pictorial_cues import estimate_from_cues
 from tests.iibr_core.scenes import photo_of, smooth_texture, square_before_wall
 
 
@@ -39,7 +39,7 @@ def test_ways_are_the_shortest() -> None:
 
 def test_averages_are_those_of_what_lies_inside() -> None:
     image = np.random.default_rng(0).random((7, 9, 2), np.float32)
-    got = pictorial_cues._averaged(image, 2)
+    got = pictorial_cues._box_filter(image, 2)
     for y, x in np.ndindex(7, 9):
         expected = image[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3].mean(axis=(0, 1))
         np.testing.assert_allclose(got[y, x], expected, rtol=1e-5)
@@ -49,29 +49,29 @@ def test_the_guided_map_takes_its_edges_from_the_photo() -> None:
     pixels = np.full((60, 60, 3), 0.2, np.float32)
     pixels[:, 30:] = 0.8
     ramp = np.tile(np.clip((np.arange(60, dtype=np.float32) - 22) / 16, 0, 1), (60, 1))
-    steps = np.abs(np.diff(pictorial_cues._guided(ramp, pixels.mean(axis=2), pixels), axis=1))
+    steps = np.abs(np.diff(pictorial_cues._guided_upsample(ramp, pixels.mean(axis=2), pixels), axis=1))
     assert (steps.argmax(axis=1) == 29).all()
     assert (steps.max(axis=1) > 4 * np.diff(ramp, axis=1).max()).all()
 
 
 def test_what_stands_out_before_a_wall_is_closer_than_the_wall_beside_it() -> None:
     photo, truth = square_before_wall(120, 160)
-    values = estimate_offline(photo).values
+    values = estimate_from_cues(photo).values
     rows = slice(50, 70)
     in_front = truth.values[rows] > 1
     assert np.percentile(values[rows][in_front], 10) > np.percentile(values[rows][~in_front], 95)
 
 
 def test_a_plain_photo_is_a_ground() -> None:
-    values = estimate_offline(photo_of(np.full((40, 60, 3), 0.5))).values
+    values = estimate_from_cues(photo_of(np.full((40, 60, 3), 0.5))).values
     assert (np.diff(values.mean(axis=1)) > 0).all()
     np.testing.assert_allclose(values, np.tile(values[:, :1], (1, 60)), atol=1e-4)
 
 
 def test_larger_photos_give_the_same_map_larger() -> None:
     texture = smooth_texture(300, 400)
-    small = estimate_offline(photo_of(texture)).values
-    large = estimate_offline(photo_of(texture.repeat(3, axis=0).repeat(3, axis=1))).values
+    small = estimate_from_cues(photo_of(texture)).values
+    large = estimate_from_cues(photo_of(texture.repeat(3, axis=0).repeat(3, axis=1))).values
     assert large.shape == (900, 1200)
     np.testing.assert_allclose(large[1::3, 1::3], small, atol=0.1)
 
@@ -80,7 +80,7 @@ def test_larger_photos_give_the_same_map_larger() -> None:
 @given(st.integers(1, 30), st.integers(1, 30), st.sampled_from([0.0, 1.0, 60000.0]), st.integers(0, 9))
 def test_any_photo_gives_a_finite_map_of_its_size(height: int, width: int, brightest: float, seed: int) -> None:
     pixels = np.random.default_rng(seed).random((height, width, 3)) * brightest
-    values = estimate_offline(photo_of(pixels, is_hdr=brightest > 1)).values
+    values = estimate_from_cues(photo_of(pixels, is_hdr=brightest > 1)).values
     assert values.shape == (height, width)
     assert values.dtype == np.float32
     assert np.isfinite(values).all()
@@ -88,6 +88,6 @@ def test_any_photo_gives_a_finite_map_of_its_size(height: int, width: int, brigh
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 500), (500, 1), (2, 3), (3, 900)])
 def test_thin_photos(size: tuple[int, int]) -> None:
-    values = estimate_offline(photo_of(np.random.default_rng(0).random((*size, 3)))).values
+    values = estimate_from_cues(photo_of(np.random.default_rng(0).random((*size, 3)))).values
     assert values.shape == size
     assert np.isfinite(values).all()

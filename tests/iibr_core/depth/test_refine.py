@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from iibr_core.depth.refine import edge_blur_px, refine
-from iibr_core.training.degradation import blurred, coarse
+from iibr_core.training.degradation import blur, coarsen
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import InputError, ViewOffset
+from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
 CENTRE = ViewOffset(0.0, 0.0)
@@ -33,19 +33,19 @@ def rms(a: np.ndarray, b: np.ndarray) -> float:
 @pytest.mark.parametrize("sigma", [0.8, 1.0, 2.0, 4.0])
 def test_the_blur_of_a_map_is_measured(sigma: float) -> None:
     _, disparity, _ = disc_before_slope()
-    assert edge_blur_px(blurred(disparity, sigma)) == pytest.approx(sigma, rel=0.2)
+    assert edge_blur_px(blur(disparity, sigma)) == pytest.approx(sigma, rel=0.2)
 
 
 def test_a_wide_blur_is_measured_on_a_smaller_map() -> None:
     disparity = np.zeros((400, 400), np.float32)
     disparity[:, 200:] = 1
-    assert edge_blur_px(blurred(disparity, 8.0)) == pytest.approx(8.0, rel=0.2)
+    assert edge_blur_px(blur(disparity, 8.0)) == pytest.approx(8.0, rel=0.2)
 
 
 @pytest.mark.parametrize("sigma", [1.0, 2.0, 4.0])
 def test_blurred_edges_become_steps_where_they_were(sigma: float) -> None:
     photo, disparity, front = disc_before_slope()
-    soft = blurred(disparity, sigma)
+    soft = blur(disparity, sigma)
     sharp = refine(photo, soft)
     assert rms(sharp, disparity) < 0.35 * rms(soft, disparity)
     assert np.mean((sharp > 1.2) != front) < 0.01
@@ -55,13 +55,13 @@ def test_blurred_edges_become_steps_where_they_were(sigma: float) -> None:
 
 def test_half_resolution_becomes_steps() -> None:
     photo, disparity, _ = disc_before_slope()
-    soft = coarse(disparity, 2)
+    soft = coarsen(disparity, 2)
     assert rms(refine(photo, soft), disparity) < 0.7 * rms(soft, disparity)
 
 
 def test_the_edge_follows_the_photo_where_the_map_is_beside_it() -> None:
     photo, disparity, front = disc_before_slope()
-    soft = blurred(np.roll(disparity, 1, axis=1), 1.5)
+    soft = blur(np.roll(disparity, 1, axis=1), 1.5)
     without_photo = refine(np.full_like(photo, 0.5), soft)
     wrong, wrong_without = ((sharp > 1.2) != front for sharp in (refine(photo, soft), without_photo))
     assert wrong.sum() < 0.7 * wrong_without.sum()
@@ -69,13 +69,15 @@ def test_the_edge_follows_the_photo_where_the_map_is_beside_it() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_exact_maps_stay_as_they_are(seed: int) -> None:
-    colors, disparity = render(random_scene(np.random.default_rng(seed), (128, 160), 3.0), (128, 160), CENTRE, 1)
+    colors, disparity = render(
+        random_scene(np.random.default_rng(seed), ImageSize(128, 160), 3.0), ImageSize(128, 160), CENTRE, 1
+    )
     np.testing.assert_array_equal(refine(colors, disparity), disparity)
 
 
 def test_slanted_surfaces_stay_as_they_are_beside_soft_edges() -> None:
     photo, disparity, _ = disc_before_slope()
-    soft = blurred(disparity, 2.0)
+    soft = blur(disparity, 2.0)
     y, x = np.mgrid[:120, :120]
     far_from_edge = np.abs(np.hypot(x - 55, y - 62) - 32) > 14
     np.testing.assert_array_equal(refine(photo, soft)[far_from_edge], soft[far_from_edge])
@@ -85,7 +87,7 @@ def test_a_steep_slope_is_no_edge_beside_sharper_ones() -> None:
     disparity = np.zeros((80, 160), np.float32)
     disparity[:, 80:] = 2.0
     disparity[:40] = np.clip((np.arange(160) - 50) / 30, 0, 2)
-    soft = blurred(disparity, 1.0)
+    soft = blur(disparity, 1.0)
     refined = refine(smooth_texture(80, 160), soft)
     np.testing.assert_allclose(refined[:34], soft[:34], atol=1e-5)
     assert np.minimum(np.abs(refined[46:]), np.abs(refined[46:] - 2)).max() < 0.1
@@ -95,7 +97,7 @@ def test_thin_structures_are_kept() -> None:
     photo, disparity, _ = disc_before_slope()
     disparity[:, 100:104] = 2.5
     photo[:, 100:104] = [0.9, 0.9, 0.2]
-    soft = blurred(disparity, 1.0)
+    soft = blur(disparity, 1.0)
     sharp = refine(photo, soft)
     assert sharp[:, 100:104].mean() >= soft[:, 100:104].mean()
     assert sharp[20:100, [97, 106]].mean() <= soft[20:100, [97, 106]].mean()
@@ -103,7 +105,7 @@ def test_thin_structures_are_kept() -> None:
 
 def test_strength_zero_is_off_and_between_is_between() -> None:
     photo, disparity, _ = disc_before_slope()
-    soft = blurred(disparity, 2.0)
+    soft = blur(disparity, 2.0)
     np.testing.assert_array_equal(refine(photo, soft, 0.0), soft)
     errors = [rms(refine(photo, soft, strength), disparity) for strength in (0.0, 0.4, 0.8, 1.0)]
     assert errors == sorted(errors, reverse=True)
@@ -111,7 +113,7 @@ def test_strength_zero_is_off_and_between_is_between() -> None:
 
 def test_scale_and_offset_of_the_map_do_not_matter() -> None:
     photo, disparity, _ = disc_before_slope()
-    soft = blurred(disparity, 2.0)
+    soft = blur(disparity, 2.0)
     other = refine(photo, soft * 8 - 16)
     # At the threshold of a decision rounding may tip it.
     assert np.mean(np.abs((other + 16) / 8 - refine(photo, soft)) > 1e-3) < 1e-3
@@ -119,7 +121,7 @@ def test_scale_and_offset_of_the_map_do_not_matter() -> None:
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     photo, disparity, _ = disc_before_slope()
-    soft = blurred(disparity, 2.0)
+    soft = blur(disparity, 2.0)
     reference = refine(photo, soft)
     monkeypatch.setattr("iibr_core.runtime.tiling.THREADS", 7)
     np.testing.assert_array_equal(refine(photo, soft), reference)
@@ -127,7 +129,7 @@ def test_results_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.Monk
 
 def test_the_input_is_left_alone() -> None:
     photo, disparity, _ = disc_before_slope()
-    soft = blurred(disparity, 2.0)
+    soft = blur(disparity, 2.0)
     before = soft.copy()
     refine(photo, soft)
     np.testing.assert_array_equal(soft, before)

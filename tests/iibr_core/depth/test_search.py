@@ -10,12 +10,12 @@ import pytest
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
-from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resized
+from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resize_estimate
 from iibr_core.runtime.tiling import Cancelled
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 
-SIZE = (48, 72)
+SIZE = ImageSize(48, 72)
 DEPTH = np.full(SIZE, 200, np.uint8)
 DEPTH[12:36, 24:48] = 20  # dark is near
 NEAR = np.s_[12:36, 24:48]
@@ -135,7 +135,7 @@ def test_a_model_is_used_and_named(tmp_path: Path) -> None:
     folder = depth_anything(tmp_path / "tiny").folder
     told: list[str] = []
     choice = DepthChoice(model=str(folder))
-    found = open_with_depth(photo_file(tmp_path, None), choice, tell=lambda doing, share: told.append(doing))
+    found = open_with_depth(photo_file(tmp_path, None), choice, report_progress=lambda doing, share: told.append(doing))
     assert (found.origin.kind, found.origin.words) == ("model", "estimated by the model in tiny")
     assert found.origin.failures == ()
     assert any("estimating depth" in doing for doing in told)
@@ -222,13 +222,13 @@ def test_a_bad_photo_is_an_error(tmp_path: Path) -> None:
 
 def test_lengths_in_pixels_scale_with_the_picture() -> None:
     halves = np.repeat(np.array([[1.0, 4.0]], np.float32), 2, 0)
-    disparity = resized(DisparityMap(halves), (4, 4))
+    disparity = resize_estimate(DisparityMap(halves), ImageSize(4, 4))
     assert isinstance(disparity, DisparityMap)
     np.testing.assert_array_equal(disparity.px_per_view[0], [2, 2, 8, 8])
-    metric = resized(MetricDepth(halves, 10.0), (4, 4))
+    metric = resize_estimate(MetricDepth(halves, 10.0), ImageSize(4, 4))
     assert isinstance(metric, MetricDepth)
     assert metric.focal_px == 20
     np.testing.assert_allclose(metric.metres[0], [1, 1, 4, 4])
-    relative = resized(RelativeInverseDepth(halves), (4, 4))
+    relative = resize_estimate(RelativeInverseDepth(halves), ImageSize(4, 4))
     assert isinstance(relative, RelativeInverseDepth)
     np.testing.assert_array_equal(relative.values[0], [1, 1, 4, 4])

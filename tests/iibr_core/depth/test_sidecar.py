@@ -13,8 +13,8 @@ from iibr_core.depth.sidecar import SIDECAR_EXTENSIONS, find_sidecar, flat_dispa
 from iibr_core.formats.maps.disparity_file import DEPTH_SPAN_WIDTHS, read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.maps.resample import SURFACE_SHARE, resample_surfaces
-from iibr_core.inpainting.disparity_holes import OPEN_LINE, SHORTNESS, STEP_LENGTHS, fill_from_background
-from iibr_core.types import InputError
+from iibr_core.inpainting.disparity_holes import OPEN_LINE, SHORTNESS, STEP_LENGTHS, fill_disparity_holes
+from iibr_core.types import ImageSize, InputError, image_size
 
 RNG = np.random.default_rng(3)
 NAN = np.float32(np.nan)
@@ -84,9 +84,9 @@ def walk(values, y, x, dy, dx):
 def test_fill_agrees_with_its_slow_twin(values):
     if np.isnan(values).all():
         with pytest.raises(ValueError, match="no known value"):
-            fill_from_background(values)
+            fill_disparity_holes(values)
         return
-    filled = fill_from_background(values)
+    filled = fill_disparity_holes(values)
     assert np.allclose(filled, fill_slowly(values), atol=1e-3)
     known = ~np.isnan(values)
     assert np.array_equal(filled[known], values[known])
@@ -102,7 +102,7 @@ def test_hole_beside_a_foreground_object_gets_the_background(turn):
     holes[:, 14:20] = NAN  # where the other camera saw the object instead
     expected = scene.copy()
     expected[:, 14:20] = 1.0
-    wrong = np.abs(np.rot90(fill_from_background(np.rot90(holes, turn)), -turn) - expected)
+    wrong = np.abs(np.rot90(fill_disparity_holes(np.rot90(holes, turn)), -turn) - expected)
     assert wrong[5:-5].max() < 0.05
     assert wrong.max() < 0.3  # the frame hides the background from the object's side
 
@@ -111,20 +111,20 @@ def test_hole_over_the_whole_border():
     scene = np.tile(np.linspace(1, 2, 60, dtype=np.float32)[:, None], (1, 80))
     holes = np.full_like(scene, NAN)
     holes[8:-8, 8:-8] = scene[8:-8, 8:-8]
-    assert np.abs(fill_from_background(holes) - scene).max() < 0.2
+    assert np.abs(fill_disparity_holes(holes) - scene).max() < 0.2
 
 
 def test_single_known_pixel_fills_everything():
     values = np.full((9, 14), NAN)
     values[3, 5] = 2.5
-    assert np.array_equal(fill_from_background(values), np.full((9, 14), 2.5))
+    assert np.array_equal(fill_disparity_holes(values), np.full((9, 14), 2.5))
 
 
 def test_large_hole_in_a_plane_stays_smooth():
     plane = np.add.outer(np.linspace(0, 4, 120), np.linspace(0, 6, 160)).astype(np.float32)
     holes = plane.copy()
     holes[20:100, 30:130] = NAN
-    filled = fill_from_background(holes)
+    filled = fill_disparity_holes(holes)
     inside = filled[20:100, 30:130]
     assert np.abs(np.diff(inside, axis=0)).max() < 0.5
     assert np.abs(np.diff(inside, axis=1)).max() < 0.5
@@ -165,20 +165,22 @@ def test_resampling_agrees_with_its_slow_twin():
     values = RNG.uniform(0, 10, (13, 17)).astype(np.float32)
     values[RNG.random(values.shape) < 0.2] = NAN
     for size in [(29, 37), (7, 11), (13, 31), (40, 5), (1, 1), (1, 23)]:
-        assert np.allclose(resample_surfaces(values, size), resample_slowly(values, size), 1e-5, equal_nan=True)
+        assert np.allclose(
+            resample_surfaces(values, ImageSize(*size)), resample_slowly(values, size), 1e-5, equal_nan=True
+        )
 
 
 @settings(deadline=None, max_examples=30)
 @given(MAPS)
 def test_same_size_is_the_identity(values):
-    assert np.array_equal(resample_surfaces(values, values.shape), values, equal_nan=True)
+    assert np.array_equal(resample_surfaces(values, image_size(values)), values, equal_nan=True)
 
 
 @pytest.mark.parametrize("size", [(200, 300), (37, 61), (20, 30), (99, 151)])
 def test_no_pixel_flies_between_two_surfaces(size):
     scene = np.full((40, 60), 1.0, np.float32)
     scene[10:30, 17:41] = 5.0
-    found = resample_surfaces(scene, size)
+    found = resample_surfaces(scene, ImageSize(*size))
     assert set(np.unique(found)) == {1.0, 5.0}
     area = (found == 5).mean()
     assert abs(area - (scene == 5).mean()) < 0.02
@@ -186,7 +188,7 @@ def test_no_pixel_flies_between_two_surfaces(size):
 
 def test_a_plane_is_interpolated_not_stepped():
     plane = np.tile(np.arange(200, dtype=np.float32), (20, 1))
-    found = resample_surfaces(plane, (60, 600))[30]
+    found = resample_surfaces(plane, ImageSize(60, 600))[30]
     expected = (np.arange(600) + 0.5) / 3 - 0.5
     assert np.allclose(found[2:-2], expected[2:-2], atol=1e-3)
 
@@ -204,8 +206,8 @@ def test_sidecar_order(tmp_path):
 
 
 def test_flat_disparity_says_how_to_get_depth():
-    assert "--disparity" in flat_disparity((4, 5)).notes[0]
-    assert flat_disparity((4, 5)).values.shape == (4, 5)
+    assert "--disparity" in flat_disparity(ImageSize(4, 5)).notes[0]
+    assert flat_disparity(ImageSize(4, 5)).values.shape == (4, 5)
 
 
 @pytest.mark.parametrize("extension", SIDECAR_EXTENSIONS)
@@ -218,7 +220,7 @@ def test_every_format_gives_the_same_values(tmp_path, extension):
         np.save(path, whole)
     else:
         save(path, whole.astype(np.float32 if extension == ".exr" else np.uint16))
-    found = read_disparity(path, (6, 8))
+    found = read_disparity(path, ImageSize(6, 8))
     assert found.values.dtype == np.float32
     assert np.array_equal(found.values, whole)
     assert (found.source, found.notes) == (path.name, ())
@@ -229,7 +231,7 @@ def test_png_values_are_scaled_and_zero_is_unknown(tmp_path, dtype):
     stored = np.full((4, 6), 200, dtype)
     stored[:, 3:] = 100
     stored[1, 2] = 0
-    found = read_disparity(save(tmp_path / "a.png", stored), (4, 6), scale=1 / 50)
+    found = read_disparity(save(tmp_path / "a.png", stored), ImageSize(4, 6), scale=1 / 50)
     assert found.values[0].tolist() == pytest.approx([4, 4, 4, 2, 2, 2])
     assert found.values[1, 2] == pytest.approx(2, abs=0.05)
     assert "filled" in found.notes[0]
@@ -238,10 +240,10 @@ def test_png_values_are_scaled_and_zero_is_unknown(tmp_path, dtype):
 def test_nan_inf_and_masked_values_are_filled(tmp_path):
     values = np.full((5, 6), 3.0, np.float32)
     values[0, 0], values[1, 1], values[2, 2] = np.nan, np.inf, -np.inf
-    assert (read_disparity(pfm(tmp_path / "a.pfm", values), (5, 6)).values == 3).all()
+    assert (read_disparity(pfm(tmp_path / "a.pfm", values), ImageSize(5, 6)).values == 3).all()
     masked = np.dstack([np.full((5, 6), 3.0), np.ones((5, 6))]).astype(np.float32)
     masked[2, 2] = (77.0, 0.0)
-    assert (read_disparity(save(tmp_path / "a.exr", masked, ("Y", "A")), (5, 6)).values == 3).all()
+    assert (read_disparity(save(tmp_path / "a.exr", masked, ("Y", "A")), ImageSize(5, 6)).values == 3).all()
 
 
 @pytest.mark.parametrize("wild", [1e6, -1e6, 3e38])
@@ -249,21 +251,21 @@ def test_one_outlier_counts_as_unknown(tmp_path, wild):
     values = RNG.uniform(1, 3, (9, 11)).astype(np.float32)
     values[4, 5] = wild
     for size in [(9, 11), (18, 22)]:
-        found = read_disparity(pfm(tmp_path / "a.pfm", values), size)
+        found = read_disparity(pfm(tmp_path / "a.pfm", values), ImageSize(*size))
         assert 1 <= found.values.min() <= found.values.max() <= 6
         assert any(note.startswith("1 values") for note in found.notes)
 
 
 def test_negative_and_equal_disparities_stay(tmp_path):
     values = np.array([[-3, -3, 0], [0, 2, 2]], np.float32)
-    assert np.array_equal(read_disparity(pfm(tmp_path / "a.pfm", values), (2, 3)).values, values)
-    assert (read_disparity(pfm(tmp_path / "b.pfm", np.full((2, 3), 7)), (4, 6)).values == 14).all()
+    assert np.array_equal(read_disparity(pfm(tmp_path / "a.pfm", values), ImageSize(2, 3)).values, values)
+    assert (read_disparity(pfm(tmp_path / "b.pfm", np.full((2, 3), 7)), ImageSize(4, 6)).values == 14).all()
 
 
 def test_another_size_scales_the_values_by_the_width(tmp_path):
     values = np.full((20, 30), 1.0, np.float32)
     values[:, 15:] = 6.0
-    found = read_disparity(pfm(tmp_path / "a.pfm", values), (40, 60))
+    found = read_disparity(pfm(tmp_path / "a.pfm", values), ImageSize(40, 60))
     assert set(np.unique(found.values)) == {2.0, 12.0}
     assert "30x20 to 60x40" in found.notes[0]
 
@@ -272,39 +274,39 @@ def test_another_size_scales_the_values_by_the_width(tmp_path):
 def test_another_shape_is_refused_with_both_sizes(tmp_path, size):
     path = pfm(tmp_path / "a.pfm", np.ones((20, 30)))
     with pytest.raises(InputError, match=rf"30x20.*{size[1]}x{size[0]}"):
-        read_disparity(path, size)
+        read_disparity(path, ImageSize(*size))
 
 
 def test_nothing_known(tmp_path):
     for name, value in [("nan", np.nan), ("inf", np.inf)]:
         with pytest.raises(InputError, match="no value is known"):
-            read_disparity(pfm(tmp_path / f"{name}.pfm", np.full((3, 4), value)), (3, 4))
+            read_disparity(pfm(tmp_path / f"{name}.pfm", np.full((3, 4), value)), ImageSize(3, 4))
     with pytest.raises(InputError, match="no value is known"):
-        read_disparity(save(tmp_path / "zero.png", np.zeros((3, 4), np.uint16)), (3, 4))
+        read_disparity(save(tmp_path / "zero.png", np.zeros((3, 4), np.uint16)), ImageSize(3, 4))
     with pytest.raises(InputError, match="--disparity-scale"):
-        read_disparity(save(tmp_path / "large.png", np.full((3, 4), 60000, np.uint16)), (3, 4))
+        read_disparity(save(tmp_path / "large.png", np.full((3, 4), 60000, np.uint16)), ImageSize(3, 4))
     lonely = np.full((40, 60), NAN)
     lonely[3, 3] = 1
     with pytest.raises(InputError, match="denser"):
-        read_disparity(pfm(tmp_path / "lonely.pfm", lonely), (4, 6))
+        read_disparity(pfm(tmp_path / "lonely.pfm", lonely), ImageSize(4, 6))
 
 
 @pytest.mark.parametrize("scale", [0.0, math.nan, math.inf])
 def test_scale_must_be_a_number(tmp_path, scale):
     with pytest.raises(InputError, match="--disparity-scale"):
-        read_disparity(pfm(tmp_path / "a.pfm", np.ones((2, 2))), (2, 2), scale)
+        read_disparity(pfm(tmp_path / "a.pfm", np.ones((2, 2))), ImageSize(2, 2), scale)
 
 
 def test_depth_becomes_disparity(tmp_path):
     depth = np.tile(np.geomspace(2, 50, 100), (80, 1))
-    found = read_disparity(pfm(tmp_path / "scene_depth.pfm", depth), (80, 100)).values
+    found = read_disparity(pfm(tmp_path / "scene_depth.pfm", depth), ImageSize(80, 100)).values
     assert (np.diff(found[0]) < 0).all()  # farther is smaller
     q = found[0].astype(np.float64)
     line = np.polyfit(1 / depth[0], q, 1)
     assert np.allclose(np.polyval(line, 1 / depth[0]), q, atol=1e-5)  # linear in 1 / depth
     assert np.ptp(q) == pytest.approx(DEPTH_SPAN_WIDTHS * 100, rel=0.15)
     assert abs(q.min()) < 0.02
-    doubled = read_disparity(tmp_path / "scene_depth.pfm", (80, 100), 2.0)
+    doubled = read_disparity(tmp_path / "scene_depth.pfm", ImageSize(80, 100), 2.0)
     assert np.allclose(doubled.values, 2 * found, atol=1e-6)
     assert "baseline" in doubled.notes[0]
 
@@ -312,16 +314,16 @@ def test_depth_becomes_disparity(tmp_path):
 def test_depth_of_zero_and_infinity_is_unknown(tmp_path):
     depth = np.full((6, 9), 4.0)
     depth[:, 5:] = 8.0
-    whole = read_disparity(pfm(tmp_path / "a_depth.pfm", depth), (6, 9)).values
+    whole = read_disparity(pfm(tmp_path / "a_depth.pfm", depth), ImageSize(6, 9)).values
     depth[2, 2], depth[3, 7], depth[4, 7], depth[1, 1] = 0.0, np.inf, np.nan, -5.0
-    assert np.allclose(read_disparity(pfm(tmp_path / "a_depth.pfm", depth), (6, 9)).values, whole, atol=0.02)
+    assert np.allclose(read_disparity(pfm(tmp_path / "a_depth.pfm", depth), ImageSize(6, 9)).values, whole, atol=0.02)
 
 
 def test_constant_depth_is_flat(tmp_path):
-    found = read_disparity(pfm(tmp_path / "a_depth.pfm", np.full((4, 5), 3.0)), (4, 5))
+    found = read_disparity(pfm(tmp_path / "a_depth.pfm", np.full((4, 5), 3.0)), ImageSize(4, 5))
     assert not found.values.any()
     with pytest.raises(InputError, match="no value is known"):
-        read_disparity(pfm(tmp_path / "b_depth.pfm", np.zeros((4, 5))), (4, 5))
+        read_disparity(pfm(tmp_path / "b_depth.pfm", np.zeros((4, 5))), ImageSize(4, 5))
 
 
 def test_hostile_arrays(tmp_path):
@@ -336,12 +338,14 @@ def test_hostile_arrays(tmp_path):
     (tmp_path / "archive.npz").rename(tmp_path / "archive.npy")
     for name in ("object", "three", "complex", "none", "cut", "text", "archive"):
         with pytest.raises(InputError, match=f"{name}.npy"):
-            read_disparity(tmp_path / f"{name}.npy", (2, 2))
+            read_disparity(tmp_path / f"{name}.npy", ImageSize(2, 2))
 
 
 def test_colour_picture_is_no_map(tmp_path):
     pixels = RNG.integers(1, 255, (4, 4, 3), dtype=np.uint8)
     with pytest.raises(InputError, match="colour"):
-        read_disparity(save(tmp_path / "a.png", pixels), (4, 4))
+        read_disparity(save(tmp_path / "a.png", pixels), ImageSize(4, 4))
     grey = np.repeat(pixels[..., :1], 3, axis=2)
-    assert np.allclose(read_disparity(save(tmp_path / "b.png", grey), (4, 4), 1 / 64).values * 64, grey[..., 0])
+    assert np.allclose(
+        read_disparity(save(tmp_path / "b.png", grey), ImageSize(4, 4), 1 / 64).values * 64, grey[..., 0]
+    )

@@ -21,7 +21,7 @@ from iibr_core.depth.models.catalog import KNOWN_MODELS, LocalModel, cached_fold
 from iibr_core.depth.models.config import Preparation, read_preparation
 from iibr_core.depth.models.transformers_models import estimate_with, input_size
 from iibr_core.runtime.tiling import Cancelled
-from iibr_core.types import InputError, Photo
+from iibr_core.types import ImageSize, InputError, Photo
 
 RNG = np.random.default_rng(3)
 PHOTO = Photo(RNG.random((40, 60, 3)).astype(np.float32), 50.0, "photo")
@@ -239,13 +239,13 @@ PREPARATION = Preparation((518, 518), True, 14, False, (0.5,) * 3, (0.5,) * 3)
     [((1000, 1000), (518, 518)), ((600, 800), (518, 686)), ((800, 600), (686, 518)), ((1080, 1920), (518, 924))],
 )
 def test_the_input_is_as_large_as_the_library_makes_it(size: tuple[int, int], expected: tuple[int, int]) -> None:
-    assert input_size(PREPARATION, size, 1e9) == expected
+    assert input_size(PREPARATION, ImageSize(*size), 1e9) == expected
 
 
 @pytest.mark.parametrize("size", [(1, 1), (10, 10_000), (10_000, 10), (1, 100_000), (3000, 4000)])
 @pytest.mark.parametrize("max_pixels", [28 * 28, 10_000, 1e9])
 def test_the_input_never_exceeds_what_is_allowed(size: tuple[int, int], max_pixels: float) -> None:
-    height, width = input_size(PREPARATION, size, max_pixels)
+    height, width = input_size(PREPARATION, ImageSize(*size), max_pixels)
     assert height % 14 == width % 14 == 0
     assert min(height, width) >= 28
     assert height * width <= min(max_pixels, 2.5 * 518 * 518)
@@ -328,7 +328,7 @@ def test_nan_in_the_weights_is_told_and_not_kept(tmp_path: Path, own_cache: Path
 def test_it_stops_between_layers_and_tells_how_far_it_is(tmp_path: Path, own_cache: Path) -> None:
     model = depth_anything(tmp_path / "model")
     shares: list[float] = []
-    estimate_with(model, PHOTO, tell=lambda doing, share: shares.append(share))
+    estimate_with(model, PHOTO, report_progress=lambda doing, share: shares.append(share))
     assert shares == sorted(shares)
     assert len(shares) > 50
     for path in own_cache.glob("*"):
@@ -344,7 +344,7 @@ def test_a_kept_estimate_needs_no_network(tmp_path: Path, own_cache: Path) -> No
     model = depth_anything(tmp_path / "model")
     first = estimate_with(model, PHOTO)
     doings: set[str] = set()
-    again = estimate_with(model, PHOTO, tell=lambda doing, share: doings.add(doing))
+    again = estimate_with(model, PHOTO, report_progress=lambda doing, share: doings.add(doing))
     np.testing.assert_array_equal(values_of(first), values_of(again))
     assert not any("loading" in doing for doing in doings)
     assert len(list(own_cache.glob("*.npz"))) == 1

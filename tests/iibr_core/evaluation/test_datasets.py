@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.datasets import find_scenes, read_known_disparity, read_scene, read_view, turned_back
+from iibr_core.evaluation.datasets import find_scenes, read_known_disparity, read_scene, read_view, undo_rotation
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.scene import KnownView, MultiView, nearest_view
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.types import InputError, ViewOffset
+from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.iibr_core.known_scenes import (
     HEIGHT,
     WIDTH,
@@ -49,7 +49,7 @@ def test_hci_names_count_row_by_row(tmp_path: Path, rows: int, columns: int) -> 
     assert list(scene.disparity) == [scene.centre]
     known = scene.disparity[scene.centre]
     assert known.is_truth
-    np.testing.assert_array_equal(read_known_disparity(known, (HEIGHT, WIDTH)).values, disparity_of_square())
+    np.testing.assert_array_equal(read_known_disparity(known, ImageSize(HEIGHT, WIDTH)).values, disparity_of_square())
 
 
 def test_views_in_a_subfolder_with_truth_and_estimates(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_middlebury_pair_from_the_left(tmp_path: Path) -> None:
     assert scene.layout == "Middlebury pair"
     assert scene.centre == 0
     assert offset_by_file(scene) == {"im0": (0, 0), "im1": (0, 1)}
-    known = read_known_disparity(scene.disparity[0], (HEIGHT, WIDTH))
+    known = read_known_disparity(scene.disparity[0], ImageSize(HEIGHT, WIDTH))
     assert known.values[1, 1] == 7.5
     assert np.isfinite(known.values).all()
 
@@ -150,7 +150,7 @@ def test_middlebury_rows_store_four_steps_times_a_factor(
     assert [view.offset.s for view in scene.views] == list(range(count))
     assert list(scene.disparity) == list(truths)
     for known in scene.disparity.values():
-        values = read_known_disparity(known, (4, width)).values
+        values = read_known_disparity(known, ImageSize(4, width)).values
         np.testing.assert_allclose(values, 120 / factor / 4, rtol=1e-5)
 
 
@@ -223,7 +223,7 @@ def test_llff_in_a_turned_world_gives_the_same(tmp_path: Path) -> None:
 
 def test_turning_back_by_nothing_changes_nothing() -> None:
     pixels = view_of_wall(ViewOffset(0, 0))
-    same, known = turned_back(pixels, np.eye(3))
+    same, known = undo_rotation(pixels, np.eye(3))
     assert known.all()
     np.testing.assert_allclose(same, pixels, atol=1e-5)
 

@@ -18,14 +18,14 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation import report
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.protocol import Judgement, Options, evaluate
+from iibr_core.evaluation.protocol import EvaluationResult, Options, evaluate
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
-from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, given_of, trials_of
+from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input, trials_of
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.generation.light_field import generate
-from iibr_core.generation.view_maker import ViewMaker, as_stored, outer_views
+from iibr_core.generation.view_maker import ViewMaker, outer_views, quantise_as_stored
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid, write_numbered
@@ -47,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def judgements(folder: Path) -> list[Judgement]:
+def judgements(folder: Path) -> list[EvaluationResult]:
     return evaluate(scene_of(folder), Options(choice=UNREFINED))
 
 
@@ -61,7 +61,7 @@ def test_views_are_those_that_generate_makes(quality: Quality) -> None:
     offsets = {(v, u): grid.offset(v, u) for v, u in made if (v, u) != grid.centre}
     with ViewMaker(photo.pixels, disparity.values, offsets.values(), (quality,)) as maker:
         for index, offset in offsets.items():
-            shown = np.rint(255 * as_stored(maker.view(quality, offset).colors)).astype(np.uint8)
+            shown = np.rint(255 * quantise_as_stored(maker.view(quality, offset).colors)).astype(np.uint8)
             np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
 
 
@@ -72,7 +72,7 @@ def test_outer_views_are_corners_and_side_middles_of_what_is_asked_for() -> None
     assert outer_views([ViewOffset(0.0, 0.0)]) == []
 
 
-def test_both_trials_show_every_row(judgements: list[Judgement]) -> None:
+def test_both_trials_show_every_row(judgements: list[EvaluationResult]) -> None:
     assert [j.trial for j in judgements] == [CENTRE_TRIAL, CORNER_TRIAL]
     centre, corner = judgements
     for judgement in judgements:
@@ -85,14 +85,14 @@ def test_both_trials_show_every_row(judgements: list[Judgement]) -> None:
     assert any("carried over" in note for note in corner.notes)
 
 
-def test_figures_are_of_the_right_pictures(folder: Path, judgements: list[Judgement]) -> None:
+def test_figures_are_of_the_right_pictures(folder: Path, judgements: list[EvaluationResult]) -> None:
     """Identity and reference warp, worked out anew from the files."""
     photo = read_photo(folder / "views/v01_u01.png").pixels
     truth = read_photo(folder / "views/v00_u02.png").pixels
     offset = ViewOffset(-1.0, 1.0)
     warped = reference_warp(photo, disparity_of_square(), offset)
     rows = {row.method: row.of_views["v00 u02"] for row in judgements[0].rows}
-    for name, image in (("identity", photo), ("reference warp", as_stored(warped.colors))):
+    for name, image in (("identity", photo), ("reference warp", quantise_as_stored(warped.colors))):
         figures = rows[name]
         assert figures.full_db == pytest.approx(psnr(image, truth))
         assert figures.visible_db == pytest.approx(psnr(image, truth, warped.visible))
@@ -102,7 +102,7 @@ def test_figures_are_of_the_right_pictures(folder: Path, judgements: list[Judgem
         assert math.isnan(figures.lpips)
 
 
-def test_means_and_the_worst_view(judgements: list[Judgement]) -> None:
+def test_means_and_the_worst_view(judgements: list[EvaluationResult]) -> None:
     for row in judgements[0].rows:
         full = {name: figures.full_db for name, figures in row.of_views.items()}
         assert row.mean.full_db == pytest.approx(np.mean(list(full.values())))
@@ -111,7 +111,7 @@ def test_means_and_the_worst_view(judgements: list[Judgement]) -> None:
         assert row.mean.hole_db == pytest.approx(np.mean(holes))
 
 
-def test_every_way_beats_doing_nothing(judgements: list[Judgement]) -> None:
+def test_every_way_beats_doing_nothing(judgements: list[EvaluationResult]) -> None:
     for judgement in judgements:
         full = {row.method: row.mean.full_db for row in judgement.rows}
         assert full["identity"] + 10 < min(full["reference warp"], full["fast"])
@@ -151,10 +151,10 @@ def test_without_true_disparity_an_estimate_is_aligned_to_views(tmp_path: Path) 
     (folder / "gt_disp_u01_v01.npy").unlink()
     scene = scene_of(folder)
     trial = trials_of(scene, "auto")[0]
-    given = given_of(trial, "auto", DepthChoice(start="rough"), 10**6)
+    given = trial_input(trial, "auto", DepthChoice(start="rough"), 10**6)
     assert [disparity.source.split(",")[-1] for disparity in given.maps][1].endswith("fitted to true views")
     with pytest.raises(InputError, match="no true disparity"):
-        given_of(trial, "gt", UNREFINED, 10**6)
+        trial_input(trial, "gt", UNREFINED, 10**6)
 
 
 def test_a_file_is_the_centre_views_and_carried_to_the_corner(folder: Path, tmp_path: Path) -> None:
@@ -162,17 +162,17 @@ def test_a_file_is_the_centre_views_and_carried_to_the_corner(folder: Path, tmp_
     np.save(path, disparity_of_square() + 1)
     scene = scene_of(folder)
     centre, corner = trials_of(scene, "auto")
-    (own,) = given_of(centre, path, UNREFINED, 10**6).maps
+    (own,) = trial_input(centre, path, UNREFINED, 10**6).maps
     np.testing.assert_array_equal(own.values, disparity_of_square() + 1)
-    (moved,) = given_of(corner, path, UNREFINED, 10**6).maps
+    (moved,) = trial_input(corner, path, UNREFINED, 10**6).maps
     assert moved.source == "mine.npy, carried over"
-    assert given_of(centre, path, UNREFINED, 10**6).judge.source == "gt_disp_u01_v01.npy"
+    assert trial_input(centre, path, UNREFINED, 10**6).judge.source == "gt_disp_u01_v01.npy"
 
 
 def test_an_estimate_in_the_folder_is_used_where_there_is_no_truth(tmp_path: Path) -> None:
     folder = write_grid(tmp_path / "scene")
     (folder / "gt_disp_u01_v01.npy").rename(folder / "disp_est_u01_v01.npy")
-    (given,) = given_of(trials_of(scene_of(folder), "auto")[0], "auto", UNREFINED, 10**6).maps
+    (given,) = trial_input(trials_of(scene_of(folder), "auto")[0], "auto", UNREFINED, 10**6).maps
     assert given.source == "disp_est_u01_v01.npy"
 
 
@@ -190,7 +190,7 @@ def test_stopping_ends_it(folder: Path) -> None:
         evaluate(scene_of(folder), Options(choice=UNREFINED), should_stop=lambda: True)
 
 
-def test_the_json_holds_every_figure(judgements: list[Judgement]) -> None:
+def test_the_json_holds_every_figure(judgements: list[EvaluationResult]) -> None:
     read = json.loads(report.json_of(judgements, "iibr evaluate x"), parse_constant=lambda name: pytest.fail(name))
     assert read["command"] == "iibr evaluate x"
     for judgement, stored in zip(judgements, read["judgements"]):
@@ -202,7 +202,7 @@ def test_the_json_holds_every_figure(judgements: list[Judgement]) -> None:
         assert stored["consistency"].keys() == judgement.consistency.keys()
 
 
-def test_the_markdown_has_a_table_for_each_judgement(judgements: list[Judgement]) -> None:
+def test_the_markdown_has_a_table_for_each_judgement(judgements: list[EvaluationResult]) -> None:
     text = report.markdown_of(judgements, "iibr evaluate x")
     for method in ALWAYS:
         assert len(re.findall(rf"(?m)^\| {method} \|", text)) >= len(judgements)
@@ -217,7 +217,7 @@ def test_the_markdown_has_a_table_for_each_judgement(judgements: list[Judgement]
         assert len({line.count("|") for line in block.strip().splitlines()}) == 1
 
 
-def test_the_page_needs_nothing_else(judgements: list[Judgement]) -> None:
+def test_the_page_needs_nothing_else(judgements: list[EvaluationResult]) -> None:
     text = report.page_of(judgements, "iibr <evaluate>")
     assert "iibr &lt;evaluate&gt;" in text
     assert not re.findall(r'(?:src|href)="(?!data:)|url\(|@import|<script|<link', text)
@@ -236,13 +236,13 @@ def test_the_page_needs_nothing_else(judgements: list[Judgement]) -> None:
         assert picture.size == ((WIDTH, 3) if name.startswith("EPI") else (WIDTH, HEIGHT))
 
 
-def test_epis_of_the_truth_hold_the_views_own_rows(folder: Path, judgements: list[Judgement]) -> None:
+def test_epis_of_the_truth_hold_the_views_own_rows(folder: Path, judgements: list[EvaluationResult]) -> None:
     pictures = judgements[0].pictures
     rows = [read_photo(folder / f"views/v01_u{u:02d}.png").pixels[pictures.epi_row] for u in range(3)]
     np.testing.assert_array_equal(pictures.epis["truth"], np.rint(255 * np.stack(rows)))
 
 
-def test_reports_replace_older_ones_whole(judgements: list[Judgement], tmp_path: Path) -> None:
+def test_reports_replace_older_ones_whole(judgements: list[EvaluationResult], tmp_path: Path) -> None:
     out = tmp_path / "made" / "report"
     report.write_report(out, judgements, "first")
     report.write_report(out, judgements[:1], "second")
@@ -258,7 +258,7 @@ def test_places_where_no_report_can_be_are_told_before_any_work(tmp_path: Path) 
             report.require_report_folder(folder)
 
 
-def test_the_summary_takes_means_over_scenes(judgements: list[Judgement]) -> None:
+def test_the_summary_takes_means_over_scenes(judgements: list[EvaluationResult]) -> None:
     other = replace(judgements[0], scene="other")
     text = report.markdown_of([*judgements, other], "x")
     assert re.search(r"(?m)^\| mean of 2 scenes \|", text)

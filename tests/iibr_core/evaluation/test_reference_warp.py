@@ -11,7 +11,7 @@ from iibr_core.evaluation.alignment import fit_to_truth, fit_to_views
 from iibr_core.evaluation.consistency import LineView, consistency, disagreement, line_straightness
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.reference_warp import LOBES, SAMPLES, reference_warp
-from iibr_core.evaluation.trials import carried
+from iibr_core.evaluation.trials import warp_disparity
 from iibr_core.rendering.view_synthesis import RenderedView
 from iibr_core.types import ViewOffset
 from tests.iibr_core.known_scenes import FRONT, HEIGHT, WALL, WIDTH, disparity_of_square, view_of_square, view_of_wall
@@ -95,7 +95,7 @@ def test_odd_disparities_give_finite_pictures(shape: tuple[int, int], value: flo
 
 def test_carried_disparity_is_that_of_the_other_view() -> None:
     at = ViewOffset(-1.0, 1.0)
-    own = carried(disparity_of_square(), at)
+    own = warp_disparity(disparity_of_square(), at)
     wanted = np.full((HEIGHT, WIDTH), WALL, np.float32)
     top, left = round(HEIGHT / 3 + FRONT), round(WIDTH / 3 - FRONT)
     wanted[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FRONT

@@ -20,9 +20,9 @@ from iibr_core.evaluation import report
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.lens_picture import read_lens_picture
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.evaluation.protocol import Judgement, Options, evaluate
+from iibr_core.evaluation.protocol import EvaluationResult, Options, evaluate
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.evaluation.refocus import LENS, FocalStack, Focus, foci_of, lens_focus, sheared, weight_of, within
+from iibr_core.evaluation.refocus import LENS, FocalStack, Focus, foci_of, lens_focus, shear, weight_of, within
 from iibr_core.generation.light_field import generate
 from iibr_core.types import Disparity, FloatImage, InputError, ViewOffset
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
@@ -78,7 +78,7 @@ def test_a_constant_stays_constant_at_every_focus() -> None:
 def test_whole_shifts_are_exact() -> None:
     view, focus = smooth_texture(30, 32), Focus("x", 2.0, 1.0)
     at, margin = ViewOffset(1.0, -0.5), 5
-    np.testing.assert_array_equal(sheared(view, at, focus), view[margin - 2 : -margin - 2, margin + 1 : -margin + 1])
+    np.testing.assert_array_equal(shear(view, at, focus), view[margin - 2 : -margin - 2, margin + 1 : -margin + 1])
 
 
 @pytest.mark.parametrize("radius", [0.5, 1.0, 2.0, 3.3])
@@ -163,14 +163,14 @@ def test_views_on_disk_follow_the_convention(name: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def judgement(networks: Path) -> Judgement:  # noqa: F811
+def judgement(networks: Path) -> EvaluationResult:  # noqa: F811
     """Of the fence, by all that there is to judge by; the networks are random ones."""
     scene = read_scene(FOLDER / "fence")
     assert scene is not None
     return evaluate(scene, Options(choice=QUICK.choice, qualities=("fast",), lpips=networks))[0]
 
 
-def test_evaluation_judges_every_focus_and_the_lens(judgement: Judgement) -> None:
+def test_evaluation_judges_every_focus_and_the_lens(judgement: EvaluationResult) -> None:
     assert [found.focus.name for found in judgement.refocus] == ["near", "middle", "far", LENS]
     for found in judgement.refocus:
         db = {method: figures.db for method, figures in found.figures.items()}
@@ -185,7 +185,7 @@ def test_evaluation_judges_every_focus_and_the_lens(judgement: Judgement) -> Non
     assert MADE_DB["fence"] < lens.figures["fast"].db + 1 < lens.figures["truth"].db + 1
 
 
-def test_reports_hold_the_refocus(judgement: Judgement) -> None:
+def test_reports_hold_the_refocus(judgement: EvaluationResult) -> None:
     read = json.loads(report.json_of([judgement], "x"))["judgements"][0]
     for found, stored in zip(judgement.refocus, read["refocus"], strict=True):
         assert (stored["name"], stored["disparity"]) == (found.focus.name, found.focus.disparity)
@@ -198,7 +198,7 @@ def test_reports_hold_the_refocus(judgement: Judgement) -> None:
     assert all(f'alt="{name}"' in page for name in (LENS, f"{LENS}, fast", f"{LENS}, error"))
 
 
-def test_lpips_of_local_networks_is_reported(judgement: Judgement) -> None:
+def test_lpips_of_local_networks_is_reported(judgement: EvaluationResult) -> None:
     lpips = {row.method: row.mean.lpips for row in judgement.rows}
     assert 0 < lpips["fast"] < lpips["identity"]
     assert "| LPIPS |" in report.markdown_of([judgement], "x")

@@ -10,7 +10,7 @@ import pytest
 from iibr_core.formats.images.oiio_reader import read_map
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.writer import MAP_SUFFIXES, PNG_MOST, write_map
-from iibr_core.types import InputError
+from iibr_core.types import InputError, image_size
 
 
 def some_map() -> np.ndarray:
@@ -30,7 +30,7 @@ def test_a_png_comes_back_scaled_and_moved(tmp_path: Path) -> None:
     note = write_map(path, wanted)
     step = (wanted.max() - wanted.min()) / (PNG_MOST - 1)
     assert f"{step:.6g}" in note
-    again = read_disparity(path, wanted.shape, step).values
+    again = read_disparity(path, image_size(wanted), step).values
     np.testing.assert_allclose(again - again.min(), wanted - wanted.min(), atol=step)
 
 

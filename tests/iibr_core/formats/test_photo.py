@@ -22,7 +22,7 @@ from iibr_core.formats.images.photo import (
     upright,
     write_image,
 )
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 
 RNG = np.random.default_rng(7)
 RGB = RNG.integers(0, 256, (13, 17, 3), dtype=np.uint8)
@@ -272,7 +272,7 @@ def test_one_bright_pixel_does_not_disturb_its_row(tmp_path):
 
 @given(st.integers(1, 10**5), st.integers(1, 10**5), st.integers(1, 10**7))
 def test_size_within_fits_and_keeps_its_shape(height, width, max_pixels):
-    new_height, new_width = size_within((height, width), max_pixels)
+    new_height, new_width = size_within(ImageSize(height, width), max_pixels)
     assert 1 <= new_height <= height
     assert 1 <= new_width <= width
     assert new_height * new_width <= max_pixels

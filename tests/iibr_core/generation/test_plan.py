@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from iibr_core.generation.cost_model import outermost_of, relief_of
+from iibr_core.generation.cost_model import largest_offset, measure_parallax
 from iibr_core.generation.light_field import ray_set
 from iibr_core.generation.plan import MOST_VIEWS_A_SIDE, STEP_PX, PlanOverrides, plan_for_viewing, plan_literal
-from iibr_core.training.batches import contested_rays
-from iibr_core.training.degradation import blurred
+from iibr_core.training.batches import ambiguous_rays_of_view
+from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import TOTAL_PARALLAX, GridShape, InputError, ViewOffset
+from iibr_core.types import TOTAL_PARALLAX, GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture, square_before_wall
 
 
@@ -52,16 +52,16 @@ def test_a_flat_scene_needs_next_to_nothing():
     flat = plan_for_viewing(photo, disparity_of(np.zeros((300, 400))))
     deep = plan_for_viewing(photo, disparity)
     for quality in ("fast", "balanced", "exact"):
-        assert flat.needs.of(quality).seconds == 0
-        assert 0 < flat.needs.of(quality).peak_bytes < deep.needs.of(quality).peak_bytes
-    assert deep.needs.fast.seconds < deep.needs.balanced.seconds < deep.needs.exact.seconds
-    assert deep.peak_bytes == deep.needs.balanced.peak_bytes
+        assert flat.costs.of(quality).seconds == 0
+        assert 0 < flat.costs.of(quality).peak_bytes < deep.costs.of(quality).peak_bytes
+    assert deep.costs.fast.seconds < deep.costs.balanced.seconds < deep.costs.exact.seconds
+    assert deep.peak_bytes == deep.costs.balanced.peak_bytes
 
 
 def test_needs_follow_views_pixels_and_depth_edges():
     def seconds(size, side, front=2.0):
         photo, disparity = square_before_wall(*size, front=front)
-        return plan_literal(photo, disparity, GridShape(side, side)).needs
+        return plan_literal(photo, disparity, GridShape(side, side)).costs
 
     small, wider = seconds((120, 160), 5), seconds((240, 320), 5)
     assert 3 < wider.fast.seconds / small.fast.seconds < 4.2
@@ -72,20 +72,20 @@ def test_needs_follow_views_pixels_and_depth_edges():
 
 
 @pytest.mark.parametrize("blur_px", [0.0, 2.0])
-def test_the_rays_foretold_are_those_really_contested(blur_px):
+def test_the_rays_foretold_are_those_really_ambiguous(blur_px):
     size, grid = (120, 160), GridShape(9, 9)
-    foretold, found = [], []
+    predicted, found = [], []
     for seed in range(4):
-        scene = random_scene(np.random.default_rng(seed), size, 2.0)
-        colors, values = render(scene, size, ViewOffset(0.0, 0.0))
-        photo, disparity = photo_of(colors), disparity_of(blurred(values, blur_px))
+        scene = random_scene(np.random.default_rng(seed), ImageSize(*size), 2.0)
+        colors, values = render(scene, ImageSize(*size), ViewOffset(0.0, 0.0))
+        photo, disparity = photo_of(colors), disparity_of(blur(values, blur_px))
         rays, completing = ray_set(photo, disparity, plan_literal(photo, disparity, grid))
         assert len(list(completing)) == 8
-        relief = relief_of(disparity.values, outermost_of(grid))
+        statistics = measure_parallax(disparity.values, largest_offset(grid))
         for reach in (1.0, 2.0, 4.0):
-            foretold.append(relief.contested_share(reach / 4) * disparity.values.size)
-            found.append(len(contested_rays(rays, ViewOffset(reach, -reach), (0, size[0]), False).pixel))
-    assert sum(foretold) == pytest.approx(sum(found), rel=0.3), (foretold, found)
+            predicted.append(statistics.ambiguous_share(reach / 4) * disparity.values.size)
+            found.append(len(ambiguous_rays_of_view(rays, ViewOffset(reach, -reach), (0, size[0]), False).pixel))
+    assert sum(predicted) == pytest.approx(sum(found), rel=0.3), (predicted, found)
 
 
 def test_one_wild_value_does_not_set_the_baseline():

@@ -14,55 +14,55 @@ from iibr_core.rendering.ambiguous_rays import (
     LEAST_VOTE,
     PLAIN,
     SHARE,
-    Contested,
-    decide,
-    find_contested,
-    votes,
+    AmbiguousRays,
+    blend_hypotheses,
+    find_ambiguous_rays,
+    hypothesis_colors,
 )
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import look_up_colors
+from iibr_core.rendering.resampling import resample_colors
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
-from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import photo_of, smooth_texture, square_before_wall
 
 OFFSET = ViewOffset(0.0, 2.0)
 
 
-def contested_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
-    """(contested rays, closed-form weights, ray set)."""
+def ambiguous_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
+    """(ambiguous rays, closed-form weights, ray set)."""
     rays = rays_of_photo(photo.pixels, disparity, 2.0, 0)
     if not fringe:  # which pixels are mixed is a matter of colour
         rays = RaySet(1, photo.size, 0.25)
         rays.add(ViewOffset(0.0, 0.0), photo.pixels, disparity, np.ones_like(disparity))
     height = photo.size[0]
     candidates = find_candidates(rays, offset, (0, height))
-    weights = closed_form_weights(candidates)
-    shown = look_up_colors(rays, candidates, weights)[1:]
-    return find_contested(rays, candidates, weights, shown, (0, height), every), weights, rays
+    weights = visibility_weights(candidates)
+    shown = resample_colors(rays, candidates, weights)[1:]
+    return find_ambiguous_rays(rays, candidates, weights, shown, (0, height), every), weights, rays
 
 
-def test_only_rays_near_depth_edges_are_contested():
+def test_only_rays_near_depth_edges_are_ambiguous():
     photo, disparity = square_before_wall()
-    contested, _, _ = contested_of(photo, disparity.values)
-    y, x = contested.pixel.T
+    ambiguous, _, _ = ambiguous_of(photo, disparity.values)
+    y, x = ambiguous.pixel.T
     assert 0 < len(y) < 0.4 * disparity.values.size
     assert not ((y < 14) | (y > 45) | (x < 15) | (x > 60)).any()
-    flat, _, _ = contested_of(photo, np.zeros_like(disparity.values))
+    flat, _, _ = ambiguous_of(photo, np.zeros_like(disparity.values))
     assert len(flat.pixel) == 0
-    everything, _, _ = contested_of(photo, np.zeros_like(disparity.values), every=True)
+    everything, _, _ = ambiguous_of(photo, np.zeros_like(disparity.values), every=True)
     assert len(everything.pixel) == disparity.values.size
 
 
 def test_hypotheses_are_the_surfaces_around_and_differ():
     photo, disparity = square_before_wall()
-    contested, weights, _ = contested_of(photo, disparity.values)
-    shares = contested.features[..., SHARE]
-    at = tuple(contested.pixel.T)
+    ambiguous, weights, _ = ambiguous_of(photo, disparity.values)
+    shares = ambiguous.features[..., SHARE]
+    at = tuple(ambiguous.pixel.T)
     assert shares.sum(axis=1) == pytest.approx(np.minimum(weights.sum(axis=0), 1)[at], abs=0.05)
-    assert contested.mask.sum(axis=1).min() >= 2
-    for disparities, mask in zip(contested.disparity[:200], contested.mask[:200]):
+    assert ambiguous.mask.sum(axis=1).min() >= 2
+    for disparities, mask in zip(ambiguous.disparity[:200], ambiguous.mask[:200]):
         assert set(np.round(disparities[mask])) <= {0.0, 2.0}
 
 
@@ -70,12 +70,12 @@ def test_features_know_no_colour_and_no_place():
     """The same geometry in other colours, or elsewhere in the photo: the same features."""
     photo, disparity = square_before_wall()
     other = photo_of(np.roll(smooth_texture(*photo.size, seed=9), 3, axis=0))
-    here, _, _ = contested_of(photo, disparity.values, fringe=False)
-    recoloured, _, _ = contested_of(other, disparity.values, fringe=False)
+    here, _, _ = ambiguous_of(photo, disparity.values, fringe=False)
+    recoloured, _, _ = ambiguous_of(other, disparity.values, fringe=False)
     assert (here.features == recoloured.features).all()
     assert (here.pixel == recoloured.pixel).all()
     down, right = 4, -5
-    moved, _, _ = contested_of(photo, np.roll(disparity.values, (down, right), axis=(0, 1)), fringe=False)
+    moved, _, _ = ambiguous_of(photo, np.roll(disparity.values, (down, right), axis=(0, 1)), fringe=False)
     assert (moved.pixel == here.pixel + np.array([down, right])).all()
     assert moved.features == pytest.approx(here.features, abs=1e-5)
 
@@ -85,15 +85,15 @@ def test_features_are_finite_for_wild_disparity(wild):
     photo, disparity = square_before_wall()
     values = disparity.values.copy()
     values[25:30, 30:40] = wild
-    contested, _, rays = contested_of(photo, values)
-    assert np.isfinite(contested.features).all()
-    assert np.abs(contested.features).max() < 20
-    assert np.isfinite(votes(rays, contested)).all()
+    ambiguous, _, rays = ambiguous_of(photo, values)
+    assert np.isfinite(ambiguous.features).all()
+    assert np.abs(ambiguous.features).max() < 20
+    assert np.isfinite(hypothesis_colors(rays, ambiguous)).all()
 
 
-def random_contested(rays=200, seed=0):
+def random_ambiguous(rays=200, seed=0):
     random = np.random.default_rng(seed)
-    return Contested(
+    return AmbiguousRays(
         OFFSET,
         np.zeros((rays, 2), np.int64),
         np.arange(HYPOTHESES) < random.integers(1, HYPOTHESES + 1, rays)[:, None],
@@ -112,48 +112,48 @@ def trained(seed=0):
     return model
 
 
-def weights_of(model, contested, order=slice(None)):
+def weights_of(model, ambiguous, order=slice(None)):
     with torch.no_grad():
-        return model(torch.from_numpy(contested.features[:, order]), torch.from_numpy(contested.mask[:, order])).numpy()
+        return model(torch.from_numpy(ambiguous.features[:, order]), torch.from_numpy(ambiguous.mask[:, order])).numpy()
 
 
 def test_weights_sum_to_one_over_hypotheses_in_use():
-    contested = random_contested()
-    weights = weights_of(trained(), contested)
+    ambiguous = random_ambiguous()
+    weights = weights_of(trained(), ambiguous)
     assert weights.sum(axis=1) == pytest.approx(1, abs=1e-5)
-    assert (weights[~contested.mask] == 0).all()
+    assert (weights[~ambiguous.mask] == 0).all()
     assert weights.min() >= 0
 
 
 def test_the_order_of_hypotheses_does_not_matter():
-    contested, model = random_contested(), trained()
+    ambiguous, model = random_ambiguous(), trained()
     order = np.array([3, 0, 4, 1, 5, 2])
-    assert weights_of(model, contested, order) == pytest.approx(weights_of(model, contested)[:, order], abs=1e-5)
+    assert weights_of(model, ambiguous, order) == pytest.approx(weights_of(model, ambiguous)[:, order], abs=1e-5)
 
 
 def test_untrained_it_is_the_closed_form():
-    contested = random_contested()
-    contested.features[..., SHARE] = np.eye(HYPOTHESES)[0]
-    weights = weights_of(RayTransformer(), contested)
+    ambiguous = random_ambiguous()
+    ambiguous.features[..., SHARE] = np.eye(HYPOTHESES)[0]
+    weights = weights_of(RayTransformer(), ambiguous)
     assert (weights.argmax(axis=1) == 0).all()
     assert weights[:, 0].min() > 0.9
 
 
 @pytest.mark.parametrize("value", [1e30, -1e30, 0.0])
 def test_weights_are_finite_for_any_finite_features(value):
-    contested = random_contested()
-    contested.features[:] = value
-    weights = weights_of(trained(), contested)
-    assert weights[contested.mask.any(axis=1)].sum(axis=1) == pytest.approx(1, abs=1e-4)
+    ambiguous = random_ambiguous()
+    ambiguous.features[:] = value
+    weights = weights_of(trained(), ambiguous)
+    assert weights[ambiguous.mask.any(axis=1)].sum(axis=1) == pytest.approx(1, abs=1e-4)
 
 
 def test_bfloat16_agrees_within_its_precision():
-    contested, model = random_contested(), trained()
-    exact = weights_of(model, contested)
-    rough = model.to(torch.bfloat16)(
-        torch.from_numpy(contested.features).to(torch.bfloat16), torch.from_numpy(contested.mask)
+    ambiguous, model = random_ambiguous(), trained()
+    exact = weights_of(model, ambiguous)
+    incoherent = model.to(torch.bfloat16)(
+        torch.from_numpy(ambiguous.features).to(torch.bfloat16), torch.from_numpy(ambiguous.mask)
     )
-    assert np.abs(rough.detach().float().numpy() - exact).mean() < 0.02
+    assert np.abs(incoherent.detach().float().numpy() - exact).mean() < 0.02
 
 
 def test_compiled_weights_are_those_of_the_model(tmp_path):
@@ -162,39 +162,41 @@ def test_compiled_weights_are_those_of_the_model(tmp_path):
     save_weights(model, path)
     compiled = TrainedWeights(path)
     for rays in (1, 63, 64, 200):
-        contested = random_contested(rays)
-        assert compiled(contested) == pytest.approx(weights_of(model, contested), abs=1e-5)
+        ambiguous = random_ambiguous(rays)
+        assert compiled(ambiguous) == pytest.approx(weights_of(model, ambiguous), abs=1e-5)
 
 
 def test_weights_of_a_ray_do_not_depend_on_the_others(tmp_path):
     path = tmp_path / "weights.safetensors"
     save_weights(trained(), path)
-    contested = random_contested()
-    part = replace(contested, mask=contested.mask[37:], features=contested.features[37:])
-    assert (TrainedWeights(path)(contested)[37:] == TrainedWeights(path)(part)).all()
+    ambiguous = random_ambiguous()
+    part = replace(ambiguous, mask=ambiguous.mask[37:], features=ambiguous.features[37:])
+    assert (TrainedWeights(path)(ambiguous)[37:] == TrainedWeights(path)(part)).all()
 
 
 def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
     photo, disparity = square_before_wall()
-    contested, _, rays = contested_of(photo, disparity.values)
+    ambiguous, _, rays = ambiguous_of(photo, disparity.values)
     random = np.random.default_rng(0)
-    weights = random.uniform(0.01, 1, contested.mask.shape).astype(np.float32) * contested.mask
+    weights = random.uniform(0.01, 1, ambiguous.mask.shape).astype(np.float32) * ambiguous.mask
     weights /= weights.sum(axis=1, keepdims=True)
-    colors, disparities, source = decide(rays, contested, weights)
+    colors, disparities, source = blend_hypotheses(rays, ambiguous, weights)
     kept = np.where(weights > LEAST_VOTE, weights, 0)
-    linear = (kept[..., None] * linear_from_srgb(votes(rays, contested))).sum(axis=1) / kept.sum(axis=1)[:, None]
+    linear = (kept[..., None] * linear_from_srgb(hypothesis_colors(rays, ambiguous))).sum(axis=1) / kept.sum(axis=1)[
+        :, None
+    ]
     assert colors == pytest.approx(srgb_from_linear(linear), abs=1e-4)
     at = np.arange(len(weights)), weights.argmax(axis=1)
-    assert (disparities == contested.disparity[at]).all()
-    assert (source == contested.source[at] % PLAIN).all()
+    assert (disparities == ambiguous.disparity[at]).all()
+    assert (source == ambiguous.source[at] % PLAIN).all()
 
 
 def test_a_transformer_that_repeats_the_closed_form_changes_nothing():
     photo, disparity = square_before_wall()
     rays = rays_of_photo(photo.pixels, disparity.values, 2.0, 0)
 
-    def closed_form(contested):
-        share = np.where(contested.mask, contested.features[..., SHARE], 0) + 1e-9 * contested.mask
+    def closed_form(ambiguous):
+        share = np.where(ambiguous.mask, ambiguous.features[..., SHARE], 0) + 1e-9 * ambiguous.mask
         return (share / share.sum(axis=1, keepdims=True)).astype(np.float32)
 
     with ViewSynthesis() as plain, ViewSynthesis(transformer=closed_form) as asked:

@@ -3,12 +3,12 @@ import pytest
 
 from iibr_core.rendering.candidates import SAME_SURFACE_PX, SEALED_GAP_PX, find_candidates
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.types import ViewOffset
+from iibr_core.types import ViewOffset, image_size
 
 
 def ray_set(*disparities, coverage=None):
     disparities = [np.asarray(d, np.float32) for d in disparities]
-    rays = RaySet(len(disparities), disparities[0].shape, 0.1)
+    rays = RaySet(len(disparities), image_size(disparities[0]), 0.1)
     for d in disparities:
         colors = np.zeros((*d.shape, 3), np.float32)
         rays.add(ViewOffset(0, 0), colors, d, np.ones_like(d) if coverage is None else coverage)
@@ -100,10 +100,10 @@ def test_the_rearmost_gives_way_where_slots_run_out():
     assert sorted(found.disparity[:, 1, 4]) == [2.0, 3.0]
 
 
-@pytest.mark.parametrize("roughness", [0.01, 1.0])
-def test_bands_do_not_change_what_is_found(roughness):
+@pytest.mark.parametrize("incoherence", [0.01, 1.0])
+def test_bands_do_not_change_what_is_found(incoherence):
     noise = np.random.default_rng(1).uniform(-2, 2, (20, 15))
-    disparity = (np.arange(20)[:, None] * -0.4 + roughness * noise).astype(np.float32)
+    disparity = (np.arange(20)[:, None] * -0.4 + incoherence * noise).astype(np.float32)
     rays, offset = ray_set(disparity), ViewOffset(1.7, -0.4)
     whole = find_candidates(rays, offset, (0, 20))
     for first, last in ((0, 7), (7, 20), *((row, row + 1) for row in range(20))):

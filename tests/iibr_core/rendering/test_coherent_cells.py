@@ -3,14 +3,14 @@ import pytest
 
 from iibr_core.rendering import candidates as candidates_module
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.coherent_cells import SETTLED_PX, find_smooth_cells
+from iibr_core.rendering.coherent_cells import SETTLED_PX, find_coherent_cells
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
-from iibr_core.rendering.resampling import look_up_colors
-from iibr_core.rendering.visibility_weights import closed_form_weights
-from iibr_core.types import ViewOffset
+from iibr_core.rendering.resampling import resample_colors
+from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.types import ImageSize, ViewOffset, image_size
 from tests.iibr_core.scenes import smooth_texture
 
-SIZE = 48, 64
+SIZE = ImageSize(48, 64)
 Y, X = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
 SLOPE = 0.5 + 0.02 * X - 0.01 * Y
 BUMPS = 0.6 * np.sin(X / 9) * np.cos(Y / 7)
@@ -19,7 +19,7 @@ OFFSETS = [ViewOffset(0, 1), ViewOffset(-1.3, 0.4), ViewOffset(2, -2)]
 
 
 def ray_set(disparity, farthest=2.0):
-    rays = RaySet(2, disparity.shape, 0.5 / farthest, farthest)
+    rays = RaySet(2, image_size(disparity), 0.5 / farthest, farthest)
     rays.add(ViewOffset(0, 0), smooth_texture(*disparity.shape), disparity.astype(np.float32), np.ones_like(disparity))
     return rays
 
@@ -32,7 +32,7 @@ def by_pixel(cells, rows):
 
 
 def nowhere_smooth(rays, offset, rows):
-    smooth, about = find_smooth_cells(rays, offset, rows)
+    smooth, about = find_coherent_cells(rays, offset, rows)
     return np.zeros_like(smooth), about
 
 
@@ -41,9 +41,9 @@ def both_ways(monkeypatch, rays, offset):
     found = []
     for patch in (False, True):
         if patch:
-            monkeypatch.setattr(candidates_module, "find_smooth_cells", nowhere_smooth)
+            monkeypatch.setattr(candidates_module, "find_coherent_cells", nowhere_smooth)
         candidates = find_candidates(rays, offset, (0, SIZE[0]))
-        found.append((candidates, look_up_colors(rays, candidates, closed_form_weights(candidates))[0]))
+        found.append((candidates, resample_colors(rays, candidates, visibility_weights(candidates))[0]))
     return found
 
 
@@ -90,7 +90,7 @@ def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
     filled = np.zeros(SIZE, np.float32)
     filled[20:24, 20:24] = 1
     rays.add(at, np.zeros((*SIZE, 3), np.float32), np.full(SIZE, disparity, np.float32), filled)
-    smooth, _ = find_smooth_cells(rays, at, (0, SIZE[0]))
+    smooth, _ = find_coherent_cells(rays, at, (0, SIZE[0]))
     assert by_pixel(smooth, (0, SIZE[0]))[20:24, 20:24].all() == is_smooth
     assert by_pixel(smooth, (0, SIZE[0]))[8:12, 40:44].all()
 
@@ -116,8 +116,8 @@ def test_unknown_disparity_is_never_smooth():
     disparity = SLOPE.copy()
     disparity[10, 12] = np.nan
     rays = ray_set(disparity)
-    assert rays.cells.rough[2, 3]
-    assert not rays.cells.rough[4, 8]
-    smooth, _ = find_smooth_cells(rays, ViewOffset(0, 0.01), (0, SIZE[0]))
+    assert rays.cells.incoherent[2, 3]
+    assert not rays.cells.incoherent[4, 8]
+    smooth, _ = find_coherent_cells(rays, ViewOffset(0, 0.01), (0, SIZE[0]))
     assert not smooth[2, 3]
     assert smooth[4, 8]

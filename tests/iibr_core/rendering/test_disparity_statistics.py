@@ -6,9 +6,9 @@ from iibr_core.rendering.disparity_statistics import (
     EDGE_WINDOW_PX,
     STEP_AROUND_PX,
     edge_softness,
-    surroundings_of,
+    measure_disparity,
 )
-from iibr_core.training.degradation import blurred
+from iibr_core.training.degradation import blur
 
 
 def slow_surroundings(disparity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -38,7 +38,7 @@ def random_disparity(rng: np.random.Generator, shape: tuple[int, int], unknown: 
 @pytest.mark.parametrize("unknown", [0.0, 0.6, 1.0])
 def test_surroundings_against_a_slow_twin(shape: tuple[int, int], unknown: float):
     disparity = random_disparity(np.random.default_rng(7), shape, unknown)
-    around = surroundings_of(disparity[None], 4.0)
+    around = measure_disparity(disparity[None], 4.0)
     low, high, step = slow_surroundings(disparity)
     assert around.low[0] == pytest.approx(low)
     assert around.high[0] == pytest.approx(high)
@@ -73,7 +73,7 @@ def test_softness_against_a_slow_twin(shape: tuple[int, int], unknown: float):
 
 def test_softness_tells_steps_from_slopes():
     assert edge_softness(square(), 0.5) == 0
-    softness = [edge_softness(blurred(square(), sigma), 0.5) for sigma in (0.5, 1, 2, 4)]
+    softness = [edge_softness(blur(square(), sigma), 0.5) for sigma in (0.5, 1, 2, 4)]
     assert softness == sorted(softness)
     assert softness[-1] > 0.8 > 0.5 > softness[0] > 0
 

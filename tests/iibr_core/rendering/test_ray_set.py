@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from iibr_core.rendering.ray_set import CELL_PX, SMOOTH_SHARE, RaySet
-from iibr_core.types import ViewOffset
+from iibr_core.types import ImageSize, ViewOffset
 
 SURFACE_STEP = 0.6
 
@@ -31,8 +31,8 @@ def slow_cells(values, of_cell):
     )
 
 
-def slow_rough(disparity):
-    """A pixel is rough if it differs from one beside it, or is unknown, or at the border; a cell if any of its is."""
+def slow_incoherent(disparity):
+    """Pixels that differ from one beside them, are unknown, or at the border; cells that hold one."""
     around = np.pad(disparity, 1, constant_values=np.nan)
     steps = [np.abs(np.roll(around, shift, axis)[1:-1, 1:-1] - disparity) for shift in (1, -1) for axis in (0, 1)]
     return slow_cells(~(np.stack(steps) <= SMOOTH_SHARE * SURFACE_STEP).all(axis=0), np.any)
@@ -45,10 +45,10 @@ def test_edges_and_cells(size, unknown):
     disparity = np.cumsum(random.normal(0, 0.2, size), axis=1).astype(np.float32)
     disparity[random.random(size) < unknown] = np.nan
     coverage = np.where(np.isnan(disparity), 0, random.random(size) > 0.8).astype(np.float32)
-    rays = RaySet(1, size, SURFACE_STEP)
+    rays = RaySet(1, ImageSize(*size), SURFACE_STEP)
     rays.add(ViewOffset(0.0, 0.0), np.zeros((*size, 3), np.float32), disparity, coverage)
     _, _, _, _, near_edge = rays.arrays
     assert (near_edge[0] == slow_near_edge(disparity)).all()
     assert (rays.cells.low[0] == slow_cells(np.where(coverage > 0, disparity, np.inf), np.min)).all()
     assert (rays.cells.high[0] == slow_cells(np.where(coverage > 0, disparity, -np.inf), np.max)).all()
-    assert (rays.cells.rough == slow_rough(disparity)).all()
+    assert (rays.cells.incoherent == slow_incoherent(disparity)).all()

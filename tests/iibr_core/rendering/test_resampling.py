@@ -4,14 +4,14 @@ import pytest
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.rendering.candidates import Candidates, find_candidates
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import KEYS_A, look_up_colors
-from iibr_core.rendering.visibility_weights import closed_form_weights
-from iibr_core.types import ViewOffset
+from iibr_core.rendering.resampling import KEYS_A, resample_colors
+from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.types import ImageSize, ViewOffset, image_size
 from tests.iibr_core.scenes import smooth_texture
 
 
 def rays_of(colors, disparity, surface_step=0.1):
-    rays = RaySet(1, disparity.shape, surface_step)
+    rays = RaySet(1, image_size(disparity), surface_step)
     rays.add(ViewOffset(0, 0), colors, disparity.astype(np.float32), np.ones(disparity.shape, np.float32))
     return rays
 
@@ -38,7 +38,7 @@ def test_one_surface_is_looked_up_by_keys_cubic(offset):
     image = np.random.default_rng(5).uniform(0.3, 0.7, (12, 14, 3)).astype(np.float32)
     rays = rays_of(image, np.full((12, 14), 0.9))
     candidates = find_candidates(rays, offset, (0, 12))
-    colors, disparity, _ = look_up_colors(rays, candidates, closed_form_weights(candidates))
+    colors, disparity, _ = resample_colors(rays, candidates, visibility_weights(candidates))
     for y, x in ((4, 4), (6, 7), (8, 9)):
         expected = cubic_slowly(image, x + 0.9 * offset.s, y + 0.9 * offset.t)
         assert colors[y, x] == pytest.approx(expected, abs=1e-5)
@@ -47,7 +47,7 @@ def test_one_surface_is_looked_up_by_keys_cubic(offset):
 
 def test_surfaces_that_share_a_pixel_blend_in_linear_light():
     red, blue = np.float32([0.9, 0.1, 0.1]), np.float32([0.1, 0.1, 0.9])
-    rays = RaySet(2, (3, 3), 0.1)
+    rays = RaySet(2, ImageSize(3, 3), 0.1)
     for color, disparity in ((red, 1.0), (blue, 0.0)):
         rays.add(
             ViewOffset(0, 0),
@@ -66,7 +66,7 @@ def test_surfaces_that_share_a_pixel_blend_in_linear_light():
         slots,
         np.zeros((1, 1), np.bool_),
     )
-    colors, _, _ = look_up_colors(rays, candidates, half)
+    colors, _, _ = resample_colors(rays, candidates, half)
     assert colors[0, 1] == pytest.approx(
         srgb_from_linear((linear_from_srgb(red) + linear_from_srgb(blue)) / 2), abs=1e-5
     )
@@ -78,8 +78,8 @@ def test_no_colour_crosses_a_depth_edge():
     disparity = np.where(np.arange(12) < 6, 0.0, 3.0) * np.ones((8, 1))
     rays = rays_of(image, disparity)
     candidates = find_candidates(rays, ViewOffset(0, 0.5), (0, 8))
-    colors, found, _ = look_up_colors(rays, candidates, closed_form_weights(candidates))
-    sole = closed_form_weights(candidates).max(axis=0) > 0.999
+    colors, found, _ = resample_colors(rays, candidates, visibility_weights(candidates))
+    sole = visibility_weights(candidates).max(axis=0) > 0.999
     assert colors[sole & (found == 0)].max() == 0
     assert colors[sole & (found == 3)].min() == 1
 
@@ -87,6 +87,6 @@ def test_no_colour_crosses_a_depth_edge():
 def test_no_candidates_are_black():
     rays = rays_of(smooth_texture(5, 5), np.full((5, 5), 100.0))
     candidates = find_candidates(rays, ViewOffset(0, 1), (0, 5))
-    colors, disparity, _ = look_up_colors(rays, candidates, closed_form_weights(candidates))
+    colors, disparity, _ = resample_colors(rays, candidates, visibility_weights(candidates))
     assert colors.max() == 0
     assert disparity.max() == 0

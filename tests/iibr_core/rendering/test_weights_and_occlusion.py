@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.occlusion import LEAST_COVERED, entropy, occlusion_mask
-from iibr_core.rendering.visibility_weights import closed_form_weights
+from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import ViewOffset
 
 
@@ -42,24 +42,24 @@ pairs_of_floats = st.lists(
 
 @given(pairs_of_floats)
 def test_weights_agree_with_a_slow_twin(pairs):
-    weights = closed_form_weights(one_ray(pairs))[:, 0, 0]
+    weights = visibility_weights(one_ray(pairs))[:, 0, 0]
     assert weights[: len(pairs)] == pytest.approx(weights_slowly(pairs), abs=1e-5)
     assert weights.min() >= 0
     assert weights.sum() <= 1 + 1e-5
 
 
 def test_the_front_surface_wins_and_coverage_blends():
-    assert closed_form_weights(one_ray([(1.0, 0.0), (1.0, 5.0)]))[:2, 0, 0] == pytest.approx([0, 1])
-    assert closed_form_weights(one_ray([(1.0, 0.0), (0.3, 5.0)]))[:2, 0, 0] == pytest.approx([0.7, 0.3])
+    assert visibility_weights(one_ray([(1.0, 0.0), (1.0, 5.0)]))[:2, 0, 0] == pytest.approx([0, 1])
+    assert visibility_weights(one_ray([(1.0, 0.0), (0.3, 5.0)]))[:2, 0, 0] == pytest.approx([0.7, 0.3])
 
 
 def test_no_candidates_have_no_weight():
-    assert closed_form_weights(one_ray([])).sum() == 0
+    assert visibility_weights(one_ray([])).sum() == 0
 
 
 @given(pairs_of_floats)
 def test_entropy_is_normalised(pairs):
-    value = entropy(closed_form_weights(one_ray(pairs)))[0, 0]
+    value = entropy(visibility_weights(one_ray(pairs)))[0, 0]
     assert 0 <= value <= 1
 
 
@@ -74,7 +74,7 @@ def test_entropy_of_one_hot_uniform_and_nothing(slots):
 
 
 def test_mask_tells_uncovered_rays_from_shared_ones():
-    assert occlusion_mask(closed_form_weights(one_ray([])))[0, 0]
-    assert occlusion_mask(closed_form_weights(one_ray([(LEAST_COVERED / 2, 1.0)])))[0, 0]
-    assert not occlusion_mask(closed_form_weights(one_ray([(LEAST_COVERED * 1.5, 1.0)])))[0, 0]
-    assert not occlusion_mask(closed_form_weights(one_ray([(0.2, d) for d in range(5)])))[0, 0]
+    assert occlusion_mask(visibility_weights(one_ray([])))[0, 0]
+    assert occlusion_mask(visibility_weights(one_ray([(LEAST_COVERED / 2, 1.0)])))[0, 0]
+    assert not occlusion_mask(visibility_weights(one_ray([(LEAST_COVERED * 1.5, 1.0)])))[0, 0]
+    assert not occlusion_mask(visibility_weights(one_ray([(0.2, d) for d in range(5)])))[0, 0]

@@ -7,23 +7,23 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from iibr_core.depth.pictorial_cues import estimate_offline
+from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import edge_blur_px, refine
 from iibr_core.generation.light_field import generate
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.disparity_holes import fill_from_background
-from iibr_core.rendering.disparity_statistics import edge_softness, surroundings_of
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes
+from iibr_core.rendering.disparity_statistics import edge_softness, measure_disparity
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import Cancelled, in_bands, in_pieces
-from iibr_core.types import Photo, ViewOffset
+from iibr_core.types import ImageSize, Photo, ViewOffset
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 
 RANDOM = np.random.default_rng(5)
-SIZE = (83, 67)
+SIZE = ImageSize(83, 67)
 COLORS = np.repeat(np.repeat(RANDOM.uniform(0, 1, (21, 17, 3)), 4, axis=0), 4, axis=1)[: SIZE[0], : SIZE[1]]
 COLORS = np.ascontiguousarray(COLORS, np.float32)
 LAYERS = np.repeat(np.repeat(RANDOM.integers(-3, 4, (6, 5)), 14, axis=0), 14, axis=1)[: SIZE[0], : SIZE[1]]
@@ -52,7 +52,7 @@ def rendered(should_stop):
 
 
 def surveyed(should_stop):
-    around = surroundings_of(np.stack([LAYERS, np.where(HOLES, np.nan, SOFT)]), 2.0, should_stop)
+    around = measure_disparity(np.stack([LAYERS, np.where(HOLES, np.nan, SOFT)]), 2.0, should_stop)
     return around.low, around.high, around.step, around.softness
 
 
@@ -66,8 +66,8 @@ STAGES = {
     "softness": lambda stop: [edge_softness(SOFT, 0.5, stop)],
     "refine": lambda stop: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, stop)],
     "blur": lambda stop: [edge_blur_px(SOFT, stop)],
-    "offline": lambda stop: [estimate_offline(Photo(COLORS, 100.0, "test"), stop).values],
-    "unknown depth": lambda stop: [fill_from_background(np.where(HOLES, np.nan, LAYERS), stop)],
+    "offline": lambda stop: [estimate_from_cues(Photo(COLORS, 100.0, "test"), stop).values],
+    "unknown depth": lambda stop: [fill_disparity_holes(np.where(HOLES, np.nan, LAYERS), stop)],
 }
 
 
@@ -147,10 +147,10 @@ def test_a_ray_set_that_was_told_to_stop_is_as_before():
     with pytest.raises(Cancelled):
         rays.survey(lambda: True)
     assert len(rays) == count
-    assert rays.surroundings is rays.survey(lambda: True)  # made by now
+    assert rays.statistics is rays.survey(lambda: True)  # made by now
 
 
-def test_threads_that_ask_at_once_get_the_same_surroundings():
+def test_threads_that_ask_at_once_get_the_same_statistics():
     rays = rays_of_photo(COLORS, LAYERS, 2.0, 0)
     found = in_pieces(lambda _: rays.survey(), range(8), threads=8)
     assert all(around is found[0] for around in found)
@@ -160,7 +160,7 @@ def test_threads_that_ask_at_once_get_the_same_surroundings():
 @pytest.mark.parametrize("most", [1, 8, 1000])
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_every_row_is_in_one_band(size, most, threads):
-    found = in_bands(lambda first, last: (first, last), size, threads=threads, most_pixels=most)
+    found = in_bands(lambda first, last: (first, last), ImageSize(*size), threads=threads, most_pixels=most)
     assert all(before[1] == after[0] for before, after in pairwise(found))
     assert [found[0][0], found[-1][1]] == [0, size[0]] if found else size[0] == 0
     assert all(first < last and ((last - first) * size[1] <= most or last - first == 1) for first, last in found)

@@ -7,14 +7,15 @@ from iibr_core.ray_transformer.model import RayTransformer
 from iibr_core.rendering.ambiguous_rays import FEATURES, HYPOTHESES
 from iibr_core.training import batches
 from iibr_core.training.batches import RayChoice, training_batch
-from iibr_core.training.losses import LossWeights, color_loss, perceived
+from iibr_core.training.losses import LossWeights, color_loss, to_perceptual
 from iibr_core.training.trainer import TrainConfig, train
+from iibr_core.types import ImageSize
 
 
 @pytest.fixture(scope="module", autouse=True)
 def small_scenes():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(batches, "SIZE", (48, 72))
+        patch.setattr(batches, "SIZE", ImageSize(48, 72))
         patch.setattr(batches, "RAYS_A_VIEW", 300)
         yield
 
@@ -52,7 +53,7 @@ def test_training_lowers_the_loss_of_the_real_model(tmp_path):
     def loss():
         with torch.no_grad():
             rendered = [(model(b.features, b.mask)[..., None] * b.colors).sum(dim=1) for b in few]
-        losses = [color_loss(perceived(r), perceived(b.truth)).item() for r, b in zip(rendered, few)]
+        losses = [color_loss(to_perceptual(r), to_perceptual(b.truth)).item() for r, b in zip(rendered, few)]
         return np.mean([b.color_gain * loss for b, loss in zip(few, losses)])
 
     before = loss()

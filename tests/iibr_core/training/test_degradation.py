@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.training.degradation import blurred, coarse, degrade, misaligned, noisy, quantised, rescaled
+from iibr_core.training.degradation import add_noise, blur, coarsen, degrade, misalign, quantise, rescale
 
 SHAPES = [(1, 1), (1, 13), (7, 1), (2, 3), (31, 37)]
 
@@ -21,11 +21,11 @@ def test_blur_against_the_sum_over_all_pixels(sigma):
     y, x = np.indices(far.shape)
     for i, j in [(0, 0), (3, 4), (5, 8)]:
         weights = np.exp(-0.5 * ((y - i - 40) ** 2 + (x - j - 40) ** 2) / sigma**2)
-        assert blurred(d, sigma)[i, j] == pytest.approx((weights * far).sum() / weights.sum(), abs=5e-3)
+        assert blur(d, sigma)[i, j] == pytest.approx((weights * far).sum() / weights.sum(), abs=5e-3)
 
 
 def test_a_blurred_edge_stays_where_it_is_and_within_its_range():
-    soft = blurred(step_edge(), 2.0)[4]
+    soft = blur(step_edge(), 2.0)[4]
     assert (soft[19] + soft[20]) / 2 == pytest.approx(1.0, abs=1e-5)
     assert (np.diff(soft) >= -1e-6).all()
     assert soft[0] == pytest.approx(-1)
@@ -35,7 +35,7 @@ def test_a_blurred_edge_stays_where_it_is_and_within_its_range():
 @pytest.mark.parametrize("grain", [0.0, 0.6, 3.0])
 def test_noise_has_the_strength_asked_for(grain):
     zero = np.zeros((80, 90), np.float32)
-    noise = noisy(zero, np.random.default_rng(1), 0.3, grain)
+    noise = add_noise(zero, np.random.default_rng(1), 0.3, grain)
     assert noise.std() == pytest.approx(0.3, rel=0.03)
     neighbours = np.corrcoef(noise[:, 1:].ravel(), noise[:, :-1].ravel())[0, 1]
     assert (neighbours > 0.9) if grain == 3.0 else (neighbours < 0.7)
@@ -43,7 +43,7 @@ def test_noise_has_the_strength_asked_for(grain):
 
 def test_quantised_values_are_multiples_within_half_a_step():
     d = rough()
-    q = quantised(d, 0.25)
+    q = quantise(d, 0.25)
     assert np.abs(q - d).max() <= 0.125 + 1e-6
     assert (q / 0.25) == pytest.approx(np.rint(q / 0.25), abs=1e-5)
 
@@ -51,31 +51,31 @@ def test_quantised_values_are_multiples_within_half_a_step():
 def test_coarse_averages_squares_and_keeps_slopes():
     y, x = np.mgrid[0:24, 0:30].astype(np.float32)
     slope = 0.3 * x - 0.2 * y
-    assert coarse(slope, 4)[2:-2, 2:-2] == pytest.approx(slope[2:-2, 2:-2], abs=1e-4)
+    assert coarsen(slope, 4)[2:-2, 2:-2] == pytest.approx(slope[2:-2, 2:-2], abs=1e-4)
     d = rough((9, 12))
-    assert coarse(d, 3)[4, 7] == pytest.approx(d[3:6, 6:9].mean(), abs=1e-5)
+    assert coarsen(d, 3)[4, 7] == pytest.approx(d[3:6, 6:9].mean(), abs=1e-5)
 
 
 def test_misalignment_moves_down_and_right():
     d = rough()
-    assert (misaligned(d, 2.0, 3.0)[2:, 3:] == d[:-2, :-3]).all()
-    assert misaligned(d, 0.0, -0.25)[:, :-1] == pytest.approx(0.75 * d[:, :-1] + 0.25 * d[:, 1:], abs=1e-5)
+    assert (misalign(d, 2.0, 3.0)[2:, 3:] == d[:-2, :-3]).all()
+    assert misalign(d, 0.0, -0.25)[:, :-1] == pytest.approx(0.75 * d[:, :-1] + 0.25 * d[:, 1:], abs=1e-5)
 
 
 def test_rescaled():
-    assert rescaled(step_edge(), 1.1, -0.2) == pytest.approx(1.1 * step_edge() - 0.2)
+    assert rescale(step_edge(), 1.1, -0.2) == pytest.approx(1.1 * step_edge() - 0.2)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(
     "fault",
     [
-        lambda d: blurred(d, 0.0),
-        lambda d: quantised(d, 0.0),
-        lambda d: coarse(d, 1),
-        lambda d: misaligned(d, 0.0, 0.0),
-        lambda d: rescaled(d, 1.0, 0.0),
-        lambda d: noisy(d, np.random.default_rng(0), 0.0),
+        lambda d: blur(d, 0.0),
+        lambda d: quantise(d, 0.0),
+        lambda d: coarsen(d, 1),
+        lambda d: misalign(d, 0.0, 0.0),
+        lambda d: rescale(d, 1.0, 0.0),
+        lambda d: add_noise(d, np.random.default_rng(0), 0.0),
     ],
 )
 def test_a_fault_of_no_strength_changes_nothing_and_gives_a_copy(fault, shape):
@@ -89,7 +89,7 @@ def test_a_fault_of_no_strength_changes_nothing_and_gives_a_copy(fault, shape):
 @pytest.mark.parametrize("shape", SHAPES)
 def test_an_even_map_stays_even_where_only_its_shape_is_touched(shape):
     flat = np.full(shape, 1.5, np.float32)
-    for out in (blurred(flat, 4.0), coarse(flat, 3), misaligned(flat, 5.3, -40.2)):
+    for out in (blur(flat, 4.0), coarsen(flat, 3), misalign(flat, 5.3, -40.2)):
         assert out.shape == shape
         assert out == pytest.approx(flat, abs=1e-6)
 

@@ -6,19 +6,19 @@ import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.training.scenes.random_scene import (
-    Scene,
+    RaycastScene,
     cast,
     disparity_at,
+    is_visible_from,
     random_scene,
     render,
     sample_places,
-    seen_from,
 )
 from iibr_core.training.scenes.raycast import BALL, BOX, PLANE, PRIMITIVE, WIRE
-from iibr_core.types import ViewOffset
+from iibr_core.types import ImageSize, ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)
-SIZE = (48, 64)
+SIZE = ImageSize(48, 64)
 FOCAL, INFINITY = 70.0, 1.5
 GREATEST_Z = FOCAL / 0.5  # disparity -1
 ENDLESS = 1e9
@@ -36,7 +36,7 @@ def primitive(shape, centre, half, axes=None, color=(0.5, 0.5, 0.5)):
 
 def scene_of(*primitives, back=(0.1, 0.1, 0.1)):
     last = primitive(PLANE, (0, 0, GREATEST_Z), (ENDLESS, ENDLESS, 0), color=back)
-    return Scene(
+    return RaycastScene(
         primitives=np.array([*primitives, last], PRIMITIVE),
         centre_px=(31.5, 23.5),
         focal_px=FOCAL,
@@ -137,10 +137,10 @@ def test_seen_from_agrees_with_what_stands_before():
     offset = ViewOffset(2.0, -3.0)
     d = disparity_at(scene, x, y, offset).astype(np.float64)
     centre = disparity_at(scene, x + d * offset.s, y + d * offset.t, CENTRE)
-    seen = seen_from(scene, x, y, d, offset)
+    seen = is_visible_from(scene, x, y, d, offset)
     assert (centre[~seen] > d[~seen]).mean() > 0.99, "hidden by something nearer"
     assert 0.3 < seen.mean() < 1
-    assert seen_from(scene, x, y, d, offset, offset).all()
+    assert is_visible_from(scene, x, y, d, offset, offset).all()
 
 
 def test_rays_of_chosen_pixels_are_those_of_the_picture():
@@ -240,9 +240,9 @@ def test_a_seed_repeats_and_another_differs():
 @pytest.mark.parametrize("largest", [0.0, 1e-6, 1.0, 60.0, 1e4])
 def test_every_size_and_range_is_finite_and_within_its_range(size, largest):
     for seed in range(3):
-        scene = random_scene(np.random.default_rng(seed), size, largest)
+        scene = random_scene(np.random.default_rng(seed), ImageSize(*size), largest)
         for offset in (CENTRE, ViewOffset(4.0, -4.0)):
-            colors, disparity = render(scene, size, offset)
+            colors, disparity = render(scene, ImageSize(*size), offset)
             assert colors.shape == (*size, 3)
             assert np.isfinite(colors).all()
             assert (colors >= 0).all()
@@ -274,7 +274,7 @@ def test_bad_requests_are_refused():
     rng = np.random.default_rng(0)
     for size, largest in (((0, 5), 1.0), ((4, 4), -1.0), ((4, 4), np.nan), ((4, 4), np.inf)):
         with pytest.raises(ValueError, match="size"):
-            random_scene(rng, size, largest)
+            random_scene(rng, ImageSize(*size), largest)
     with pytest.raises(ValueError, match="samples"):
         cast(wavy(), [1.0], [2.0], CENTRE, samples=0)
     with pytest.raises(ValueError, match="equal"):

@@ -53,14 +53,14 @@ def viewer(open_window: Opener, photo_path: Path) -> Iterator[Driver]:
 
 
 def disparity_of(app: App) -> np.ndarray:
-    """What the views on the stage were made from, as given."""
-    assert app.stage.loaded is not None
-    return app.stage.loaded.disparity.values
+    """What the views on the screen were made from, as given."""
+    assert app.scene_view.loaded is not None
+    return app.scene_view.loaded.disparity.values
 
 
 def is_made(app: App) -> bool:
-    """Whether the stage shows what was asked for last."""
-    return app.stage.generation == app.state.generation
+    """Whether the screen shows what was asked for last."""
+    return app.scene_view.generation == app.state.generation
 
 
 def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
@@ -77,17 +77,17 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
     viewer.until_idle()
     before, given = viewer.image(), disparity_of(viewer.app).copy()
     press_at(viewer, 0.5, 0.5)
-    viewer.until(lambda app: not np.array_equal(app.stage.renderer.read_image(), before))
-    previews = viewer.app.stage.previews
+    viewer.until(lambda app: not np.array_equal(app.scene_view.renderer.read_image(), before))
+    previews = viewer.app.scene_view.previews
     viewer.send("mousemove", *viewer.position(0.5, 0.6))
-    viewer.until(lambda app: app.stage.previews > previews)
+    viewer.until(lambda app: app.scene_view.previews > previews)
     assert viewer.app.state.generation == 1
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     viewer.send("mouseup", 1)
     viewer.until(lambda app: app.state.stroke is None and is_made(app))
     viewer.until_idle()
     assert viewer.app.state.generation == 2
-    assert viewer.app.stage.views_present == 9
+    assert viewer.app.scene_view.views_present == 9
     made = disparity_of(viewer.app)
     assert made.max() == pytest.approx(NEAR + (NEAR - FAR), abs=0.2)
     far = given == FAR
@@ -104,9 +104,9 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
 def test_the_disparity_as_colours_follows_the_brush(viewer: Driver) -> None:
     viewer.app.do(SetOverlay("disparity"), SetOpacity(1.0), SetBrush(Brush("farther", 0.1, 1.0, is_on=True)))
     viewer.until_idle()
-    shown = viewer.app.table._drawn["overlay"][0]
+    shown = viewer.app.inspection_view._drawn["overlay"][0]
     press_at(viewer, 0.5, 0.5)
-    viewer.until(lambda app: app.table._drawn["overlay"][0] != shown)
+    viewer.until(lambda app: app.inspection_view._drawn["overlay"][0] != shown)
     viewer.send("mouseup", 1)
     viewer.until(lambda app: is_made(app) and app.state.stroke is None)
     viewer.until_idle()
@@ -158,9 +158,9 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
     x, y = viewer.find("handle near_clip")
     viewer.send("mousedown", 1)
     viewer.app.step()
-    previews = viewer.app.stage.previews
+    previews = viewer.app.scene_view.previews
     viewer.send("mousemove", x - 60, y)
-    viewer.until(lambda app: app.state.depth.edits.near_clip < 0.7 and app.stage.previews > previews)
+    viewer.until(lambda app: app.state.depth.edits.near_clip < 0.7 and app.scene_view.previews > previews)
     assert viewer.app.state.generation == 3
     viewer.send("mouseup", 1)
     viewer.until(lambda app: app.state.generation == 4 and is_made(app))
@@ -175,8 +175,8 @@ def test_refine_is_worked_out_anew_without_reading_the_photo(viewer: Driver, pho
     viewer.until(lambda app: app.state.generation == 2 and is_made(app))
     viewer.until_idle()
     assert 0 < viewer.app.state.depth.refine < 1
-    assert viewer.app.stage.loaded is not None
-    assert viewer.app.stage.loaded.work == viewer.app.state.depth
+    assert viewer.app.scene_view.loaded is not None
+    assert viewer.app.scene_view.loaded.depth_settings == viewer.app.state.depth
     viewer.app.do(SetDepthStrength(2.0, is_finished=True))
     viewer.until(lambda app: app.state.generation == 3 and is_made(app))
     viewer.until_idle()

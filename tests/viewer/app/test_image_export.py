@@ -13,7 +13,7 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.app.headless import HeadlessViewer
-from viewer.app.image_export import AlreadyThereError, drawn_pixels, save_picture
+from viewer.app.image_export import AlreadyThereError, render_pixels, save_picture
 from viewer.model.actions import MoveEye, SetAperture, SetFocus
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import SaveTask, Source
@@ -44,7 +44,7 @@ def opened(photo: Path) -> Iterator[HeadlessViewer]:
 
 
 def saved(viewer: HeadlessViewer, path: Path, size_px: tuple[int, int]) -> np.ndarray:
-    save_picture(viewer._stage, viewer.state, SaveTask(str(path), size_px))
+    save_picture(viewer._scene_view, viewer.state, SaveTask(str(path), size_px))
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))[..., :3]
 
 
@@ -77,19 +77,19 @@ def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
 
 
 def test_the_window_draws_its_own_picture_again(opened: HeadlessViewer) -> None:
-    stage, size_px = opened._stage, (WIDTH, HEIGHT)
-    stage.converge(opened.state, size_px)
-    shown, drawn = stage.renderer.read_image(), stage.pictures_drawn
-    stage.picture(opened.state, (40, 30))
-    stage.converge(opened.state, size_px)
-    assert stage.pictures_drawn == drawn + 1
-    assert np.array_equal(stage.renderer.read_image(), shown)
+    scene_view, size_px = opened._scene_view, (WIDTH, HEIGHT)
+    scene_view.converge(opened.state, size_px)
+    shown, drawn = scene_view.renderer.read_image(), scene_view.pictures_drawn
+    scene_view.picture(opened.state, (40, 30))
+    scene_view.converge(opened.state, size_px)
+    assert scene_view.pictures_drawn == drawn + 1
+    assert np.array_equal(scene_view.renderer.read_image(), shown)
 
 
 @pytest.mark.parametrize("size_px", [(0, 5), (5, -1), (20_000, 20_000)])
 def test_absurd_sizes_are_refused(opened: HeadlessViewer, size_px: tuple[int, int]) -> None:
     with pytest.raises(InputError, match=rf"{size_px[0]}x{size_px[1]} px: .* million"):
-        drawn_pixels(opened._stage, opened.state, size_px)
+        render_pixels(opened._scene_view, opened.state, size_px)
 
 
 def test_files_are_not_replaced_unasked(opened: HeadlessViewer, tmp_path: Path) -> None:
@@ -98,11 +98,11 @@ def test_files_are_not_replaced_unasked(opened: HeadlessViewer, tmp_path: Path) 
     with pytest.raises(AlreadyThereError, match=r"taken\.png"):
         saved(opened, path, (8, 8))
     assert path.read_bytes() == b"mine"
-    save_picture(opened._stage, opened.state, SaveTask(str(path), (8, 8), may_replace=True))
+    save_picture(opened._scene_view, opened.state, SaveTask(str(path), (8, 8), may_replace=True))
     assert path.read_bytes() != b"mine"
 
 
 @pytest.mark.parametrize("name", ["", "a.jpg", "missing-folder/a.png"])
 def test_places_that_cannot_be_written(opened: HeadlessViewer, tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError):
-        save_picture(opened._stage, opened.state, SaveTask(str(tmp_path / name) if name else "", (8, 8)))
+        save_picture(opened._scene_view, opened.state, SaveTask(str(tmp_path / name) if name else "", (8, 8)))

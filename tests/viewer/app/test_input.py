@@ -34,7 +34,7 @@ from viewer.model.actions import (
     Undo,
 )
 from viewer.model.commands import BY_NAME
-from viewer.model.layout import Layout, layout_of, letterboxed, pixel_at
+from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
 from viewer.model.layout import Rect as R
 from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, History, Hover, Optics, Scene, Source, TiltHandles
@@ -242,7 +242,7 @@ def test_pixels_of_a_dense_display() -> None:
 
 
 def test_no_room_for_the_picture() -> None:
-    assert letterboxed(R(0, 0, -5, 10), (4, 3)) is None
+    assert letterbox(R(0, 0, -5, 10), (4, 3)) is None
     assert layout_of((0, 0), (4, 3)).picture_px is None
 
 

@@ -17,8 +17,8 @@ from iibr_core.generation.plan import plan_literal
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.input import actions_from_drop
-from viewer.app.main_loop import App, opening
-from viewer.background.scene_worker import load
+from viewer.app.main_loop import App, initial_state
+from viewer.background.loaded_photo import load_photo
 from viewer.model.actions import MoveEye, OpenPath, SetLoop, ToggleSection
 from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState, Optics, ReadTruthTask, Source
@@ -39,7 +39,7 @@ def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
 
 def write_truth(photo: Path, folder: Path, shift: int = 0) -> Path:
     """The light field that the photo gives at its disparity as it is, brighter by `shift` steps of 255."""
-    loaded = load(Source(str(photo)))
+    loaded = load_photo(Source(str(photo)))
     plan = plan_literal(loaded.photo, loaded.disparity, GRID)
     with HciWriter(folder, GRID, 100.0, folder.name) as writer:
         for view in generate(loaded.photo, plan.field_disparity(loaded.disparity), plan):
@@ -58,15 +58,15 @@ def test_epis_follow_the_pointer_and_cost_no_picture(viewer: Driver) -> None:
     viewer.until_idle()
     app = viewer.app
     assert app.layout().strip_across is not None
-    shown = app.table.draw(app.state, app.layout())
+    shown = app.inspection_view.draw(app.state, app.layout())
     assert shown.strip_across is not None
-    drawn, frames = app.stage.pictures_drawn, app.frames_shown
+    drawn, frames = app.scene_view.pictures_drawn, app.frames_shown
     viewer.send("mousemove", *viewer.position(0.5, 0.6))
     viewer.until(lambda app: app.state.hover is not None and app.state.hover.y_px > 30)
     viewer.until_idle()
-    moved = app.table.draw(app.state, app.layout())
+    moved = app.inspection_view.draw(app.state, app.layout())
     assert moved != shown
-    assert app.stage.pictures_drawn == drawn
+    assert app.scene_view.pictures_drawn == drawn
     assert app.frames_shown > frames
     frames = app.frames_shown
     for _ in range(3):
@@ -119,7 +119,7 @@ def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver)
     viewer.slide("##Opacity", 0.25)
     assert 0.1 < viewer.app.state.inspection.opacity < 0.4
     viewer.press("Entropy")
-    viewer.until(lambda app: app.table.draw(app.state, app.layout()).overlay is not None)
+    viewer.until(lambda app: app.inspection_view.draw(app.state, app.layout()).overlay is not None)
     viewer.press("Entropy")
     viewer.until(lambda app: app.state.inspection.overlay is None)
     viewer.send("mousemove", *viewer.position(0.5, 0.5))
@@ -173,9 +173,9 @@ def test_a_folder_dropped_on_the_panel_is_ground_truth(viewer: Driver, photo_pat
     assert pair.psnr_db == pytest.approx(20 * math.log10(255 / 3), abs=0.1)
     app.do(MoveEye(ViewOffset(-2, 1)))
     viewer.until(lambda app: is_scored(app) and app.state.inspection.pair.view == (0, 3))  # type: ignore[union-attr]
-    aids = app.table.draw(app.state, app.layout())
-    assert aids.left is not None
-    assert aids.right is not None
+    textures = app.inspection_view.draw(app.state, app.layout())
+    assert textures.left is not None
+    assert textures.right is not None
 
 
 def test_dropped_elsewhere_a_folder_is_opened(viewer: Driver) -> None:
@@ -220,7 +220,7 @@ def test_ground_truth_of_the_command_line_waits_for_the_scene(
     driver = open_window(None)
     app = driver.app
     app.state = replace(
-        opening(OpenPath(Source(str(photo_path), grid=GridShape(3, 3))), ground_truth=str(truth)),
+        initial_state(OpenPath(Source(str(photo_path), grid=GridShape(3, 3))), ground_truth=str(truth)),
         preferences=app.state.preferences,
     )
     driver.until(is_scored)

@@ -37,8 +37,8 @@ def shown_focus(viewer: Driver, given: float) -> float:
 
 def test_the_first_picture_comes_before_the_views(open_window: Opener, photo_path: Path) -> None:
     driver = open_window(photo_path)
-    driver.until(lambda app: app.stage.pictures_drawn > 0)
-    assert driver.app.stage.views_present <= WAITING_VIEWS
+    driver.until(lambda app: app.scene_view.pictures_drawn > 0)
+    assert driver.app.scene_view.views_present <= WAITING_VIEWS
     assert driver.image().std() > 10
 
 
@@ -97,23 +97,23 @@ def test_a_slider_changes_the_aperture_and_not_the_viewpoint(viewer: Driver) -> 
 
 def test_an_idle_window_draws_nothing_however_often_it_is_woken(viewer: Driver) -> None:
     app = viewer.app
-    shown, drawn = app.frames_shown, app.stage.pictures_drawn
+    shown, drawn = app.frames_shown, app.scene_view.pictures_drawn
     for _ in range(50):
         glfw.post_empty_event()
         app.step()
         assert app.wait_s > 0
-    assert (app.frames_shown, app.stage.pictures_drawn) == (shown, drawn)
+    assert (app.frames_shown, app.scene_view.pictures_drawn) == (shown, drawn)
 
 
 def test_moving_the_pointer_over_the_panel_does_not_draw_the_picture_again(viewer: Driver) -> None:
     app = viewer.app
-    shown, drawn = app.frames_shown, app.stage.pictures_drawn
+    shown, drawn = app.frames_shown, app.scene_view.pictures_drawn
     panel = app.layout().panel
     for y in range(60, 260, 20):
         viewer.send("mousemove", int(panel.x + 0.8 * panel.width), y)
         viewer.until_idle()
     assert app.frames_shown > shown, "sliders light up"
-    assert app.stage.pictures_drawn == drawn
+    assert app.scene_view.pictures_drawn == drawn
 
 
 def test_a_dropped_photo_replaces_the_scene(viewer: Driver, tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
     viewer.slide("##Parallax", 0.9)
     assert viewer.app.state.generation == 2
     assert viewer.app.state.depth_strength > 1
-    viewer.until(lambda app: app.stage.generation == 2)
+    viewer.until(lambda app: app.scene_view.generation == 2)
     viewer.until_idle()
     again = viewer.app.state.scene
     assert again is not None

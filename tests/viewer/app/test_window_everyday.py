@@ -225,12 +225,12 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
     driver.until(lambda app: app.state.progress.done > 3)
     driver.app.do(StopWork())
     driver.until(lambda app: app.wait_s == 1.0)
-    made = driver.app.stage.views_present
+    made = driver.app.scene_view.views_present
     assert 3 < made < 41 * 41
-    assert driver.app.stage.views_present == made == len(driver.app.state.views_there)
+    assert driver.app.scene_view.views_present == made == len(driver.app.state.views_there)
     assert "stopped at" in driver.app.state.progress.doing
     driver.press("Resume")
-    driver.until(lambda app: app.stage.generation == 2)
+    driver.until(lambda app: app.scene_view.generation == 2)
 
 
 def test_a_lost_worker_is_told_and_replaced(
@@ -241,7 +241,7 @@ def test_a_lost_worker_is_told_and_replaced(
     real = scene_worker.results_of
 
     def dying(
-        request: scene_worker.Request, *others: object
+        request: scene_worker.SceneRequest, *others: object
     ) -> Iterator[scene_worker.SceneReady | scene_worker.ViewReady]:
         if request.generation == 1:
             raise SystemExit
@@ -258,7 +258,7 @@ def test_a_lost_worker_is_told_and_replaced(
 
 
 def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
-    from viewer.model.reducers.root import apply
+    from viewer.model.reducers.root import reduce
     from viewer.model.state.app_state import PathPrompt
 
-    assert apply(AppState(), AskForPath("mask")).prompt == PathPrompt("mask")
+    assert reduce(AppState(), AskForPath("mask")).prompt == PathPrompt("mask")

@@ -56,17 +56,17 @@ def test_the_pad_moves_the_viewpoint_as_far_as_beyond_the_views(viewer: Driver) 
 def test_a_loop_draws_while_it_runs_and_nothing_while_it_rests(viewer: Driver) -> None:
     app = viewer.app
     viewer.press("Circle")
-    drawn = app.stage.pictures_drawn
-    viewer.until(lambda app: app.stage.pictures_drawn >= drawn + 5)
+    drawn = app.scene_view.pictures_drawn
+    viewer.until(lambda app: app.scene_view.pictures_drawn >= drawn + 5)
     assert app.state.motion.is_running
     assert len({app.state.optics.eye, ViewOffset(0, 0)}) == 2
     viewer.send("key", "space")
     viewer.until(lambda app: app.state.motion.is_paused)
     viewer.until_idle()
-    shown, drawn, eye = app.frames_shown, app.stage.pictures_drawn, app.state.optics.eye
+    shown, drawn, eye = app.frames_shown, app.scene_view.pictures_drawn, app.state.optics.eye
     for _ in range(3):
         app.step()
-    assert (app.frames_shown, app.stage.pictures_drawn, app.state.optics.eye) == (shown, drawn, eye)
+    assert (app.frames_shown, app.scene_view.pictures_drawn, app.state.optics.eye) == (shown, drawn, eye)
     viewer.press("Circle")
     viewer.until(lambda app: app.state.motion.kind is None)
 
@@ -140,7 +140,7 @@ def test_the_reticle_follows_the_pointer_and_costs_no_picture(viewer: Driver) ->
     scene = app.state.scene
     assert scene is not None
     assert scene.plan is not None
-    drawn = app.stage.pictures_drawn
+    drawn = app.scene_view.pictures_drawn
     for place, given in (((0.5, 0.5), NEAR), ((0.15, 0.15), FAR)):
         wanted = pytest.approx((given - scene.plan.disparity_zero) * scene.plan.disparity_scale, abs=1e-3)
         shown = app.frames_shown
@@ -150,7 +150,7 @@ def test_the_reticle_follows_the_pointer_and_costs_no_picture(viewer: Driver) ->
         assert app.frames_shown > shown
     viewer.send("mousemove", round(app.layout().panel.x + 20), 300)
     viewer.until(lambda app: app.state.hover is None)
-    assert app.stage.pictures_drawn == drawn
+    assert app.scene_view.pictures_drawn == drawn
 
 
 DRAWS = (
@@ -173,14 +173,14 @@ ONLY_PANELS = (
 def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
     """Optics draw the picture and nothing else; panels draw panels; only depth strength makes the views anew."""
     app = viewer.app
-    uploads = count_calls(monkeypatch, app.stage.renderer, "upload_view")
+    uploads = count_calls(monkeypatch, app.scene_view.renderer, "upload_view")
 
     def cost_of(action: Action) -> tuple[bool, bool, bool, bool]:
-        before = app.stage.pictures_drawn, app.frames_shown, len(uploads), app.stage.generation
+        before = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
         app.do(action)
-        viewer.until(lambda app: app.stage.generation == app.state.generation)
+        viewer.until(lambda app: app.scene_view.generation == app.state.generation)
         viewer.until_idle()
-        after = app.stage.pictures_drawn, app.frames_shown, len(uploads), app.stage.generation
+        after = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
         drawn, shown, uploaded, generation = (a != b for a, b in zip(before, after))
         return drawn, shown, uploaded, generation
 

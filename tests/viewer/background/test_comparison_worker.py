@@ -20,19 +20,19 @@ from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import write_scene
 from viewer.background.comparison_worker import (
+    ComparisonFailed,
+    ComparisonInputs,
+    ComparisonJob,
+    ComparisonResult,
+    ComparisonWorker,
     EntropyReady,
-    Inputs,
-    Looker,
-    LookFailed,
     PairReady,
     PairScored,
-    SecondLook,
-    Seen,
     mean_flip,
     psnr_db,
 )
-from viewer.background.scene_worker import load
-from viewer.model.inspection_request import Inquiry
+from viewer.background.loaded_photo import load_photo
+from viewer.model.inspection_request import InspectionRequest
 from viewer.model.state.app_state import Source
 from viewer.model.state.inspection import GroundTruth
 
@@ -41,13 +41,13 @@ DEADLINE_S = 60.0
 
 
 @pytest.fixture(scope="module")
-def inputs(tmp_path_factory: pytest.TempPathFactory) -> Inputs:
-    loaded = load(Source(str(write_scene(tmp_path_factory.mktemp("inquiry")))))
-    return Inputs("fast", loaded, plan_for_viewing(loaded.photo, loaded.disparity))
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> ComparisonInputs:
+    loaded = load_photo(Source(str(write_scene(tmp_path_factory.mktemp("request")))))
+    return ComparisonInputs("fast", loaded, plan_for_viewing(loaded.photo, loaded.disparity))
 
 
 @pytest.fixture
-def truth(inputs: Inputs, tmp_path: Path) -> GroundTruth:
+def truth(inputs: ComparisonInputs, tmp_path: Path) -> GroundTruth:
     """The light field that the photo gives at its disparity as it is."""
     loaded = inputs.loaded
     assert loaded is not None
@@ -80,9 +80,9 @@ def test_flip_is_0_between_equals_and_grows_with_the_difference() -> None:
     assert flips[-1] > 0.3
 
 
-def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: Inputs) -> None:
-    inquiry = Inquiry(1, "entropy", (0, 0))
-    (seen,) = Looker().seen(inquiry, inputs, never)
+def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: ComparisonInputs) -> None:
+    request = InspectionRequest(1, "entropy", (0, 0))
+    (seen,) = ComparisonJob().seen(request, inputs, never)
     assert isinstance(seen, EntropyReady)
     loaded, plan = inputs.loaded, inputs.plan
     assert loaded is not None
@@ -100,17 +100,17 @@ def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: Inpu
     np.testing.assert_array_equal(with_entropy.colors, without.colors)
     assert 0 <= with_entropy.entropy.min() <= with_entropy.entropy.max() <= 1
     np.testing.assert_allclose(seen.entropy, with_entropy.entropy * 255, atol=0.5)
-    middle = next(Looker().seen(replace(inquiry, view=plan.grid.centre), inputs, never))
+    middle = next(ComparisonJob().seen(replace(request, view=plan.grid.centre), inputs, never))
     assert isinstance(middle, EntropyReady)
     assert not middle.entropy.any(), "every ray of the middle view is the photo's own"
 
 
-def test_fast_and_exact_are_the_views_generate_makes(inputs: Inputs) -> None:
+def test_fast_and_exact_are_the_views_generate_makes(inputs: ComparisonInputs) -> None:
     loaded, plan = inputs.loaded, inputs.plan
     assert loaded is not None
     assert plan is not None
     view = (0, 1)
-    pair, scored = Looker().seen(Inquiry(1, "quality", view, is_scored=True), inputs, never)
+    pair, scored = ComparisonJob().seen(InspectionRequest(1, "quality", view, is_scored=True), inputs, never)
     assert isinstance(pair, PairReady)
     disparity = plan.field_disparity(loaded.disparity)
     for image, quality in ((pair.left, "fast"), (pair.right, "exact")):
@@ -122,10 +122,12 @@ def test_fast_and_exact_are_the_views_generate_makes(inputs: Inputs) -> None:
     assert scored.flip == mean_flip(pair.right, pair.left)
 
 
-def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(inputs: Inputs, truth: GroundTruth) -> None:
+def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(
+    inputs: ComparisonInputs, truth: GroundTruth
+) -> None:
     """The plan for viewing has its own scale and focus; views beside ground truth are made at the truth's."""
     for view in ((0, 0), (1, 2), (1, 1)):
-        pair, scored = Looker().seen(Inquiry(1, "truth", view, truth, is_scored=True), inputs, never)
+        pair, scored = ComparisonJob().seen(InspectionRequest(1, "truth", view, truth, is_scored=True), inputs, never)
         assert isinstance(pair, PairReady)
         np.testing.assert_array_equal(pair.right, read_view(Path(truth.path), *view))
         assert isinstance(scored, PairScored)
@@ -134,36 +136,36 @@ def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(inputs: Inp
 
 def test_a_stored_view_is_held_against_the_truth_as_it_is(truth: GroundTruth) -> None:
     stored = np.full((truth.height, truth.width, 3), 100, np.uint8)
-    inquiry = Inquiry(1, "truth", (2, 0), truth, is_scored=True)
-    pair, scored = Looker().seen(inquiry, Inputs("fast", stored=stored), never)
+    request = InspectionRequest(1, "truth", (2, 0), truth, is_scored=True)
+    pair, scored = ComparisonJob().seen(request, ComparisonInputs("fast", stored=stored), never)
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)
     np.testing.assert_array_equal(pair.left, stored)
     assert scored.psnr_db == psnr_db(stored, read_view(Path(truth.path), 2, 0))
 
 
-def test_a_pair_is_made_once_and_scored_when_asked(inputs: Inputs, truth: GroundTruth) -> None:
-    looker, inquiry = Looker(), Inquiry(1, "truth", (0, 0), truth)
-    assert [type(seen) for seen in looker.seen(inquiry, inputs, never)] == [PairReady]
-    assert [type(seen) for seen in looker.seen(replace(inquiry, is_scored=True), inputs, never)] == [PairScored]
-    looker.forget()
-    assert [type(seen) for seen in looker.seen(inquiry, inputs, never)] == [PairReady]
+def test_a_pair_is_made_once_and_scored_when_asked(inputs: ComparisonInputs, truth: GroundTruth) -> None:
+    job, request = ComparisonJob(), InspectionRequest(1, "truth", (0, 0), truth)
+    assert [type(seen) for seen in job.seen(request, inputs, never)] == [PairReady]
+    assert [type(seen) for seen in job.seen(replace(request, is_scored=True), inputs, never)] == [PairScored]
+    job.forget()
+    assert [type(seen) for seen in job.seen(request, inputs, never)] == [PairReady]
 
 
-def test_a_look_that_is_not_wanted_any_more_stops(inputs: Inputs) -> None:
+def test_a_look_that_is_not_wanted_any_more_stops(inputs: ComparisonInputs) -> None:
     with pytest.raises(Cancelled):
-        list(Looker().seen(Inquiry(1, "quality", (0, 0)), inputs, lambda: True))
+        list(ComparisonJob().seen(InspectionRequest(1, "quality", (0, 0)), inputs, lambda: True))
 
 
-def test_truth_that_changed_on_disk_is_an_input_error(inputs: Inputs, truth: GroundTruth) -> None:
-    inquiry = Inquiry(1, "truth", (0, 0), truth)
+def test_truth_that_changed_on_disk_is_an_input_error(inputs: ComparisonInputs, truth: GroundTruth) -> None:
+    request = InspectionRequest(1, "truth", (0, 0), truth)
     for path in Path(truth.path).glob("input_Cam*.png"):
         write_image(path, np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(InputError, match="changed"):
-        list(Looker().seen(inquiry, inputs, never))
+        list(ComparisonJob().seen(request, inputs, never))
     next(Path(truth.path).glob("input_Cam000.png")).unlink()
     with pytest.raises(InputError, match="input_Cam000"):
-        list(Looker().seen(inquiry, inputs, never))
+        list(ComparisonJob().seen(request, inputs, never))
 
 
 def test_one_view_of_a_folder_is_the_one_read_with_all_others(truth: GroundTruth) -> None:
@@ -177,12 +179,12 @@ def test_one_view_of_a_folder_is_the_one_read_with_all_others(truth: GroundTruth
 
 
 @pytest.fixture
-def second_look() -> Iterator[tuple[SecondLook, Callable[[type[Seen]], Seen]]]:
+def comparisons() -> Iterator[tuple[ComparisonWorker, Callable[[type[ComparisonResult]], ComparisonResult]]]:
     """The thread, and a way to wait for what it finds."""
     woken = threading.Event()
-    thread = SecondLook(woken.set)
+    thread = ComparisonWorker(woken.set)
 
-    def found(kind: type[Seen]) -> Seen:
+    def found(kind: type[ComparisonResult]) -> ComparisonResult:
         while True:
             assert woken.wait(DEADLINE_S)
             woken.clear()
@@ -194,48 +196,52 @@ def second_look() -> Iterator[tuple[SecondLook, Callable[[type[Seen]], Seen]]]:
     thread.close()
 
 
-def test_the_newest_look_wins(inputs: Inputs, second_look: tuple[SecondLook, Callable[[type[Seen]], Seen]]) -> None:
-    thread, found = second_look
-    inquiries = [Inquiry(1, "entropy", (0, column)) for column in range(3)]
-    for inquiry in inquiries:
-        thread.want(inquiry, inputs)
-    assert found(EntropyReady).inquiry == inquiries[-1]
-    thread.want(inquiries[0], None)
-    assert thread.wanted == inquiries[-1], "without inputs nothing changes"
+def test_the_newest_look_wins(
+    inputs: ComparisonInputs, comparisons: tuple[ComparisonWorker, Callable[[type[ComparisonResult]], ComparisonResult]]
+) -> None:
+    thread, found = comparisons
+    requests = [InspectionRequest(1, "entropy", (0, column)) for column in range(3)]
+    for request in requests:
+        thread.want(request, inputs)
+    assert found(EntropyReady).request == requests[-1]
+    thread.want(requests[0], None)
+    assert thread.wanted == requests[-1], "without inputs nothing changes"
     thread.want(None, None)
     assert thread.found() == []
 
 
 def test_what_fails_is_told_in_one_line(
-    inputs: Inputs, truth: GroundTruth, second_look: tuple[SecondLook, Callable[[type[Seen]], Seen]]
+    inputs: ComparisonInputs,
+    truth: GroundTruth,
+    comparisons: tuple[ComparisonWorker, Callable[[type[ComparisonResult]], ComparisonResult]],
 ) -> None:
-    thread, found = second_look
-    thread.want(Inquiry(1, "truth", (0, 0), replace(truth, path="nowhere")), inputs)
-    failed = found(LookFailed)
-    assert isinstance(failed, LookFailed)
+    thread, found = comparisons
+    thread.want(InspectionRequest(1, "truth", (0, 0), replace(truth, path="nowhere")), inputs)
+    failed = found(ComparisonFailed)
+    assert isinstance(failed, ComparisonFailed)
     assert failed.message.startswith("nowhere")
     assert "\n" not in failed.message
 
 
-def test_a_field_of_one_view_can_be_compared(inputs: Inputs) -> None:
+def test_a_field_of_one_view_can_be_compared(inputs: ComparisonInputs) -> None:
     """No view beside the middle: the ray set has no farthest view to take in."""
     loaded = inputs.loaded
     assert loaded is not None
     plan = plan_literal(loaded.photo, loaded.disparity, GridShape(1, 1))
-    pair = next(Looker().seen(Inquiry(1, "quality", (0, 0)), replace(inputs, plan=plan), never))
+    pair = next(ComparisonJob().seen(InspectionRequest(1, "quality", (0, 0)), replace(inputs, plan=plan), never))
     assert isinstance(pair, PairReady)
     np.testing.assert_array_equal(pair.left, np.rint(loaded.photo.pixels * 255))
 
 
-def test_the_middle_view_is_the_photo_whatever_its_disparity(inputs: Inputs) -> None:
+def test_the_middle_view_is_the_photo_whatever_its_disparity(inputs: ComparisonInputs) -> None:
     """Rays of torn disparity cover each other even where nothing moves; yet nothing is to be found out there."""
     loaded = inputs.loaded
     assert loaded is not None
     torn = np.random.default_rng(5).uniform(-30, 30, loaded.photo.size).astype(np.float32)
     loaded = replace(loaded, disparity=replace(loaded.disparity, values=torn))
     plan = plan_literal(loaded.photo, loaded.disparity, GRID)
-    pair, scored = Looker().seen(
-        Inquiry(1, "quality", GRID.centre, is_scored=True), replace(inputs, loaded=loaded, plan=plan), never
+    pair, scored = ComparisonJob().seen(
+        InspectionRequest(1, "quality", GRID.centre, is_scored=True), replace(inputs, loaded=loaded, plan=plan), never
     )
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)

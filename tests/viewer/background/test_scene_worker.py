@@ -15,12 +15,12 @@ from iibr_core.types import GridShape, InputError, ViewUpdate
 from viewer.background.scene_worker import (
     QUEUED_RESULTS,
     Failed,
-    Request,
-    Result,
     SceneReady,
+    SceneRequest,
+    SceneResult,
+    SceneWorker,
     ViewReady,
     Work,
-    Worker,
     results_of,
 )
 from viewer.model.state.app_state import CENTRE, Progress, Source
@@ -34,13 +34,13 @@ class Desk:
 
     def __init__(self, work: Work | None = None) -> None:
         self._woken = threading.Semaphore(0)
-        self.worker = Worker(self._woken.release, work)
+        self.worker = SceneWorker(self._woken.release, work)
 
     def woken(self) -> bool:
         """Wait to be woken."""
         return self._woken.acquire(timeout=DEADLINE_S)
 
-    def next(self) -> Result:
+    def next(self) -> SceneResult:
         """The next result that is not late, waiting for it."""
         while True:
             if (result := self.worker.next_result()) is not None:
@@ -61,8 +61,8 @@ def desk_for() -> Iterator[Callable[..., Desk]]:
         desk.worker.close()
 
 
-def request(generation: int, path: str = "p") -> Request:
-    return Request(generation, Source(path))
+def request(generation: int, path: str = "p") -> SceneRequest:
+    return SceneRequest(generation, Source(path))
 
 
 def view(generation: int, done: int = 1) -> ViewReady:
@@ -71,7 +71,7 @@ def view(generation: int, done: int = 1) -> ViewReady:
 
 def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_path: Path) -> None:
     desk = Desk()
-    desk.worker.submit(Request(7, Source(str(photo_path), grid=GridShape(3, 3))))
+    desk.worker.submit(SceneRequest(7, Source(str(photo_path), grid=GridShape(3, 3))))
     ready = desk.next()
     assert isinstance(ready, SceneReady)
     assert (ready.generation, ready.scene.grid, ready.scene.name) == (7, (3, 3), "scene")
@@ -87,7 +87,7 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
 def test_a_lost_worker_says_so_and_the_next_request_starts_another(
     desk_for: Callable[..., Desk], capfd: pytest.CaptureFixture[str]
 ) -> None:
-    def work(asked: Request, *_: object) -> Iterator[ViewReady]:
+    def work(asked: SceneRequest, *_: object) -> Iterator[ViewReady]:
         if asked.generation == 1:
             raise SystemExit("a library tried to end the program")
         yield view(asked.generation)
@@ -109,24 +109,24 @@ def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path,
     known = tmp_path / "known.png"
     write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
     for path, expected in ((photo_path, None), (known, read_photo(known).focal_px)):
-        ready = next(results_of(Request(1, Source(str(path))), lambda: False, lambda: CENTRE))
+        ready = next(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
         assert isinstance(ready, SceneReady)
         assert ready.scene.focal_px == expected
     assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
 
 
 def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
-    ready = next(results_of(Request(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
+    ready = next(results_of(SceneRequest(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
 
 
 def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GridShape(1, 1))
-    first = next(results_of(Request(1, source), lambda: False, lambda: CENTRE))
+    first = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
     assert isinstance(first, SceneReady)
     photo_path.unlink()
-    again = next(results_of(Request(2, source, 2.0, first.loaded), lambda: False, lambda: CENTRE))
+    again = next(results_of(SceneRequest(2, source, 2.0, first.loaded), lambda: False, lambda: CENTRE))
     assert isinstance(again, SceneReady)
     assert again.loaded is first.loaded
     assert again.scene.plan is not None
@@ -138,13 +138,15 @@ def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
 def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
     from iibr_core.formats.light_fields.hci import HciWriter
 
-    made = list(results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), lambda: False, lambda: CENTRE))
+    made = list(
+        results_of(SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))), lambda: False, lambda: CENTRE)
+    )
     folder = tmp_path / "field"
     with HciWriter(folder, GridShape(3, 3), 100.0, "field", with_disparity) as writer:
         for result in made:
             if isinstance(result, ViewReady):
                 writer.add(result.view)
-    ready, *views = results_of(Request(2, Source(str(folder))), lambda: False, lambda: CENTRE)
+    ready, *views = results_of(SceneRequest(2, Source(str(folder))), lambda: False, lambda: CENTRE)
     assert isinstance(ready, SceneReady)
     assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
     assert ready.scene.has_view_disparity == with_disparity
@@ -161,7 +163,9 @@ def test_generating_stops_between_row_bands(photo_path: Path) -> None:
         asked.append(len(kinds))
         return bool(kinds)
 
-    for result in results_of(Request(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE):
+    for result in results_of(
+        SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE
+    ):
         kinds.append(type(result))
     assert asked[-1] > 0
     assert kinds[0] is SceneReady
@@ -170,7 +174,7 @@ def test_generating_stops_between_row_bands(photo_path: Path) -> None:
 
 def test_reading_stops_too(photo_path: Path) -> None:
     """Asked to stop while it refines depth."""
-    request = Request(1, Source(str(photo_path), grid=GridShape(3, 3)))
+    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
     with pytest.raises(Cancelled):
         next(results_of(request, lambda: True, lambda: CENTRE))
 
@@ -179,7 +183,7 @@ def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> 
     cancelled = threading.Event()
     started = threading.Event()
 
-    def work(job: Request, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
         if job.generation == 1:
             started.set()
             while not should_stop():
@@ -199,7 +203,7 @@ def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> 
 def test_results_already_queued_for_an_earlier_request_are_dropped(desk_for: Callable[..., Desk]) -> None:
     posted = threading.Event()
 
-    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, should_stop: object, _: object) -> Iterator[ViewReady]:
         yield view(job.generation)
         yield view(job.generation)
         if job.generation == 1:
@@ -217,7 +221,7 @@ def test_the_queue_is_bounded_and_a_full_one_can_be_cancelled(desk_for: Callable
     made: list[int] = []
     is_full = threading.Event()
 
-    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, should_stop: object, _: object) -> Iterator[ViewReady]:
         if job.generation == 2:
             yield view(2)
             return
@@ -246,7 +250,7 @@ def test_the_queue_is_bounded_and_a_full_one_can_be_cancelled(desk_for: Callable
 def test_an_exception_is_posted_and_the_worker_lives_on(
     desk_for: Callable[..., Desk], error: Exception, message: str
 ) -> None:
-    def work(job: Request, should_stop: object, _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, should_stop: object, _: object) -> Iterator[ViewReady]:
         yield view(job.generation)
         if job.generation == 1:
             raise error
@@ -264,7 +268,7 @@ def test_an_exception_is_posted_and_the_worker_lives_on(
 def test_after_cancel_nothing_is_heard_and_the_next_request_works(desk_for: Callable[..., Desk]) -> None:
     ended = threading.Event()
 
-    def work(job: Request, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
         yield view(job.generation)
         if job.generation == 1:
             while not should_stop():
@@ -295,14 +299,14 @@ def test_weights_that_are_missing_are_a_failure_and_fast_still_works(
     monkeypatch.setattr("iibr_core.generation.light_field.resource_folder", lambda name: tmp_path / name)
     desk = desk_for()
     source = Source(str(photo_path), grid=GridShape(3, 3), quality="balanced")
-    desk.worker.submit(Request(1, source))
+    desk.worker.submit(SceneRequest(1, source))
     assert [type(desk.next()) for _ in range(2)] == [SceneReady, ViewReady]
     failure = desk.next()
     assert isinstance(failure, Failed)
     assert failure.message.startswith(
         f"{tmp_path / 'assets' / 'weights' / 'ray_transformer.safetensors'}: no such file"
     )
-    desk.worker.submit(Request(2, replace(source, quality="fast")))
+    desk.worker.submit(SceneRequest(2, replace(source, quality="fast")))
     assert [type(desk.next()) for _ in range(10)] == [SceneReady, *[ViewReady] * 9]
 
 
@@ -311,7 +315,7 @@ def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> 
 
     seen = []
 
-    def work(job: Request, should_stop: object, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, should_stop: object, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
         seen.append(nearest_to())
         yield view(job.generation)
 

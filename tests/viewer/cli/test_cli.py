@@ -84,7 +84,7 @@ def test_quality_says_where_the_transformer_runs(
 
     disparity = photo_path.with_name("scene_disparity.npy")
     slope = 0.5 * np.abs(np.arange(WIDTH) % 24 - 12)
-    np.save(disparity, np.load(disparity) + slope)  # enough for hypotheses to differ, too little to be contested
+    np.save(disparity, np.load(disparity) + slope)  # enough for hypotheses to differ, too little to be ambiguous
     made, shown = {}, {}
     for quality in ("fast", "balanced", "exact"):
         out, image = tmp_path / quality, tmp_path / f"{quality}.png"
@@ -240,7 +240,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(
 
 
 def test_a_bug_is_shown_as_one(monkeypatch: pytest.MonkeyPatch, photo_path: Path) -> None:
-    monkeypatch.setattr("viewer.background.scene_worker.load", lambda source: 1 / 0)
+    monkeypatch.setattr("viewer.background.loaded_photo.load_photo", lambda source: 1 / 0)
     monkeypatch.setattr(sys, "argv", ["iibr", "plan", str(photo_path)])
     with pytest.raises(ZeroDivisionError):
         main()
@@ -250,7 +250,7 @@ def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, photo_path: Path)
     def interrupted(source: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("viewer.background.scene_worker.load", interrupted)
+    monkeypatch.setattr("viewer.background.loaded_photo.load_photo", interrupted)
     assert run(monkeypatch, "plan", photo_path) == 130
 
 

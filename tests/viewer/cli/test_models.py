@@ -14,7 +14,7 @@ import typer
 from iibr_core.depth.models.catalog import KNOWN_MODELS
 from iibr_core.types import GridShape
 from tests.viewer.conftest import write_scene
-from viewer.background.scene_worker import Doing, Request, SceneReady, Worker, results_of
+from viewer.background.scene_worker import ProgressReport, SceneReady, SceneRequest, SceneWorker, results_of
 from viewer.cli.options import depth_start_from_text, refine_from_text
 from viewer.model.state.app_state import CENTRE, Progress, Source
 
@@ -96,7 +96,7 @@ def without_sidecar(folder: Path) -> Path:
 def test_the_scene_tells_where_its_depth_came_from(tmp_path: Path) -> None:
     told: list[Progress] = []
     source = Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))
-    ready = next(results_of(Request(1, source), lambda: False, lambda: CENTRE, told.append))
+    ready = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE, told.append))
     assert isinstance(ready, SceneReady)
     origin = ready.scene.depth_origin
     assert origin is not None
@@ -109,15 +109,15 @@ def test_the_worker_tells_what_it_is_busy_with_before_the_scene(tmp_path: Path) 
     import threading
 
     woken = threading.Semaphore(0)
-    worker = Worker(woken.release)
-    worker.submit(Request(1, Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))))
+    worker = SceneWorker(woken.release)
+    worker.submit(SceneRequest(1, Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))))
     results = []
     while not any(isinstance(result, SceneReady) for result in results):
         assert woken.acquire(timeout=120)
         while (result := worker.next_result()) is not None:
             results.append(result)
     worker.close()
-    assert isinstance(results[0], Doing)
+    assert isinstance(results[0], ProgressReport)
     assert results[0].progress.doing
     assert results[0].generation == 1
 

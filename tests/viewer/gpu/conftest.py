@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from viewer.gpu.context import GLContext, create_headless
+from viewer.gpu.context import GLContext
+from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.renderer import Renderer
 
 

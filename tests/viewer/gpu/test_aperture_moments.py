@@ -9,7 +9,7 @@ import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.frame_budget import NO_HASTE, Haste
+from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import ApertureSample, aperture_samples
 from viewer.model.state.app_state import CENTRE, ApertureMask, ApertureShape, Optics
@@ -80,8 +80,8 @@ def test_beyond_the_grid_every_view_counts_alike() -> None:
         assert [sample.weight for sample in samples] == pytest.approx([1 / 25] * 25, rel=0.01)
 
 
-def width_of_spot(renderer: Renderer, optics: Optics, haste: Haste | None) -> float:
-    """Second moment per axis by which a soft spot out of focus grows, view steps. haste: None = converged."""
+def width_of_spot(renderer: Renderer, optics: Optics, level: QualityLevel | None) -> float:
+    """Second moment per axis by which a soft spot out of focus grows, view steps. level: None = converged."""
     grid, size, px_per_view, own_px = GridShape(9, 9), (128, 128), 8.0, 4.0
     y, x = np.indices(size)
     renderer.open_field(grid, *size, hdr=True, with_disparity=True)
@@ -90,19 +90,19 @@ def width_of_spot(renderer: Renderer, optics: Optics, haste: Haste | None) -> fl
         spot = np.exp(-((y - 64 + px_per_view * t) ** 2 + (x - 64 + px_per_view * s) ** 2) / 2 / own_px**2)
         encoded = srgb_from_linear(2 * spot[..., None].repeat(3, axis=2))
         renderer.upload_view(row, column, stored_from_encoded(encoded, True), np.full(size, px_per_view, np.float32))
-    if haste is None:
+    if level is None:
         light = renderer.converged_picture(optics, size, is_linear=True)[..., 0].astype(float)
     else:
-        renderer.render(optics, size, haste=haste)
+        renderer.render(optics, size, level=level)
         light = linear_from_srgb(renderer.read_image()[..., 0] / 255).astype(float)
     assert light.max() < 1
     in_all_px = (light * ((x - 64) ** 2 + (y - 64) ** 2)).sum() / light.sum() / 2
     return float((in_all_px - own_px**2) / px_per_view**2)
 
 
-@pytest.mark.parametrize("haste", [None, NO_HASTE, Haste(2), Haste(3)])
-def test_a_spot_of_light_is_drawn_as_wide_as_the_lens_has_it(renderer: Renderer, haste: Haste | None) -> None:
+@pytest.mark.parametrize("level", [None, BEST_QUALITY, QualityLevel(2), QualityLevel(3)])
+def test_a_spot_of_light_is_drawn_as_wide_as_the_lens_has_it(renderer: Renderer, level: QualityLevel | None) -> None:
     """The whole way: samples, half size, smoothing, and all rounds."""
     for radius in (1.5, 2.0, 3.0):
-        width = width_of_spot(renderer, Optics(aperture_diameter=2 * radius), haste)
+        width = width_of_spot(renderer, Optics(aperture_diameter=2 * radius), level)
         assert width == pytest.approx(radius**2 / 4, rel=0.02), radius

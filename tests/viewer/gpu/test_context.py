@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from iibr_core.types import InputError
-from viewer.gpu import context
-from viewer.gpu.context import Backend, GLContext, create_headless
+from viewer.gpu import headless_context
+from viewer.gpu.context import GLContext
+from viewer.gpu.headless_context import Backend, create_headless
 
 
 def paints_red(gl: GLContext) -> bool:
@@ -46,7 +47,7 @@ def test_failure_names_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_display(*_args: object, **_settings: object) -> None:
         raise RuntimeError("eglInitialize failed")
 
-    monkeypatch.setattr(context.moderngl, "create_context", no_display)
+    monkeypatch.setattr(headless_context.moderngl, "create_context", no_display)
     with pytest.raises(InputError, match=r"egl: eglInitialize failed \(install libegl1 .*\)") as failure:
         create_headless("egl")
     assert "\n" not in str(failure.value)

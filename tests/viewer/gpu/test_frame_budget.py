@@ -9,54 +9,62 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewer.gpu.refocus.frame_budget import HASTES, OVERHEAD_S, Haste, Pace, Work, least_haste, stretched
+from viewer.gpu.refocus.frame_budget import (
+    OVERHEAD_S,
+    QUALITY_LEVELS,
+    DrawCost,
+    FrameTimeModel,
+    QualityLevel,
+    choose_quality_level,
+    stretch_image,
+)
 
 PIXELS = 400_000
-OF_LENS = Work(samples=80, sources=0, has_detours=False, keeps_layers=True, pixels=PIXELS)
+OF_LENS = DrawCost(samples=80, sources=0, has_reprojection=False, keeps_layers=True, pixels=PIXELS)
 
 
-def work_in(haste: Haste) -> Work:
-    pixels = round(PIXELS * haste.scale**2)
-    return replace(OF_LENS, samples=max(80 // haste.stride**2, 1), pixels=pixels)
+def work_in(level: QualityLevel) -> DrawCost:
+    pixels = round(PIXELS * level.scale**2)
+    return replace(OF_LENS, samples=max(80 // level.stride**2, 1), pixels=pixels)
 
 
 def test_more_time_means_less_haste() -> None:
-    pace = Pace(5e-9)
-    chosen = [least_haste(work_in, pace, budget_s, 0) for budget_s in (1.0, 0.1, 0.05, 0.02, 0.001)]
+    frame_time = FrameTimeModel(5e-9)
+    chosen = [choose_quality_level(work_in, frame_time, budget_s, 0) for budget_s in (1.0, 0.1, 0.05, 0.02, 0.001)]
     assert chosen == sorted(chosen)
     assert chosen[0] == 0
-    assert chosen[-1] == len(HASTES) - 1, "at the least, something is drawn"
+    assert chosen[-1] == len(QUALITY_LEVELS) - 1, "at the least, something is drawn"
 
 
 def test_what_is_chosen_fits_the_time() -> None:
-    pace = Pace(5e-9)
+    frame_time = FrameTimeModel(5e-9)
     for budget_s in np.geomspace(0.01, 1, 20):
-        chosen = least_haste(work_in, pace, budget_s, 0)
-        if chosen < len(HASTES) - 1:
-            assert pace.seconds(work_in(HASTES[chosen])) <= budget_s
-        assert all(pace.seconds(work_in(better)) > budget_s for better in HASTES[:chosen])
+        chosen = choose_quality_level(work_in, frame_time, budget_s, 0)
+        if chosen < len(QUALITY_LEVELS) - 1:
+            assert frame_time.seconds(work_in(QUALITY_LEVELS[chosen])) <= budget_s
+        assert all(frame_time.seconds(work_in(better)) > budget_s for better in QUALITY_LEVELS[:chosen])
 
 
 def test_the_pace_is_learnt_for_each_sort_of_work() -> None:
-    pace = Pace(5e-9)
-    pinhole = Work(0, 4, False, False, PIXELS)
-    guess = pace.seconds(pinhole)
+    frame_time = FrameTimeModel(5e-9)
+    pinhole = DrawCost(0, 4, False, False, PIXELS)
+    guess = frame_time.seconds(pinhole)
     for _ in range(12):
-        pace.learn(OF_LENS, 0.3)
-    assert pace.seconds(OF_LENS) == pytest.approx(0.3, rel=0.01)
-    assert pace.seconds(replace(OF_LENS, pixels=PIXELS // 4)) == pytest.approx(
+        frame_time.learn(OF_LENS, 0.3)
+    assert frame_time.seconds(OF_LENS) == pytest.approx(0.3, rel=0.01)
+    assert frame_time.seconds(replace(OF_LENS, pixels=PIXELS // 4)) == pytest.approx(
         (0.3 - OVERHEAD_S) / 4 + OVERHEAD_S, 0.02
     )
-    assert pace.seconds(pinhole) == guess
+    assert frame_time.seconds(pinhole) == guess
 
 
 def test_a_picture_near_the_limit_does_not_change_back_and_forth() -> None:
-    pace = Pace(5e-9)
-    budget_s = pace.seconds(work_in(HASTES[3])) * 1.02
-    worse = least_haste(work_in, pace, budget_s / 1.05, 0)
+    frame_time = FrameTimeModel(5e-9)
+    budget_s = frame_time.seconds(work_in(QUALITY_LEVELS[3])) * 1.02
+    worse = choose_quality_level(work_in, frame_time, budget_s / 1.05, 0)
     assert worse > 3
-    assert least_haste(work_in, pace, budget_s, worse) == worse, "barely enough time: it stays"
-    assert least_haste(work_in, pace, 1.3 * budget_s, worse) <= 3, "time to spare: it becomes better"
+    assert choose_quality_level(work_in, frame_time, budget_s, worse) == worse, "barely enough time: it stays"
+    assert choose_quality_level(work_in, frame_time, 1.3 * budget_s, worse) <= 3, "time to spare: it becomes better"
 
 
 @given(
@@ -74,5 +82,5 @@ def test_stretched_against_plain_interpolation(width: int, height: int, to: tupl
         return np.stack(columns, -1).reshape(length, *values.shape[1:])
 
     expected = along(along(image.astype(float), to[1]).swapaxes(0, 1), to[0]).swapaxes(0, 1)
-    assert stretched(image, to).shape == (to[1], to[0], 3)
-    assert np.abs(stretched(image, to) - expected).max() <= 0.51
+    assert stretch_image(image, to).shape == (to[1], to[0], 3)
+    assert np.abs(stretch_image(image, to) - expected).max() <= 0.51

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
 from tests.viewer.gpu.scenes import TwoPlanes
-from viewer.gpu.context import Backend, create_headless
+from viewer.gpu.headless_context import Backend, create_headless
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.state.app_state import Optics
 

@@ -11,10 +11,10 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
-from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, Cell, InspectionPasses, Line, OverlayStyle
+from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, InspectionPasses, Line, OverlayStyle, SheetCell
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.colormap import VIRIDIS, mapped
+from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.state.app_state import Optics
 
 GRID = GridShape(5, 7)
@@ -143,7 +143,7 @@ def test_the_sheet_shows_each_view_in_its_cell_and_grey_where_none_is(
     renderer: Renderer, passes: InspectionPasses
 ) -> None:
     field = middle_only(renderer)
-    cells = Cell(2, 3, 48, 36), Cell(60, 3, 48, 36)
+    cells = SheetCell(2, 3, 48, 36), SheetCell(60, 3, 48, 36)
     passes.start_sheet((110, 60))
     passes.draw_on_sheet(field, *GRID.centre, cells[0], 1.0)
     passes.draw_on_sheet(field, 0, 0, cells[1], 1.0)
@@ -169,7 +169,7 @@ def test_the_disparity_overlay_at_a_stored_view_is_its_map_in_colours(
     passes.draw_overlay(full(renderer), Optics(eye=GRID.offset(*view)), view, SIZE, LOOK)
     overlay = passes.read("overlay")
     disparity = SCENE.view(GRID.offset(*view))[1]
-    expected = [[mapped((d + 1) / 3) for d in row] for row in disparity]
+    expected = [[map_color((d + 1) / 3) for d in row] for row in disparity]
     np.testing.assert_allclose(overlay[..., :3], np.multiply(expected, 255), atol=1)
     np.testing.assert_allclose(overlay[..., 3], 127.5, atol=1)
 

@@ -15,7 +15,7 @@ from viewer.gpu.refocus.lens import WHOLE, Lens, lens_of
 from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import pinhole_sources
-from viewer.gpu.render_targets import Targets
+from viewer.gpu.render_targets import RenderTargets
 from viewer.model.state.app_state import CENTRE, Optics
 
 GRID = GridShape(5, 5)
@@ -26,11 +26,11 @@ RANDOM = np.random.default_rng(5)
 
 @pytest.fixture
 def passes(renderer: Renderer) -> Passes:
-    return renderer._drawing.passes
+    return renderer._accumulator.passes
 
 
 @pytest.fixture
-def targets(renderer: Renderer) -> Targets:
+def targets(renderer: Renderer) -> RenderTargets:
     return renderer._targets_of(SIZE)
 
 
@@ -69,13 +69,13 @@ def looked_up(image: NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.
 
 @pytest.mark.parametrize("eye", [ViewOffset(0.37, -0.73), ViewOffset(-1.21, 3.43)])
 def test_no_search_ends_outside_its_tiles_span(
-    renderer: Renderer, passes: Passes, targets: Targets, eye: ViewOffset
+    renderer: Renderer, passes: Passes, targets: RenderTargets, eye: ViewOffset
 ) -> None:
     SCENE.fill(renderer, GRID)
     field, view = renderer.field, lens(renderer, Optics(eye))
     assert field is not None
     field.range_px = -10.0, 11.0  # wider than what is there: something can be saved
-    passes._find_spans(field, view, WHOLE, targets)
+    passes._find_march_intervals(field, view, WHOLE, targets)
     spans = np.concatenate([read(texture) for texture in targets.spans.textures], axis=-1)
     flat = spans[..., 1] < 0
     assert 0.1 < flat.mean() < 0.9
@@ -108,7 +108,7 @@ def test_tiles_change_nothing_about_a_pinhole_view(renderer: Renderer, optics: O
     assert np.mean(np.abs(images[0].astype(int) - images[1]).max(-1) > 2) < 0.001
 
 
-def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targets: Targets) -> None:
+def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targets: RenderTargets) -> None:
     SCENE.fill(renderer, GRID)
     field, wide = renderer.field, lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=3.0))
     assert field is not None
@@ -137,7 +137,7 @@ def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targ
 
 @pytest.mark.parametrize("width_px", [3.0, 9.3, 40.0])
 def test_smoothing_is_a_box_as_wide_as_told(
-    renderer: Renderer, passes: Passes, targets: Targets, width_px: float
+    renderer: Renderer, passes: Passes, targets: RenderTargets, width_px: float
 ) -> None:
     SCENE.fill(renderer, GRID)
     half = (SIZE[1] + 1) // 2, (SIZE[0] + 1) // 2
@@ -159,7 +159,7 @@ def test_smoothing_is_a_box_as_wide_as_told(
     assert not read(targets.half_smooth.textures[1]).any(), "nothing is smoothed where tiles tell of nothing"
 
 
-def test_layers_are_laid_over_each_other(renderer: Renderer, passes: Passes, targets: Targets) -> None:
+def test_layers_are_laid_over_each_other(renderer: Renderer, passes: Passes, targets: RenderTargets) -> None:
     """Sharp background in the left half, half of it covered by foreground of two brightnesses."""
     SCENE.fill(renderer, GRID)
     wide = replace(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), exposure=1.0)

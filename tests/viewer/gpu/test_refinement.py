@@ -16,10 +16,10 @@ from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.context import GLContext
 from viewer.gpu.programs import ProgramCache, ShaderError
+from viewer.gpu.refocus.accumulation import EDGE_PASSES, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
-from viewer.gpu.refocus.frame_budget import Haste
+from viewer.gpu.refocus.frame_budget import QualityLevel
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.gpu.refocus.summation import EDGE_ROUNDS, even_places
 from viewer.model.state.app_state import CENTRE, Optics
 
 GRID = GridShape(5, 5)
@@ -41,7 +41,7 @@ def test_refining_comes_nearer_to_a_dense_aperture(renderer: Renderer) -> None:
     truth = through_aperture(SCENE, offsets, [1.0] * len(offsets), CENTRE, 0.0)
     errors = []
     for stride in (3, 2, 1):
-        renderer.render(WIDE, SIZE, haste=Haste(stride))
+        renderer.render(WIDE, SIZE, level=QualityLevel(stride))
         errors.append(rms(renderer.read_image(), truth, border=20))
     renderer.refine()
     errors.append(rms(renderer.read_image(), truth, border=20))
@@ -109,15 +109,15 @@ def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Re
     renderer.render(Optics(ViewOffset(0.5, 0.3)), size)
     tones = len(np.unique(renderer.read_image().reshape(-1, 3), axis=0))
     renderer.refine()
-    assert renderer.report.samples == EDGE_ROUNDS
-    assert len(np.unique(renderer.read_image().reshape(-1, 3), axis=0)) >= tones + EDGE_ROUNDS - 3
+    assert renderer.report.samples == EDGE_PASSES
+    assert len(np.unique(renderer.read_image().reshape(-1, 3), axis=0)) >= tones + EDGE_PASSES - 3
     renderer.render(Optics(ViewOffset(1.0, -2.0)), size)
     assert renderer.is_converged
     assert np.abs(renderer.read_image().astype(int) - scene.view(ViewOffset(1.0, -2.0))[0]).max() <= 1
 
 
 def test_places_are_even_and_start_in_the_middle() -> None:
-    places = np.array(even_places(64))
+    places = np.array(r2_sequence(64))
     assert tuple(places[0]) == (0, 0)
     assert np.abs(places).max() <= 0.5
     counts, _, _ = np.histogram2d(*places.T, bins=4, range=[[-0.5, 0.5]] * 2)

@@ -12,7 +12,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.gpu.refocus.tiling import MARGIN_PX, PART_PX, parts_of
+from viewer.gpu.refocus.tiling import MARGIN_PX, PART_PX, picture_tiles
 from viewer.model.state.app_state import ApertureShape, Optics
 
 GRID = GridShape(5, 5)
@@ -24,7 +24,7 @@ LARGE = 384, 256
 @given(width=st.integers(1, 9000), height=st.integers(1, 700), largest=st.integers(64, 4096))
 def test_every_pixel_is_kept_once_and_no_part_is_too_large(width: int, height: int, largest: int) -> None:
     kept = np.zeros((height, width), np.uint8)
-    for part in parts_of((width, height), largest):
+    for part in picture_tiles((width, height), largest):
         assert max(part.size_px) <= min(largest, PART_PX)
         rows, columns = part.kept_of_drawn
         assert 0 <= rows.start <= rows.stop <= part.size_px[1]
@@ -38,7 +38,7 @@ def test_every_pixel_is_kept_once_and_no_part_is_too_large(width: int, height: i
 
 
 def test_parts_overlap_as_far_as_light_is_spread() -> None:
-    for part in parts_of((6000, 3000), 16384):
+    for part in picture_tiles((6000, 3000), 16384):
         for axis, length in ((0, 6000), (1, 3000)):
             first, last = part.first_px[axis], part.first_px[axis] + part.size_px[axis]
             assert part.kept_from_px[axis] - first == (0 if first == 0 else MARGIN_PX)
@@ -66,7 +66,7 @@ def test_parts_have_no_seams(
     SCENE.fill(renderer, GRID)
     whole = renderer.converged_picture(optics, LARGE, is_linear=False).astype(int)
     monkeypatch.setattr(gl, "max_texture_size", 160)
-    assert len(parts_of(LARGE, gl.max_texture_size)) == 12
+    assert len(picture_tiles(LARGE, gl.max_texture_size)) == 12
     in_parts = renderer.converged_picture(optics, LARGE, is_linear=False)
     difference = np.abs(in_parts - whole).max(-1)
     assert np.mean(difference > 2) < 0.001, "rounding may decide a depth edge otherwise here and there"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.view_sampling import aperture_samples, clamped_to_grid, nearest_present, pinhole_sources
+from viewer.gpu.refocus.view_sampling import aperture_samples, clamp_to_grid, nearest_present, pinhole_sources
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)
@@ -100,4 +100,4 @@ def test_nearest_present_against_a_plain_search() -> None:
 
 
 def test_clamped_to_grid_of_even_and_single_sizes() -> None:
-    assert clamped_to_grid(ViewOffset(9.0, -9.0), GridShape(4, 1)) == ViewOffset(1.0, 0.0)
+    assert clamp_to_grid(ViewOffset(9.0, -9.0), GridShape(4, 1)) == ViewOffset(1.0, 0.0)

@@ -14,8 +14,8 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import MoveEye, PauseMotion, ResetOptics, ReturnHome, SetDolly, SetLoop, SetSpeed, Tick
 from viewer.model.lens.limits import SPEED_LIMITS
-from viewer.model.reducers.camera_motion import HOME_S, LONGEST_STEP_S, eased, on_path
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.camera_motion import HOME_S, LONGEST_STEP_S, ease, point_on_loop
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import LOOPS, AppState, LoopKind
 
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))
@@ -25,45 +25,45 @@ def ticked(state: AppState, seconds: float, start: float = 100.0, step: float = 
     """The states while the clock runs."""
     states = []
     for i in range(round(seconds / step) + 1):
-        state = apply(state, Tick(start + i * step))
+        state = reduce(state, Tick(start + i * step))
         states.append(state)
     return states
 
 
 @given(grids, st.sampled_from(LOOPS), st.floats(0, 50))
 def test_loops_stay_between_the_stored_views_and_close(grid: GridShape, kind: LoopKind, turns: float) -> None:
-    eye = on_path(kind, turns, grid)
+    eye = point_on_loop(kind, turns, grid)
     for value, views in zip(eye, grid):
         assert -(views // 2) <= value <= views - 1 - views // 2
-    assert on_path(kind, turns + 1, grid) == pytest.approx(eye, abs=1e-9)
+    assert point_on_loop(kind, turns + 1, grid) == pytest.approx(eye, abs=1e-9)
 
 
 def test_the_shapes_of_the_loops() -> None:
     grid = GridShape(9, 9)
-    quarters = [on_path("circle", quarter / 4, grid) for quarter in range(4)]
+    quarters = [point_on_loop("circle", quarter / 4, grid) for quarter in range(4)]
     radius = math.hypot(*quarters[0])
     assert quarters[0].t < 0, "starts at the top"
     assert quarters[1].s == pytest.approx(radius), "then right: clockwise"
     assert all(math.hypot(*eye) == pytest.approx(radius) for eye in quarters)
-    crossings = [on_path("eight", turns, grid) for turns in (0.0, 0.5)]
+    crossings = [point_on_loop("eight", turns, grid) for turns in (0.0, 0.5)]
     assert all(eye == pytest.approx((0, 0), abs=1e-9) for eye in crossings)
-    assert all(on_path("swing", turns / 10, grid).t == 0 for turns in range(10))
+    assert all(point_on_loop("swing", turns / 10, grid).t == 0 for turns in range(10))
 
 
 @pytest.mark.parametrize("kind", LOOPS)
 def test_a_loop_begins_where_the_eye_is_and_goes_without_leaps(kind: LoopKind) -> None:
-    start = apply(state_with(scene_of()), MoveEye(ViewOffset(2, -3)))
-    states = ticked(apply(start, SetLoop(kind)), seconds=4)
+    start = reduce(state_with(scene_of()), MoveEye(ViewOffset(2, -3)))
+    states = ticked(reduce(start, SetLoop(kind)), seconds=4)
     eyes = [state.optics.eye for state in states]
     assert eyes[0] == ViewOffset(2, -3)
     steps = [math.dist(a, b) for a, b in itertools.pairwise(eyes)]
     assert max(steps) < 0.5
-    assert eyes[-1] == pytest.approx(on_path(kind, states[-1].motion.turns, GridShape(9, 9)))
+    assert eyes[-1] == pytest.approx(point_on_loop(kind, states[-1].motion.turns, GridShape(9, 9)))
 
 
 def test_the_glide_home_is_short_monotone_and_ends_exactly_there() -> None:
-    start = apply(apply(state_with(scene_of()), MoveEye(ViewOffset(2, -3))), SetDolly(1.5))
-    states = ticked(apply(start, ReturnHome()), HOME_S + 0.1)
+    start = reduce(reduce(state_with(scene_of()), MoveEye(ViewOffset(2, -3))), SetDolly(1.5))
+    states = ticked(reduce(start, ReturnHome()), HOME_S + 0.1)
     distances = [math.hypot(*state.optics.eye) for state in states]
     assert distances[0] == math.hypot(2, 3)
     assert all(a >= b for a, b in itertools.pairwise(distances))
@@ -72,37 +72,37 @@ def test_the_glide_home_is_short_monotone_and_ends_exactly_there() -> None:
 
 
 def test_a_hiccup_is_no_leap() -> None:
-    state = apply(apply(state_with(scene_of()), SetLoop("circle")), Tick(0.0))
-    assert apply(state, Tick(1000.0)).motion.turns <= LONGEST_STEP_S * state.motion.speed
-    assert apply(state, Tick(-5.0)).motion.turns == 0, "a clock that goes back"
-    assert apply(state, Tick(math.nan)) == state
+    state = reduce(reduce(state_with(scene_of()), SetLoop("circle")), Tick(0.0))
+    assert reduce(state, Tick(1000.0)).motion.turns <= LONGEST_STEP_S * state.motion.speed
+    assert reduce(state, Tick(-5.0)).motion.turns == 0, "a clock that goes back"
+    assert reduce(state, Tick(math.nan)) == state
 
 
 def test_pause_and_speed_leave_the_eye_where_it_is() -> None:
-    running = ticked(apply(state_with(scene_of()), SetLoop("eight")), 1.0)[-1]
-    paused = apply(running, PauseMotion(True))
+    running = ticked(reduce(state_with(scene_of()), SetLoop("eight")), 1.0)[-1]
+    paused = reduce(running, PauseMotion(True))
     assert ticked(paused, 1.0, start=500.0)[-1].optics == running.optics
-    again = ticked(apply(paused, PauseMotion(False)), 0.0, start=900.0)[-1]
+    again = ticked(reduce(paused, PauseMotion(False)), 0.0, start=900.0)[-1]
     assert again.optics.eye == pytest.approx(running.optics.eye)
-    faster = apply(running, SetSpeed(99.0))
+    faster = reduce(running, SetSpeed(99.0))
     assert faster.motion.speed == SPEED_LIMITS[1]
     assert faster.motion.turns == running.motion.turns
-    assert apply(running, SetSpeed(math.inf)) == running
+    assert reduce(running, SetSpeed(math.inf)) == running
 
 
 @pytest.mark.parametrize("action", [MoveEye(ViewOffset(1, 1)), SetDolly(1.0), ResetOptics(), SetLoop(None)])
 def test_a_hand_on_the_viewpoint_stops_the_motion_and_keeps_its_speed(action: object) -> None:
-    running = apply(apply(state_with(scene_of()), SetSpeed(0.5)), SetLoop("circle"))
-    state = apply(running, action)  # type: ignore[arg-type]
+    running = reduce(reduce(state_with(scene_of()), SetSpeed(0.5)), SetLoop("circle"))
+    state = reduce(running, action)  # type: ignore[arg-type]
     assert not state.motion.is_running
     assert state.motion.speed == 0.5
 
 
 def test_nothing_moves_without_a_scene() -> None:
-    assert apply(AppState(), SetLoop("circle")) == AppState()
-    assert apply(replace(AppState()), Tick(1.0)) == AppState()
+    assert reduce(AppState(), SetLoop("circle")) == AppState()
+    assert reduce(replace(AppState()), Tick(1.0)) == AppState()
 
 
 def test_easing_is_flat_at_both_ends_and_clamped() -> None:
-    assert [eased(x) for x in (-1, 0, 0.5, 1, 2)] == [0, 0, 0.5, 1, 1]
-    assert eased(0.01) < 0.001
+    assert [ease(x) for x in (-1, 0, 0.5, 1, 2)] == [0, 0, 0.5, 1, 1]
+    assert ease(0.01) < 0.001

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching
 from viewer.model.lens.presets import PRESETS
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, ChooseTask, PalettePrompt, SavePrompt
 
 
@@ -22,7 +22,7 @@ def test_names_and_chords_are_unique_and_known_to_imgui() -> None:
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
 @pytest.mark.parametrize("state", [AppState(), state_with(scene_of())], ids=["empty", "open"])
 def test_every_command_can_be_given_at_any_time(command: Command, state: AppState) -> None:
-    assert isinstance(apply(state, command.action(state)), AppState)
+    assert isinstance(reduce(state, command.action(state)), AppState)
 
 
 def test_chords_in_words() -> None:
@@ -40,12 +40,12 @@ def test_the_palette_finds_by_parts_of_words() -> None:
 
 def test_what_the_commands_bring_up() -> None:
     state = state_with(scene_of())
-    assert apply(state, BY_NAME["Open a photo…"].action(state)).tasks == (ChooseTask("photo"),)
-    asked = apply(state, BY_NAME["Save the picture…"].action(state))
+    assert reduce(state, BY_NAME["Open a photo…"].action(state)).tasks == (ChooseTask("photo"),)
+    asked = reduce(state, BY_NAME["Save the picture…"].action(state))
     assert asked.prompt == SavePrompt("photo-iibr.png", (60, 40))
-    helped = apply(state, BY_NAME["Mouse and keys"].action(state))
+    helped = reduce(state, BY_NAME["Mouse and keys"].action(state))
     assert helped.prompt == "help"
-    assert apply(helped, BY_NAME["Mouse and keys"].action(helped)).prompt is None
-    listed = apply(state, BY_NAME["All commands"].action(state))
+    assert reduce(helped, BY_NAME["Mouse and keys"].action(helped)).prompt is None
+    listed = reduce(state, BY_NAME["All commands"].action(state))
     assert listed.prompt == PalettePrompt()
-    assert apply(AppState(), BY_NAME["Save the picture…"].action(AppState())).prompt is None
+    assert reduce(AppState(), BY_NAME["Save the picture…"].action(AppState())).prompt is None

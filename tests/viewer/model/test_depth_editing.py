@@ -10,26 +10,26 @@ import pytest
 
 from iibr_core.depth.editing.edits import GAMMA_LIMITS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import GridShape, ImageSize, InputError
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
 from tests.viewer.model.test_history import after
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import save_map, settings_of
 from viewer.app.input import Keys, Pointer, actions_from_drop, actions_from_keys, actions_from_pointer
-from viewer.background.loaded_photo import load, planned, worked
-from viewer.background.scene_worker import Request, results_of
+from viewer.background.loaded_photo import apply_depth_settings, load_photo, make_plan
+from viewer.background.scene_worker import SceneRequest, results_of
 from viewer.model.actions import AskToSave, EndGesture, MoveEye, OpenFailed, OpenPath, Redo, SceneOpened, SetFocus, Undo
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import layout_of
-from viewer.model.opening import chosen
-from viewer.model.reducers.depth_editing import is_depth_ahead, wanted_work, work_asked_for
-from viewer.model.reducers.root import apply
+from viewer.model.opening import action_for_path
+from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
+from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.state.app_state import AppState, DepthOrigin, PathPrompt, SavePrompt, SaveTask, Source
 from viewer.model.state.depth_editing import (
     Brush,
-    DepthWork,
+    DepthSettings,
     DropStroke,
     Paint,
     ResetDepth,
@@ -53,32 +53,32 @@ def opened(source: Source | None = None) -> AppState:
 
 def test_tone_costs_views_only_once_the_edit_is_finished() -> None:
     start = opened()
-    held = apply(start, SetTone(TONE, is_finished=False))
+    held = reduce(start, SetTone(TONE, is_finished=False))
     assert held.depth.edits == TONE
     assert held.generation == start.generation
-    assert is_depth_ahead(held, work_asked_for(start))
-    assert apply(held, SetTone(TONE, is_finished=True)).generation == start.generation + 1
+    assert is_depth_ahead(held, depth_settings_for_worker(start))
+    assert reduce(held, SetTone(TONE, is_finished=True)).generation == start.generation + 1
 
 
 def test_one_drag_of_a_slider_is_one_edit() -> None:
     start = opened()
     state = after(start, *(SetTone(DepthEdits(gamma=1 + i / 10), i == 9) for i in range(10)), EndGesture())
     assert len(state.history.past) == 1
-    undone = apply(state, Undo())
+    undone = reduce(state, Undo())
     assert undone.depth == start.depth
     assert undone.generation == state.generation + 1
-    assert apply(undone, Redo()).depth == state.depth
+    assert reduce(undone, Redo()).depth == state.depth
 
 
 def test_clips_do_not_cross_and_values_are_clamped() -> None:
-    state = apply(opened(), SetTone(DepthEdits(far_clip=0.3, near_clip=0.6), True))
-    pushed = apply(state, SetTone(DepthEdits(far_clip=0.9, near_clip=0.6), True)).depth.edits
+    state = reduce(opened(), SetTone(DepthEdits(far_clip=0.3, near_clip=0.6), True))
+    pushed = reduce(state, SetTone(DepthEdits(far_clip=0.9, near_clip=0.6), True)).depth.edits
     assert pushed.far_clip < pushed.near_clip == 0.6
-    pulled = apply(state, SetTone(DepthEdits(far_clip=0.3, near_clip=0.1), True)).depth.edits
+    pulled = reduce(state, SetTone(DepthEdits(far_clip=0.3, near_clip=0.1), True)).depth.edits
     assert 0.3 == pulled.far_clip < pulled.near_clip
-    wild = apply(opened(), SetTone(DepthEdits(far_clip=-3, near_clip=7, gamma=1e9), True)).depth.edits
+    wild = reduce(opened(), SetTone(DepthEdits(far_clip=-3, near_clip=7, gamma=1e9), True)).depth.edits
     assert (wild.far_clip, wild.near_clip, wild.gamma) == (0, 1, GAMMA_LIMITS[1])
-    brush = apply(opened(), SetBrush(Brush(radius=9, strength=9))).brush
+    brush = reduce(opened(), SetBrush(Brush(radius=9, strength=9))).brush
     assert (brush.radius, brush.strength) == (RADIUS_LIMITS[1], 1)
 
 
@@ -93,7 +93,7 @@ def test_clips_do_not_cross_and_values_are_clamped() -> None:
     ids=lambda action: type(action).__name__,
 )
 def test_values_that_are_not_finite_change_nothing(action: SetTone) -> None:
-    assert apply(opened(), action) == opened()
+    assert reduce(opened(), action) == opened()
 
 
 def test_a_stroke_becomes_an_edit_when_the_pointer_goes_up() -> None:
@@ -101,35 +101,35 @@ def test_a_stroke_becomes_an_edit_when_the_pointer_goes_up() -> None:
     drawn = after(start, Paint((0.1, 0.1)), Paint((0.101, 0.1)), Paint((0.3, 0.1)))
     assert drawn.stroke == Stroke("nearer", ((0.1, 0.1), (0.3, 0.1)), 0.06, start.brush.strength)
     assert drawn.depth == start.depth
-    assert wanted_work(drawn).edits.strokes == (drawn.stroke,)
+    assert current_depth_settings(drawn).edits.strokes == (drawn.stroke,)
     assert drawn.generation == start.generation
-    ended = apply(drawn, EndGesture())
+    ended = reduce(drawn, EndGesture())
     assert ended.depth.edits.strokes == (drawn.stroke,)
     assert ended.stroke is None
     assert ended.generation == start.generation + 1
     twice = after(ended, Paint((0.5, 0.5)), EndGesture())
     assert len(twice.depth.edits.strokes) == 2
-    assert apply(twice, Undo()).depth == ended.depth
+    assert reduce(twice, Undo()).depth == ended.depth
     assert after(twice, Undo(), Undo()).depth == start.depth
     assert after(twice, Undo(), Undo(), Redo(), Redo()).depth == twice.depth
 
 
 def test_escape_takes_a_stroke_back_then_puts_the_brush_away() -> None:
-    drawn = apply(opened(), Paint((0.5, 0.5)))
+    drawn = reduce(opened(), Paint((0.5, 0.5)))
     (drop,) = actions_from_keys(Keys(is_escape=True), drawn)
     assert drop == DropStroke()
-    dropped = apply(drawn, drop)
+    dropped = reduce(drawn, drop)
     assert dropped.stroke is None
     assert dropped.depth == drawn.depth
     assert dropped.generation == drawn.generation + 1, "the worker was stopped when the stroke began"
     (away,) = actions_from_keys(Keys(is_escape=True), dropped)
-    assert not apply(dropped, away).brush.is_on
+    assert not reduce(dropped, away).brush.is_on
 
 
 def test_the_depth_of_a_light_field_is_left_alone() -> None:
     start = state_with(scene_of())
-    assert apply(start, SetTone(TONE, True)) == start
-    told = apply(start, SetBrush(Brush(is_on=True)))
+    assert reduce(start, SetTone(TONE, True)) == start
+    told = reduce(start, SetBrush(Brush(is_on=True)))
     assert not told.brush.is_on
     assert "cannot be edited" in told.notices[-1].text
 
@@ -137,25 +137,25 @@ def test_the_depth_of_a_light_field_is_left_alone() -> None:
 def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back() -> None:
     edited = after(opened(), SetTone(TONE, True), SetRefine(0.25, True))
     source = Source("b.png", refine=0.5)
-    asked = apply(edited, OpenPath(source))
-    assert work_asked_for(asked) == DepthWork(0.5)
-    failed = apply(asked, OpenFailed(asked.generation, "gone"))
-    assert work_asked_for(failed) == edited.depth
+    asked = reduce(edited, OpenPath(source))
+    assert depth_settings_for_worker(asked) == DepthSettings(0.5)
+    failed = reduce(asked, OpenFailed(asked.generation, "gone"))
+    assert depth_settings_for_worker(failed) == edited.depth
     scene = scene_of(GRID, source=source, plan=plan_of(GRID))
-    assert apply(asked, SceneOpened(asked.generation, scene)).depth == DepthWork(0.5)
+    assert reduce(asked, SceneOpened(asked.generation, scene)).depth == DepthSettings(0.5)
 
 
 def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
     edited = after(opened(), SetTone(TONE, True), EndGesture())
     assert edited.scene is not None
-    state = apply(edited, SceneOpened(edited.generation, replace(edited.scene, plan=plan_of(GRID, scale=0.5))))
+    state = reduce(edited, SceneOpened(edited.generation, replace(edited.scene, plan=plan_of(GRID, scale=0.5))))
     assert state.depth == edited.depth
-    assert apply(state, Undo()).depth == DepthWork()
+    assert reduce(state, Undo()).depth == DepthSettings()
 
 
 def test_reset_takes_everything_back_at_once() -> None:
     state = after(opened(Source("a.png", refine=0.5)), SetTone(TONE, True), SetRefine(1.0, True), ResetDepth())
-    assert state.depth == DepthWork(0.5)
+    assert state.depth == DepthSettings(0.5)
 
 
 DECIDED = Source(
@@ -173,16 +173,16 @@ DECIDED = Source(
 @pytest.mark.parametrize("way", ["dialog", "drop"])
 def test_another_file_keeps_what_was_decided_about_depth(way: str) -> None:
     state = opened(DECIDED)
-    action = chosen("photo", "b.png", state) if way == "dialog" else actions_from_drop(["b.png"], state)[0]
+    action = action_for_path("photo", "b.png", state) if way == "dialog" else actions_from_drop(["b.png"], state)[0]
     wanted = replace(DECIDED, path="b.png", disparity_path=None, disparity_scale=1.0, focus_disparity=None)
     assert action == OpenPath(wanted)
 
 
 def test_a_map_is_for_the_photo_that_is_open() -> None:
     wanted = replace(DECIDED, disparity_path="b.pfm", disparity_scale=1.0, focus_disparity=None, depth_start="auto")
-    assert chosen("map", "b.pfm", opened(DECIDED)) == OpenPath(wanted)
+    assert action_for_path("map", "b.pfm", opened(DECIDED)) == OpenPath(wanted)
     assert actions_from_drop(["b.pfm"], opened(DECIDED)) == [OpenPath(wanted)]
-    model = chosen("model", "/m", opened(DECIDED))
+    model = action_for_path("model", "/m", opened(DECIDED))
     assert isinstance(model, OpenPath)
     assert (model.source.depth_start, model.source.depth_model, model.source.disparity_path) == ("model", "/m", None)
 
@@ -198,7 +198,7 @@ def test_the_brush_paints_on_the_surface_seen_under_it() -> None:
     state = opened()
     assert state.scene is not None
     scene = replace(state.scene, width=96, height=64)
-    state = apply(replace(state, scene=scene), MoveEye(GRID.offset(0, 2)))
+    state = reduce(replace(state, scene=scene), MoveEye(GRID.offset(0, 2)))
     pointer, layout = pointer_at(0.5, 0.25, is_down=True, is_pressed=True)
     (paint,) = actions_from_pointer(pointer, layout, state, lambda x, y: 3.0)  # type: ignore[arg-type]
     assert isinstance(paint, Paint)
@@ -216,12 +216,12 @@ def test_a_drag_that_began_elsewhere_does_not_paint() -> None:
 
 def test_commands_of_depth() -> None:
     state = opened()
-    off = apply(state, BY_NAME["Depth brush"].action(state))
+    off = reduce(state, BY_NAME["Depth brush"].action(state))
     assert not off.brush.is_on
-    smooth = apply(off, BY_NAME["Depth brush: smooth"].action(off))
+    smooth = reduce(off, BY_NAME["Depth brush: smooth"].action(off))
     assert (smooth.brush.tool, smooth.brush.is_on) == ("smooth", True)
-    assert apply(off, BY_NAME["Invert depth"].action(off)).depth.edits == DepthEdits(is_inverted=True)
-    asked = apply(off, AskToSave("map"))
+    assert reduce(off, BY_NAME["Invert depth"].action(off)).depth.edits == DepthEdits(is_inverted=True)
+    asked = reduce(off, AskToSave("map"))
     assert isinstance(asked.prompt, SavePrompt)
     assert asked.prompt.what == "map"
     assert asked.prompt.path.endswith("_disparity.pfm"), "where it is found the next time"
@@ -231,27 +231,27 @@ def test_a_given_map_is_not_proposed_to_be_overwritten() -> None:
     state = opened()
     assert state.scene is not None
     state = replace(state, scene=replace(state.scene, depth_origin=DepthOrigin("file", "a_disparity.pfm")))
-    asked = apply(state, AskToSave("map"))
+    asked = reduce(state, AskToSave("map"))
     assert isinstance(asked.prompt, SavePrompt)
     assert asked.prompt.path.endswith("-edited.pfm")
-    assert apply(state, BY_NAME["Open a depth map…"].action(state)).tasks
+    assert reduce(state, BY_NAME["Open a depth map…"].action(state)).tasks
     assert PathPrompt("map").what == "map"
 
 
 def test_settings_bring_the_edits_along() -> None:
-    state = replace(opened(), depth=DepthWork(0.5, replace(TONE, strokes=(STROKE,))))
+    state = replace(opened(), depth=DepthSettings(0.5, replace(TONE, strokes=(STROKE,))))
     settings = settings_of(state, (96, 64))
     again = settings_from_text(settings_text(settings), "a.png")
     assert again.depth_edits == state.depth.edits
     assert again.source.refine == 0.5
-    plain = settings_of(replace(state, depth=DepthWork()), (96, 64))
+    plain = settings_of(replace(state, depth=DepthSettings()), (96, 64))
     assert "depth_edits" not in settings_text(plain)
     assert settings_from_text(settings_text(plain), "a.png").depth_edits == UNEDITED
 
 
 @pytest.mark.parametrize("damage", ['"gamma":0', '"gamma":null', '"strokes":[{}]', '"strokes":7'])
 def test_damaged_edits_in_settings_are_told(damage: str) -> None:
-    state = replace(opened(), depth=DepthWork(edits=TONE))
+    state = replace(opened(), depth=DepthSettings(edits=TONE))
     name = damage.partition(":")[0]
     text = settings_text(settings_of(state, (96, 64)))
     whole = text.replace(f"{name}:2.0", damage).replace(f"{name}:[]", damage)
@@ -262,23 +262,25 @@ def test_damaged_edits_in_settings_are_told(damage: str) -> None:
 
 def test_the_worker_edits_what_it_read_once(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GRID)
-    first = next(results_of(Request(1, source), lambda: False, lambda: GRID.offset(1, 1)))
+    first = next(results_of(SceneRequest(1, source), lambda: False, lambda: GRID.offset(1, 1)))
     photo_path.unlink()
-    work = DepthWork(edits=DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 0.5),)))
-    second = next(results_of(Request(2, source, 1.0, first.loaded, work), lambda: False, lambda: GRID.offset(1, 1)))
+    depth_settings = DepthSettings(edits=DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 0.5),)))
+    second = next(
+        results_of(SceneRequest(2, source, 1.0, first.loaded, depth_settings), lambda: False, lambda: GRID.offset(1, 1))
+    )
     assert second.loaded.disparity.values.max() == pytest.approx(NEAR + 0.5 * (NEAR - FAR), abs=0.03)
     assert second.scene.plan.disparity_scale == pytest.approx(first.scene.plan.disparity_scale, rel=1e-3)
     assert second.scene.plan.disparity_zero == first.scene.plan.disparity_zero
-    back = next(results_of(Request(3, source, 1.0, second.loaded), lambda: False, lambda: GRID.offset(1, 1)))
+    back = next(results_of(SceneRequest(3, source, 1.0, second.loaded), lambda: False, lambda: GRID.offset(1, 1)))
     np.testing.assert_array_equal(back.centre.disparity, first.centre.disparity)
 
 
 def test_clips_keep_the_parallax_of_what_they_leave(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GRID)
-    loaded = load(source)
-    clipped = worked(loaded, DepthWork(edits=DepthEdits(near_clip=0.5)))
+    loaded = load_photo(source)
+    clipped = apply_depth_settings(loaded, DepthSettings(edits=DepthEdits(near_clip=0.5)))
     assert clipped.disparity.values.max() == pytest.approx((NEAR + FAR) / 2)
-    plans = [planned(source, one, 1.0) for one in (loaded, clipped)]
+    plans = [make_plan(source, one, 1.0) for one in (loaded, clipped)]
     assert plans[1].disparity_scale == pytest.approx(plans[0].disparity_scale)
 
 
@@ -288,12 +290,12 @@ def test_refining_is_from_what_was_found_each_time(tmp_path: Path) -> None:
     for _ in range(6):
         soft[:, 1:-1] = (soft[:, :-2] + soft[:, 1:-1] + soft[:, 2:]) / 3
     np.save(tmp_path / "scene_disparity.npy", soft)
-    loaded = load(Source(str(path), refine=0.0))
+    loaded = load_photo(Source(str(path), refine=0.0))
     np.testing.assert_array_equal(loaded.disparity.values, soft)
-    full = worked(loaded, DepthWork(1.0))
+    full = apply_depth_settings(loaded, DepthSettings(1.0))
     assert not np.array_equal(full.disparity.values, soft)
-    np.testing.assert_array_equal(full.disparity.values, load(Source(str(path), refine=1.0)).disparity.values)
-    np.testing.assert_array_equal(worked(full, DepthWork(0.0)).disparity.values, soft)
+    np.testing.assert_array_equal(full.disparity.values, load_photo(Source(str(path), refine=1.0)).disparity.values)
+    np.testing.assert_array_equal(apply_depth_settings(full, DepthSettings(0.0)).disparity.values, soft)
 
 
 def test_a_flat_photo_can_be_painted_on(tmp_path: Path) -> None:
@@ -301,8 +303,8 @@ def test_a_flat_photo_can_be_painted_on(tmp_path: Path) -> None:
     np.save(tmp_path / "scene_disparity.npy", np.zeros((HEIGHT, WIDTH), np.float32))
     source = Source(str(path))
     edits = DepthEdits(strokes=(replace(STROKE, strength=1.0, radius=0.2),))
-    painted = worked(load(source), DepthWork(edits=edits))
-    assert planned(source, painted, 1.0).disparity_range_px[1] > 0
+    painted = apply_depth_settings(load_photo(source), DepthSettings(edits=edits))
+    assert make_plan(source, painted, 1.0).disparity_range_px[1] > 0
 
 
 def test_a_saved_map_is_the_same_scene_when_it_is_opened_again(photo_path: Path, tmp_path: Path) -> None:
@@ -311,22 +313,22 @@ def test_a_saved_map_is_the_same_scene_when_it_is_opened_again(photo_path: Path,
     out = tmp_path / "edited.pfm"
     with HeadlessViewer("egl") as viewer:
         viewer.open(source, 1.0, lambda progress: None, edits)
-        save_map(viewer._stage, SaveTask(str(out), (1, 1), what="map"))
-        loaded = viewer._stage.loaded
+        save_map(viewer._scene_view, SaveTask(str(out), (1, 1), what="map"))
+        loaded = viewer._scene_view.loaded
         assert loaded is not None
         wanted = loaded.disparity.values
-    np.testing.assert_array_equal(read_disparity(out, (HEIGHT, WIDTH)).values, wanted)
-    again = load(replace(source, disparity_path=str(out), refine=0.0))
+    np.testing.assert_array_equal(read_disparity(out, ImageSize(HEIGHT, WIDTH)).values, wanted)
+    again = load_photo(replace(source, disparity_path=str(out), refine=0.0))
     np.testing.assert_array_equal(again.disparity.values, wanted)
 
 
 def test_the_histogram_turns_with_the_map_and_the_focus_stays_on_its_surface(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GRID)
-    ready = next(results_of(Request(1, source), lambda: False, lambda: GRID.offset(1, 1)))
+    ready = next(results_of(SceneRequest(1, source), lambda: False, lambda: GRID.offset(1, 1)))
     levels, scene = ready.scene.levels, ready.scene
     heights = bar_heights(levels, False)
     assert bar_heights(levels, True) == heights[::-1]
     assert (heights[0], max(heights), heights[-1] > 0) == (1.0, 1.0, True)
     state = replace(AppState(source=source), scene=scene)
     near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
-    assert focus_share(apply(state, SetFocus(near)), scene, levels) == pytest.approx(1.0)
+    assert focus_share(reduce(state, SetFocus(near)), scene, levels) == pytest.approx(1.0)

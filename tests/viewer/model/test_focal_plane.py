@@ -14,13 +14,13 @@ from viewer.model.actions import EndGesture, FocusOn, MoveTiltHandle, ShowTiltHa
 from viewer.model.layout import Rect
 from viewer.model.lens.focal_plane import (
     CLOSEST_HANDLES,
-    focused_on,
+    focus_on,
     handle_points,
     place_of,
     sharp_disparity,
-    tilted_through,
+    tilt_through,
 )
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import Optics, TiltHandles
 
 shares = st.floats(-1, 1)
@@ -40,7 +40,7 @@ def test_the_plane_runs_through_both_handles_and_is_level_across_them(
     line = moved[0] - kept[0], (moved[1] - kept[1]) * aspect
     assume(math.hypot(*line) >= CLOSEST_HANDLES)
     before = Optics(focus_disparity=focus, focus_tilt=tilt)
-    after = tilted_through(before, moved, there, kept, aspect)
+    after = tilt_through(before, moved, there, kept, aspect)
     assert sharp_disparity(after, moved) == pytest.approx(there, abs=1e-6)
     assert sharp_disparity(after, kept) == pytest.approx(sharp_disparity(before, kept), abs=1e-6)
     across = kept[0] - line[1], kept[1] + line[0] / aspect  # a right angle to the line, as the eye sees it
@@ -49,38 +49,38 @@ def test_the_plane_runs_through_both_handles_and_is_level_across_them(
 
 def test_handles_on_one_spot_move_the_plane_without_tipping_it() -> None:
     before = Optics(focus_tilt=(0.5, -0.5))
-    after = tilted_through(before, (0.2, 0.2), 2.0, (0.2, 0.21), 1.0)
+    after = tilt_through(before, (0.2, 0.2), 2.0, (0.2, 0.21), 1.0)
     assert after.focus_tilt == before.focus_tilt
     assert sharp_disparity(after, (0.2, 0.2)) == pytest.approx(2.0)
 
 
 @given(places, disparities)
 def test_what_is_clicked_is_sharp_whatever_the_tilt(place: tuple[float, float], disparity: float) -> None:
-    after = focused_on(Optics(focus_tilt=(0.7, -0.3), focus_disparity=1), place, disparity)
+    after = focus_on(Optics(focus_tilt=(0.7, -0.3), focus_disparity=1), place, disparity)
     assert sharp_disparity(after, place) == pytest.approx(disparity)
     assert after.focus_tilt == (0.7, -0.3)
 
 
 def test_dragging_a_handle_is_one_action_a_step_and_lets_go_at_the_end() -> None:
-    state = apply(state_with(scene_of()), ShowTiltHandles(True))
+    state = reduce(state_with(scene_of()), ShowTiltHandles(True))
     kept = TiltHandles().second
-    state = apply(state, MoveTiltHandle(0, (-0.8, 0.6), 2.5))
+    state = reduce(state, MoveTiltHandle(0, (-0.8, 0.6), 2.5))
     assert state.tilt_handles == TiltHandles((-0.8, 0.6), kept, taken=0)
     assert sharp_disparity(state.optics, (-0.8, 0.6)) == pytest.approx(2.5)
-    state = apply(state, MoveTiltHandle(0, (-0.9, 5.0), None))
+    state = reduce(state, MoveTiltHandle(0, (-0.9, 5.0), None))
     assert state.tilt_handles is not None
     assert state.tilt_handles.first == (-0.9, 1.0), "held within the picture"
-    state = apply(state, EndGesture())
+    state = reduce(state, EndGesture())
     assert state.tilt_handles is not None
     assert state.tilt_handles.taken is None
     assert len(state.history.past) == 1
-    assert apply(state, MoveTiltHandle(1, (math.nan, 0.0), 1.0)).optics == state.optics
+    assert reduce(state, MoveTiltHandle(1, (math.nan, 0.0), 1.0)).optics == state.optics
 
 
 def test_a_click_on_a_tilted_plane_focuses_there() -> None:
-    state = apply(state_with(scene_of()), ShowTiltHandles(True))
-    state = apply(state, MoveTiltHandle(1, (0.5, -0.5), 1.0))
-    state = apply(state, FocusOn((0.9, 0.9), 0.3))
+    state = reduce(state_with(scene_of()), ShowTiltHandles(True))
+    state = reduce(state, MoveTiltHandle(1, (0.5, -0.5), 1.0))
+    state = reduce(state, FocusOn((0.9, 0.9), 0.3))
     assert sharp_disparity(state.optics, (0.9, 0.9)) == pytest.approx(0.3)
 
 

@@ -26,7 +26,7 @@ from viewer.model.actions import (
     Undo,
 )
 from viewer.model.reducers.history import EDITS_KEPT
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Source
 
 values = st.floats(0, 3)
@@ -40,7 +40,7 @@ edits = st.one_of(
 
 def after(state: AppState, *actions: Action) -> AppState:
     for action in actions:
-        state = apply(state, action)
+        state = reduce(state, action)
     return state
 
 
@@ -54,32 +54,32 @@ def test_undoing_everything_and_doing_it_again_comes_back_to_the_same(wanted: li
             seen.append(state.optics)
     back = state
     for optics in reversed(seen[:-1]):
-        back = apply(back, Undo())
+        back = reduce(back, Undo())
         assert back.optics == optics
-    assert apply(back, Undo()).optics == start.optics
+    assert reduce(back, Undo()).optics == start.optics
     for optics in seen[1:]:
-        back = apply(back, Redo())
+        back = reduce(back, Redo())
         assert back.optics == optics
-    assert apply(back, Redo()).optics == state.optics
+    assert reduce(back, Redo()).optics == state.optics
 
 
 def test_a_drag_is_one_edit() -> None:
-    start = apply(state_with(scene_of()), SetAperture(1))
+    start = reduce(state_with(scene_of()), SetAperture(1))
     state = after(start, EndGesture(), *(MoveEye(ViewOffset(0, 0.1 * i)) for i in range(1, 20)), EndGesture())
     assert len(state.history.past) == 2
-    assert apply(state, Undo()).optics == start.optics
+    assert reduce(state, Undo()).optics == start.optics
 
 
 def test_two_drags_are_two_edits_and_another_kind_is_always_another() -> None:
     state = after(state_with(scene_of()), MoveEye(ViewOffset(0, 1)), EndGesture(), MoveEye(ViewOffset(0, 2)))
-    assert apply(state, Undo()).optics.eye == ViewOffset(0, 1)
+    assert reduce(state, Undo()).optics.eye == ViewOffset(0, 1)
     state = after(state, SetFocus(1), MoveEye(ViewOffset(0, 3)))
-    assert apply(state, Undo()).optics.eye == ViewOffset(0, 2)
+    assert reduce(state, Undo()).optics.eye == ViewOffset(0, 2)
 
 
 def test_an_edit_after_undo_forgets_what_was_undone() -> None:
     state = after(state_with(scene_of()), SetFocus(1), Undo(), SetAperture(2))
-    assert apply(state, Redo()) == state
+    assert reduce(state, Redo()) == state
 
 
 def test_the_history_is_bounded() -> None:
@@ -98,7 +98,7 @@ def test_a_double_click_takes_back_the_focus_its_first_click_set() -> None:
     assert state.optics.eye == ViewOffset(0, 0)
     assert state.optics.focus_disparity == 1
     assert not state.motion.is_running
-    undone = apply(state, Undo())
+    undone = reduce(state, Undo())
     assert undone.optics == start.optics
 
 
@@ -109,10 +109,10 @@ def test_a_double_click_on_what_is_sharp_already_keeps_an_earlier_click() -> Non
 
 
 def test_undo_after_a_loop_returns_to_where_it_began() -> None:
-    start = apply(state_with(scene_of()), MoveEye(ViewOffset(1, 1)))
+    start = reduce(state_with(scene_of()), MoveEye(ViewOffset(1, 1)))
     state = after(start, SetLoop("circle"), *(Tick(0.1 * i) for i in range(30)))
     assert state.optics.eye != start.optics.eye
-    state = apply(state, Undo())
+    state = reduce(state, Undo())
     assert state.optics == start.optics
     assert not state.motion.is_running
 
@@ -120,10 +120,10 @@ def test_undo_after_a_loop_returns_to_where_it_began() -> None:
 def test_undoing_depth_strength_makes_the_field_anew() -> None:
     state = after(state_with(scene_of()), SetDepthStrength(2, False), SetDepthStrength(3, True), EndGesture())
     assert len(state.history.past) == 1
-    undone = apply(state, Undo())
+    undone = reduce(state, Undo())
     assert undone.depth_strength == 1
     assert undone.generation == state.generation + 1
-    redone = apply(undone, Redo())
+    redone = reduce(undone, Redo())
     assert (redone.depth_strength, redone.generation) == (3, undone.generation + 1)
 
 
@@ -131,16 +131,16 @@ def test_edits_before_another_plan_are_undone_in_its_units() -> None:
     old, new = plan_of(GridShape(9, 9), scale=0.5), plan_of(GridShape(9, 9), scale=1.0)
     state = after(state_with(scene_of(plan=old)), SetFocus(1.0), EndGesture(), SetFocus(0.25), EndGesture())
     state = after(state, SetDepthStrength(2.0, True), EndGesture())
-    state = apply(state, SceneOpened(state.generation, scene_of(plan=new)))
+    state = reduce(state, SceneOpened(state.generation, scene_of(plan=new)))
     assert state.optics.focus_disparity == pytest.approx(0.5)
-    state = apply(state, Undo())
-    state = apply(state, SceneOpened(state.generation, scene_of(plan=old)))
+    state = reduce(state, Undo())
+    state = reduce(state, SceneOpened(state.generation, scene_of(plan=old)))
     assert state.optics.focus_disparity == pytest.approx(0.25)
-    assert apply(state, Undo()).optics.focus_disparity == pytest.approx(1.0)
+    assert reduce(state, Undo()).optics.focus_disparity == pytest.approx(1.0)
 
 
 def test_another_file_begins_a_new_history() -> None:
     state = after(state_with(scene_of()), SetFocus(1), OpenPath(Source("b.png")))
     assert state.history.past
-    state = apply(state, SceneOpened(state.generation, scene_of(source=state.source)))
+    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
     assert state.history.past == ()

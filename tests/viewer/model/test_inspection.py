@@ -11,19 +11,19 @@ import pytest
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action, EndGesture, MoveEye, SceneOpened, SetHover
-from viewer.model.colormap import VIRIDIS, mapped
+from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME
 from viewer.model.inspection_request import (
     beside_of,
-    compared_view,
+    make_inspection_request,
     sheet_cells,
     view_at,
+    view_label,
     view_near,
-    view_words,
-    wanted_inquiry,
+    view_to_compare,
 )
 from viewer.model.layout import Beside, Rect, layout_of
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, ChooseTask, Hover, Scene, Source
 from viewer.model.state.inspection import (
     OVERLAYS,
@@ -43,8 +43,8 @@ from viewer.model.state.inspection import (
     ShowValues,
     TruthRead,
 )
-from viewer.ui.overlays.inspection import status_words
-from viewer.ui.sections.inspect import pair_words, score_words
+from viewer.ui.overlays.inspection import status_text
+from viewer.ui.sections.inspect import pair_text, score_text
 
 GRID = GridShape(5, 7)
 PLAN = ScenePlan(GRID, 1.0, 0.0, (-1.0, 2.0), 0.1, True, 0, 0, ())
@@ -56,7 +56,7 @@ TRUTH = GroundTruth("truth", "truth", GridShape(9, 9), 60, 40)
 
 def after(state: AppState, *actions: Action) -> AppState:
     for action in actions:
-        state = apply(state, action)
+        state = reduce(state, action)
     return state
 
 
@@ -176,44 +176,44 @@ def test_the_view_near_the_eye(eye: tuple[float, float], view: tuple[int, int]) 
 
 def test_ground_truth_of_another_grid_is_crossed_in_proportion() -> None:
     def view(t: float, s: float) -> tuple[int, int]:
-        return compared_view(SCENE, ViewOffset(t, s), "truth", TRUTH)
+        return view_to_compare(SCENE, ViewOffset(t, s), "truth", TRUTH)
 
     assert view(0, 0) == (4, 4)
     assert view(-2, 3) == (0, 8)
     assert view(1, -3) == (6, 0)
-    assert compared_view(SCENE, ViewOffset(2, 2), "photo", TRUTH) == GRID.centre
+    assert view_to_compare(SCENE, ViewOffset(2, 2), "photo", TRUTH) == GRID.centre
     single = replace(SCENE, grid=GridShape(1, 1))
-    assert compared_view(single, ViewOffset(0.4, 0.4), "truth", TRUTH) == (4, 4)
+    assert view_to_compare(single, ViewOffset(0.4, 0.4), "truth", TRUTH) == (4, 4)
 
 
 def test_nothing_slow_begins_while_the_viewpoint_moves() -> None:
     state = after(OPEN, Compare("quality"))
-    inquiry = wanted_inquiry(state, is_moving=False, before=None)
-    assert inquiry is not None
-    assert (inquiry.kind, inquiry.view, inquiry.is_scored) == ("quality", (2, 3), True)
+    request = make_inspection_request(state, is_moving=False, before=None)
+    assert request is not None
+    assert (request.kind, request.view, request.is_scored) == ("quality", (2, 3), True)
     moved = after(state, MoveEye(ViewOffset(1, 1)))
-    assert wanted_inquiry(moved, is_moving=True, before=inquiry) == inquiry
-    assert wanted_inquiry(moved, is_moving=True, before=None) is None
-    settled = wanted_inquiry(moved, is_moving=False, before=inquiry)
+    assert make_inspection_request(moved, is_moving=True, before=request) == request
+    assert make_inspection_request(moved, is_moving=True, before=None) is None
+    settled = make_inspection_request(moved, is_moving=False, before=request)
     assert settled is not None
     assert settled.view == (3, 4)
 
 
 def test_ground_truth_follows_the_hand_and_is_scored_when_all_is_still() -> None:
     state = after(OPEN, TruthRead(TRUTH))
-    still = wanted_inquiry(state, is_moving=False, before=None)
+    still = make_inspection_request(state, is_moving=False, before=None)
     assert still is not None
     assert still.is_scored
-    assert wanted_inquiry(state, is_moving=True, before=still) == still, "what is known stays"
-    moved = wanted_inquiry(after(state, MoveEye(ViewOffset(1, 1))), is_moving=True, before=still)
+    assert make_inspection_request(state, is_moving=True, before=still) == still, "what is known stays"
+    moved = make_inspection_request(after(state, MoveEye(ViewOffset(1, 1))), is_moving=True, before=still)
     assert moved is not None
     assert (moved.view, moved.is_scored) == ((6, 5), False)
 
 
 def test_without_a_second_image_there_is_no_work() -> None:
     for action in (Compare("photo"), SetOverlay("disparity"), SetOverlay("inpainted"), ShowEpis(True)):
-        assert wanted_inquiry(after(OPEN, action), is_moving=False, before=None) is None
-    assert wanted_inquiry(AppState(), is_moving=False, before=None) is None
+        assert make_inspection_request(after(OPEN, action), is_moving=False, before=None) is None
+    assert make_inspection_request(AppState(), is_moving=False, before=None) is None
 
 
 def test_strips_take_their_room_beside_the_picture_and_line_up_with_it() -> None:
@@ -261,32 +261,32 @@ def test_a_click_on_the_sheet_finds_the_view_drawn_there(grid: GridShape) -> Non
 
 
 def test_words() -> None:
-    assert view_words((2, 3), GRID) == "middle view"
-    assert view_words((0, 4), GRID) == "view 1 → 2 ↑"
-    assert view_words((3, 3), GRID) == "view 1 ↓"
-    assert score_words(41.234, 0.03125) == "41.23 dB PSNR, 0.0312 FLIP"
-    assert score_words(math.inf, 0.0) == "identical"
-    assert "still" in score_words(None, None)
+    assert view_label((2, 3), GRID) == "middle view"
+    assert view_label((0, 4), GRID) == "view 1 → 2 ↑"
+    assert view_label((3, 3), GRID) == "view 1 ↓"
+    assert score_text(41.234, 0.03125) == "41.23 dB PSNR, 0.0312 FLIP"
+    assert score_text(math.inf, 0.0) == "identical"
+    assert "still" in score_text(None, None)
     hover = Hover(12.3, 4.0, -0.5)
-    assert status_words(SCENE, hover, None) == ["12, 4", "−0.50 px"]
-    words = status_words(SCENE, hover, Probe((1, 20, 255), 7, 35, "inpainted"))
+    assert status_text(SCENE, hover, None) == ["12, 4", "−0.50 px"]
+    words = status_text(SCENE, hover, Probe((1, 20, 255), 7, 35, "inpainted"))
     assert words == ["12, 4", "−0.50 px", "inpainted", "RGB 1 20 255", "seen in 7 of 35 views"]
-    flat = status_words(SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "stored"))
+    flat = status_text(SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "stored"))
     assert flat == ["12, 4", "stored view", "RGB 0 0 0", "35 views"]
 
 
 def test_scores_are_shown_only_with_the_view_they_belong_to() -> None:
     state = after(OPEN, Compare("quality"), PairCompared(Pair(3, "quality", (2, 3), 40.0, 0.01)))
-    assert pair_words(state, SCENE, "quality") == "Middle view: 40.00 dB PSNR, 0.0100 FLIP"
+    assert pair_text(state, SCENE, "quality") == "Middle view: 40.00 dB PSNR, 0.0100 FLIP"
     moved = after(state, MoveEye(ViewOffset(0, 2)))
-    assert pair_words(moved, SCENE, "quality") == "Making the view 2 →…"
+    assert pair_text(moved, SCENE, "quality") == "Making the view 2 →…"
 
 
 def test_the_colour_map_grows_steadily_lighter() -> None:
-    colors = np.array([mapped(share) for share in np.linspace(0, 1, 100)])
+    colors = np.array([map_color(share) for share in np.linspace(0, 1, 100)])
     lightness = colors @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(lightness) > 0).all()
     for i, color in enumerate(VIRIDIS):
-        assert mapped(i / (len(VIRIDIS) - 1)) == pytest.approx([value / 255 for value in color], abs=1e-6)
-    assert mapped(-1) == mapped(0)
-    assert mapped(2) == mapped(1)
+        assert map_color(i / (len(VIRIDIS) - 1)) == pytest.approx([value / 255 for value in color], abs=1e-6)
+    assert map_color(-1) == map_color(0)
+    assert map_color(2) == map_color(1)

@@ -51,7 +51,7 @@ from viewer.model.lens.limits import (
     is_finite,
 )
 from viewer.model.lens.presets import PRESETS
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.root import reduce
 from viewer.model.reducers.worker_events import NOTICES_KEPT
 from viewer.model.state.app_state import (
     APERTURE_KINDS,
@@ -89,7 +89,7 @@ def state_with(scene: Scene | None) -> AppState:
 @given(grids, floats, floats)
 def test_the_eye_stays_within_the_grid_and_a_margin(grid: GridShape, t: float, s: float) -> None:
     before = state_with(scene_of(grid))
-    eye = apply(before, MoveEye(ViewOffset(t, s))).optics.eye
+    eye = reduce(before, MoveEye(ViewOffset(t, s))).optics.eye
     if not (math.isfinite(t) and math.isfinite(s)):
         assert eye == before.optics.eye
         return
@@ -104,7 +104,7 @@ def test_the_eye_stays_within_the_grid_and_a_margin(grid: GridShape, t: float, s
 @given(grids, floats)
 def test_the_aperture_lies_between_pinhole_and_grid(grid: GridShape, diameter: float) -> None:
     widest = max(grid) if max(grid) > 1 else 0
-    result = apply(state_with(scene_of(grid)), SetAperture(diameter)).optics.aperture_diameter
+    result = reduce(state_with(scene_of(grid)), SetAperture(diameter)).optics.aperture_diameter
     assert 0 <= result <= widest
     if 0 <= diameter <= widest:
         assert result == diameter
@@ -115,7 +115,7 @@ def test_focus_exposure_and_depth_stay_finite_and_in_range(value: float) -> None
     scene = scene_of()
     state = state_with(scene)
     for action in (SetFocus(value), SetExposure(value), SetDepthStrength(value, is_finished=False)):
-        state = apply(state, action)
+        state = reduce(state, action)
     low, high = focus_limits(scene)
     assert low <= state.optics.focus_disparity <= high
     assert abs(state.optics.exposure_stops) <= EXPOSURE_LIMIT_STOPS
@@ -135,7 +135,7 @@ def test_every_optic_stays_finite_and_within_its_limits(
     state = state_with(scene)
     edits = (SetDolly(dolly), SetFocusRange(spread), SetTilt(tilt), SetApertureShape(shape))
     for action in (*edits, SetHighlightRecovery(highlights)):
-        state = apply(state, action)
+        state = reduce(state, action)
     optics, span = state.optics, focus_span(scene)
     assert is_finite(optics)
     assert abs(optics.dolly) <= dolly_limit(grid) == (grid.columns - 1) / 2
@@ -152,9 +152,9 @@ def test_every_optic_stays_finite_and_within_its_limits(
 
 def test_a_mask_is_kept_while_another_shape_is_tried() -> None:
     mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255]))
-    state = apply(state_with(scene_of()), SetApertureShape(ApertureShape("mask", mask=mask)))
+    state = reduce(state_with(scene_of()), SetApertureShape(ApertureShape("mask", mask=mask)))
     assert state.optics.aperture_shape.kind == "mask"
-    state = apply(state, SetApertureShape(replace(state.optics.aperture_shape, kind="ring")))
+    state = reduce(state, SetApertureShape(replace(state.optics.aperture_shape, kind="ring")))
     assert state.optics.aperture_shape.mask == mask
 
 
@@ -176,17 +176,17 @@ def test_where_the_picture_is_extrapolated(eye: ViewOffset, grid: GridShape, out
 def test_presets_keep_viewpoint_and_light_and_can_be_taken_back(name: str) -> None:
     before = state_with(scene_of(subject_disparity_px=1.5))
     for action in (MoveEye(ViewOffset(1, 2)), SetDolly(1), SetExposure(1), SetTilt((1, 1)), SetAperture(2)):
-        before = apply(before, action)
-    after = apply(before, ApplyPreset(name))  # type: ignore[arg-type]
+        before = reduce(before, action)
+    after = reduce(before, ApplyPreset(name))  # type: ignore[arg-type]
     kept = [(o.eye, o.dolly, o.exposure_stops) for o in (before.optics, after.optics)]
     assert kept[0] == kept[1]
     assert after.optics.focus_tilt == (0, 0)
-    assert apply(after, Undo()).optics == before.optics
+    assert reduce(after, Undo()).optics == before.optics
 
 
 def test_what_the_presets_are_for() -> None:
     state = state_with(scene_of(subject_disparity_px=1.5))
-    portrait, macro, sharp = (apply(state, ApplyPreset(name)).optics for name in PRESETS)
+    portrait, macro, sharp = (reduce(state, ApplyPreset(name)).optics for name in PRESETS)
     assert portrait.focus_disparity == 1.5
     assert portrait.focus_range > 0
     assert macro.focus_disparity == 3.0, "the nearest"
@@ -198,53 +198,53 @@ def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> 
     state = state_with(scene_of(GridShape(5, 5)))
     optics = Optics(eye=ViewOffset(9, 9), aperture_diameter=20, focus_disparity=1)
     saved = SavedSettings(optics, 1.0, Source(""), (10, 10))
-    offered = apply(state, Notify(Notice("It has settings.", offer=saved)))
-    after = apply(offered, TakeSettings(saved))
+    offered = reduce(state, Notify(Notice("It has settings.", offer=saved)))
+    after = reduce(offered, TakeSettings(saved))
     assert after.optics == Optics(eye=ViewOffset(3, 3), aperture_diameter=5, focus_disparity=1)
     assert after.notices == ()
-    assert apply(after, Undo()).optics == state.optics
+    assert reduce(after, Undo()).optics == state.optics
     broken = replace(saved, optics=replace(optics, dolly=math.nan))
-    assert apply(state, TakeSettings(broken)).optics == state.optics
+    assert reduce(state, TakeSettings(broken)).optics == state.optics
 
 
 def test_stopping_keeps_what_is_there_and_late_progress_does_not_bring_it_back() -> None:
-    state = apply(state_with(scene_of()), ProgressMade(1, Progress(3, 81, 0.1), (0, 0)))
-    state = apply(state, StopWork())
+    state = reduce(state_with(scene_of()), ProgressMade(1, Progress(3, 81, 0.1), (0, 0)))
+    state = reduce(state, StopWork())
     assert state.stopped == state.generation == 1
     assert "3 of 81" in state.progress.doing
-    late = apply(state, ProgressMade(1, Progress(4, 81, 0.2), (0, 1)))
+    late = reduce(state, ProgressMade(1, Progress(4, 81, 0.2), (0, 1)))
     assert late.progress == state.progress
     assert late.views_there == {(0, 0), (0, 1)}
 
 
 def test_stopping_while_another_file_is_read_returns_to_the_scene_that_is_open() -> None:
     before = state_with(scene_of())
-    state = apply(apply(before, OpenPath(Source("other.png"))), StopWork())
+    state = reduce(reduce(before, OpenPath(Source("other.png"))), StopWork())
     assert state.source is before.source
     assert state.generation == before.generation + 2
     assert state.stopped is None
-    first = apply(apply(AppState(), OpenPath(SOURCE)), StopWork())
+    first = reduce(reduce(AppState(), OpenPath(SOURCE)), StopWork())
     assert (first.source, first.stopped, first.progress) == (None, 1, Progress())
 
 
 def test_a_finished_field_cannot_be_stopped() -> None:
-    state = apply(state_with(scene_of()), ProgressMade(1, Progress(81, 81, 0.1), (0, 0)))
-    assert apply(state, StopWork()) == state
+    state = reduce(state_with(scene_of()), ProgressMade(1, Progress(81, 81, 0.1), (0, 0)))
+    assert reduce(state, StopWork()) == state
 
 
 def test_views_that_came_are_known_until_another_field_is_made() -> None:
-    state = apply(state_with(None), SceneOpened(1, scene_of(GridShape(3, 3))))
+    state = reduce(state_with(None), SceneOpened(1, scene_of(GridShape(3, 3))))
     assert state.views_there == {(1, 1)}
-    state = apply(state, ProgressMade(1, Progress(2, 9, 0.1), (0, 2)))
+    state = reduce(state, ProgressMade(1, Progress(2, 9, 0.1), (0, 2)))
     assert state.views_there == {(1, 1), (0, 2)}
-    state = apply(state, SceneOpened(1, scene_of(GridShape(5, 5))))
+    state = reduce(state, SceneOpened(1, scene_of(GridShape(5, 5))))
     assert state.views_there == {(2, 2)}
 
 
 def test_recent_files_are_listed_once_the_latest_first() -> None:
     state = state_with(None)
     for name in ("a.png", "b.png", "a.png"):
-        state = apply(state, SceneOpened(1, scene_of(source=Source(name))))
+        state = reduce(state, SceneOpened(1, scene_of(source=Source(name))))
     assert state.recent == ("a.png", "b.png")
 
 
@@ -269,15 +269,15 @@ def test_focus_can_be_set_in_a_flat_scene() -> None:
     ],
 )
 def test_optics_do_not_change_before_a_scene_is_open(action: object) -> None:
-    assert apply(AppState(), action) == AppState()  # type: ignore[arg-type]
+    assert reduce(AppState(), action) == AppState()  # type: ignore[arg-type]
 
 
 def test_reset_brings_the_first_optics_back() -> None:
     state = state_with(scene_of())
     for action in (MoveEye(ViewOffset(1, 2)), SetFocus(1), SetAperture(3), SetExposure(1)):
-        state = apply(state, action)
+        state = reduce(state, action)
     assert state.optics == Optics(eye=ViewOffset(1, 2), focus_disparity=1, aperture_diameter=3, exposure_stops=1)
-    assert apply(state, ResetOptics()).optics == Optics()
+    assert reduce(state, ResetOptics()).optics == Optics()
 
 
 @pytest.mark.parametrize(
@@ -312,7 +312,7 @@ def test_reset_brings_the_first_optics_back() -> None:
 def test_what_an_edit_costs(action: object, draws: bool, restarts: bool) -> None:
     """The picture is drawn anew only if its record differs, the worker restarts only if the generation does."""
     before = state_with(scene_of())
-    after = apply(before, action)  # type: ignore[arg-type]
+    after = reduce(before, action)  # type: ignore[arg-type]
     picture = [Picture(1, 5, state.optics, (60, 40)) for state in (before, after)]
     assert (picture[0] != picture[1]) == draws
     assert (before.generation != after.generation) == restarts
@@ -320,21 +320,21 @@ def test_what_an_edit_costs(action: object, draws: bool, restarts: bool) -> None
 
 def test_opening_shows_what_is_read_and_keeps_the_old_scene_until_then() -> None:
     before = state_with(scene_of())
-    after = apply(before, OpenPath(Source("other.png")))
+    after = reduce(before, OpenPath(Source("other.png")))
     assert after.scene is before.scene
     assert "other.png" in after.progress.doing
 
 
 def test_a_new_scene_starts_with_fresh_optics_and_its_notes() -> None:
-    state = apply(apply(state_with(scene_of()), SetAperture(2)), OpenPath(Source("other.png")))
-    state = apply(state, SceneOpened(state.generation, scene_of(source=state.source, notes=("Made smaller.",))))
+    state = reduce(reduce(state_with(scene_of()), SetAperture(2)), OpenPath(Source("other.png")))
+    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source, notes=("Made smaller.",))))
     assert state.optics == Optics()
     assert state.notices == (Notice("Made smaller."),)
 
 
 def test_the_same_file_opened_again_is_a_new_scene() -> None:
-    state = apply(apply(state_with(scene_of()), SetAperture(2)), OpenPath(replace(SOURCE)))
-    state = apply(state, SceneOpened(state.generation, scene_of(source=state.source)))
+    state = reduce(reduce(state_with(scene_of()), SetAperture(2)), OpenPath(replace(SOURCE)))
+    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
     assert state.optics == Optics()
 
 
@@ -344,9 +344,9 @@ def test_another_depth_strength_keeps_the_surface_in_focus_and_the_place_in_the_
     state = state_with(scene_of(GridShape(5, 5), plan=old))
     given = 13.0  # the surface in focus, in the disparity file's units
     for action in (MoveEye(ViewOffset(1, -2)), SetFocus((given - 10.0) * 0.5), SetAperture(2.0), SetExposure(1.0)):
-        state = apply(state, action)
-    state = apply(state, SetDepthStrength(1.5, is_finished=True))
-    optics = apply(state, SceneOpened(state.generation, scene_of(GridShape(9, 9), plan=new))).optics
+        state = reduce(state, action)
+    state = reduce(state, SetDepthStrength(1.5, is_finished=True))
+    optics = reduce(state, SceneOpened(state.generation, scene_of(GridShape(9, 9), plan=new))).optics
     assert optics.focus_disparity == pytest.approx((given - 12.0) * 0.25)
     assert optics.eye == ViewOffset(2, -4)
     assert optics.aperture_diameter == 4.0
@@ -357,9 +357,9 @@ def test_depth_strength_of_zero_and_back_gives_finite_optics() -> None:
     flat, deep = plan_of(GridShape(1, 1), scale=0.0), plan_of(GridShape(9, 9), scale=0.5)
     state = state_with(scene_of(GridShape(9, 9), plan=deep))
     for action in (MoveEye(ViewOffset(4, 4)), SetFocus(1), SetAperture(9)):
-        state = apply(state, action)
+        state = reduce(state, action)
     for plan in (flat, deep):
-        state = apply(state, SceneOpened(1, scene_of(plan.grid, plan=plan)))
+        state = reduce(state, SceneOpened(1, scene_of(plan.grid, plan=plan)))
         assert all(map(math.isfinite, (*state.optics.eye, state.optics.focus_disparity)))
         assert 0 <= state.optics.aperture_diameter <= max(plan.grid)
 
@@ -370,13 +370,13 @@ def test_depth_strength_of_zero_and_back_gives_finite_optics() -> None:
 )
 def test_late_words_of_an_earlier_generation_change_nothing(late: object) -> None:
     state = state_with(scene_of())
-    assert apply(state, late) is state  # type: ignore[arg-type]
+    assert reduce(state, late) is state  # type: ignore[arg-type]
 
 
 def test_a_failure_is_said_and_the_scene_before_is_taken_up_again() -> None:
     before = state_with(scene_of())
-    state = apply(before, OpenPath(Source("broken.png")))
-    state = apply(state, OpenFailed(state.generation, "broken.png: truncated"))
+    state = reduce(before, OpenPath(Source("broken.png")))
+    state = reduce(state, OpenFailed(state.generation, "broken.png: truncated"))
     assert state.notices == (Notice("broken.png: truncated", is_error=True),)
     assert state.source is SOURCE
     assert state.generation == before.generation + 2
@@ -384,14 +384,14 @@ def test_a_failure_is_said_and_the_scene_before_is_taken_up_again() -> None:
 
 def test_a_failure_of_the_open_scene_itself_does_not_start_it_again() -> None:
     before = state_with(scene_of())
-    state = apply(before, OpenFailed(1, "no memory"))
+    state = reduce(before, OpenFailed(1, "no memory"))
     assert (state.generation, state.progress) == (before.generation, Progress())
 
 
 def test_notices_are_kept_once_bounded_and_dismissable() -> None:
     state = AppState()
     for i in (*range(NOTICES_KEPT + 3), NOTICES_KEPT + 2):
-        state = apply(state, Notify(Notice(str(i))))
+        state = reduce(state, Notify(Notice(str(i))))
     assert [notice.text for notice in state.notices] == [str(i) for i in range(3, NOTICES_KEPT + 3)]
-    state = apply(state, DismissNotice(Notice("5")))
+    state = reduce(state, DismissNotice(Notice("5")))
     assert [notice.text for notice in state.notices] == ["3", "4", "6", "7"]

@@ -15,14 +15,14 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import SceneOpened
-from viewer.model.reducers.root import apply
+from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import (
     ATTRIBUTE,
-    decided_like,
     read_settings,
     settings_from_text,
     settings_text,
     settings_text_in,
+    source_like,
 )
 from viewer.model.state.app_state import APERTURE_KINDS, ApertureMask, ApertureShape, Optics, SavedSettings, Source
 
@@ -126,13 +126,13 @@ def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
         settings_from_text(text, "a.png")
     assert "\n" not in str(error.value)
     before = state_with(None)
-    state = apply(before, SceneOpened(1, scene_of(settings=text or "x")))
+    state = reduce(before, SceneOpened(1, scene_of(settings=text or "x")))
     assert state.optics == Optics()
     assert [notice.is_error for notice in state.notices] == [True]
 
 
 def test_a_saved_picture_opens_as_a_photo_and_offers_its_settings() -> None:
-    state = apply(state_with(None), SceneOpened(1, scene_of(settings=settings_text(ONE))))
+    state = reduce(state_with(None), SceneOpened(1, scene_of(settings=settings_text(ONE))))
     (notice,) = state.notices
     assert notice.offer == ONE
     assert state.optics == Optics()
@@ -151,6 +151,6 @@ def test_pictures_without_settings_and_other_files(tmp_path: Path) -> None:
 
 def test_options_given_beat_the_saved_ones() -> None:
     source = Source("photo.png", "map.pfm", 2.0, GridShape(9, 9))
-    merged = decided_like(source, ONE, given={"grid"})
+    merged = source_like(source, ONE, given={"grid"})
     assert merged == Source("photo.png", "map.pfm", 1.0, GridShape(9, 9))
-    assert decided_like(source, ONE, ()).grid == GridShape(3, 5)
+    assert source_like(source, ONE, ()).grid == GridShape(3, 5)

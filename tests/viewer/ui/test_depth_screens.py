@@ -82,25 +82,25 @@ def test_the_prompt_for_a_map_has_no_size(viewer: HeadlessViewer) -> None:
 
 def test_a_stroke_under_way_is_seen_in_colours(viewer: HeadlessViewer) -> None:
     viewer.do(SetOverlay("disparity"), SetOpacity(1.0))
-    stage, before = viewer._stage, viewer.screen(SIZE)
-    preview = DepthPreview(stage)
+    scene_view, before = viewer._scene_view, viewer.screen(SIZE)
+    preview = DepthPreview(scene_view)
     preview.update(viewer.state)
-    assert stage.previews == 0, "nothing is edited yet"
+    assert scene_view.previews == 0, "nothing is edited yet"
     stroke = Stroke("farther", ((0.5, 0.5),), 0.1, 1.0)
     viewer.state = replace(viewer.state, stroke=stroke)
     preview.update(viewer.state)
     preview.update(viewer.state)
-    assert stage.previews == 1
+    assert scene_view.previews == 1
     changed = differs(before, viewer.screen(SIZE))
     assert changed[PICTURE].sum() > 200
     viewer.state = replace(viewer.state, stroke=None)
     preview.update(viewer.state)
-    assert stage.previews == 2
+    assert scene_view.previews == 2
     assert not differs(before, viewer.screen(SIZE))[PICTURE].any()
 
 
 def test_an_empty_window_has_no_depth(viewer: HeadlessViewer) -> None:
-    preview = DepthPreview(viewer._stage)
-    previews = viewer._stage.previews
+    preview = DepthPreview(viewer._scene_view)
+    previews = viewer._scene_view.previews
     preview.update(AppState())
-    assert viewer._stage.previews == previews
+    assert viewer._scene_view.previews == previews

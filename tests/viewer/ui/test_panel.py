@@ -7,7 +7,7 @@ import pytest
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import GridShape, Quality
 from viewer.model.state.app_state import Progress, Scene, Source
-from viewer.ui.panel import progress_words, size_words
+from viewer.ui.panel import progress_text, size_text
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ from viewer.ui.panel import progress_words, size_words
     ],
 )
 def test_progress_in_words(progress: Progress, words: str) -> None:
-    assert progress_words(progress) == words
+    assert progress_text(progress) == words
 
 
 @pytest.mark.parametrize(
@@ -40,4 +40,4 @@ def test_quality_is_told_where_views_are_made_and_not_plain(quality: Quality, is
     grid = GridShape(3, 9)
     plan = ScenePlan(grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ()) if is_made else None
     scene = Scene(Source("a.png", quality=quality), "a", 60, 40, grid, (-2.0, 3.0), "a.pfm", plan=plan)
-    assert size_words(scene) == words
+    assert size_text(scene) == words

@@ -1,9 +1,11 @@
-"""Draws the rounds of samples that a picture is summed up from, and puts them together. What to draw is a Summation."""
+"""A still picture is summed up in passes, each with its samples elsewhere in the lens and in the pixel."""
 
 from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import moderngl
 
@@ -12,15 +14,81 @@ from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.lens import Lens
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
-from viewer.gpu.refocus.summation import Summation
-from viewer.gpu.refocus.view_sampling import ApertureSample, clamped_to_grid, nearest_present
-from viewer.gpu.render_targets import Targets
+from viewer.gpu.refocus.view_sampling import ApertureSample, clamp_to_grid, nearest_present
+from viewer.gpu.render_targets import RenderTargets
+
+MAX_PASSES = 16
+"""Times that a still picture is summed up over, each with its samples elsewhere, at most."""
+
+PASS_BLUR_PX = 1.5
+"""So many passes are drawn that neighbouring samples are no farther apart than this."""
+
+STILL_SAMPLES = 600
+"""More passes than these samples need are not worth the wait."""
+
+EDGE_PASSES = 5
+"""Rounds that make the edges of a warped view smooth."""
+
+
+@dataclass
+class ProgressiveAccumulation:
+    """A picture on its way to its best: passes of samples, all drawn up to sample `at` of pass `pass_index`.
+
+    places: in a square of side 1, how far the lattice of samples is moved in each pass. samples, sparse: of this pass,
+    see `Passes.draw_aperture`. done: samples drawn in all passes.
+    """
+
+    lens: Lens
+    size_px: tuple[int, int]
+    places: tuple[ViewOffset, ...]
+    samples: list[ApertureSample] = dataclass_field(default_factory=list)
+    sparse: dict[ViewOffset, float] = dataclass_field(default_factory=dict)
+    pass_index: int = 0
+    at: int = 0
+    done: int = 0
+
+    @property
+    def within_px(self) -> ViewOffset:
+        """Where in a pixel this pass asks which surface shows."""
+        return self.places[self.pass_index]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every pass is drawn."""
+        return self.pass_index == len(self.places)
+
+
+def pass_count(lens: Lens, field: LightFieldTexture) -> int:
+    """How often to sum up, until neighbouring samples are close and edges smooth."""
+    count = 1
+    if lens.aperture_share > 0 and lens.keeps_layers:
+        affordable = STILL_SAMPLES // len(lens.samples(field.grid, field.present))
+        count = min(math.ceil((lens.widest_blur_px / PASS_BLUR_PX) ** 2), MAX_PASSES, affordable)
+    is_warped = field.has_disparity.any() and (lens.has_dolly or not _is_stored(lens.eye, field))
+    if lens.aperture_share < 1 and is_warped:
+        count = max(count, EDGE_PASSES)
+    return max(count, 1)
+
+
+def _is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
+    row, column = float(eye.t + field.grid.centre[0]), float(eye.s + field.grid.centre[1])
+    is_on_grid = 0 <= row < field.grid.rows and 0 <= column < field.grid.columns
+    return is_on_grid and row.is_integer() and column.is_integer() and bool(field.present[int(row), int(column)])
+
+
+def r2_sequence(count: int) -> list[ViewOffset]:
+    """Places in a square of side 1, one a pass, evenly spread, the first in the middle (the R2 sequence)."""
+    return [
+        ViewOffset(*((k * step + 0.5) % 1.0 - 0.5 for step in (0.7548776662466927, 0.5698402909980532)))
+        for k in range(count)
+    ]
+
 
 HIGHLIGHT_SPREAD = 2.0
-"""Samples of many rounds lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""
+"""Samples of many passes lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""
 
 
-class Drawing:
+class Accumulator:
     """Sums light of a field into targets. adaptive: whether tiles skip what they have no content for."""
 
     def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
@@ -34,13 +102,13 @@ class Drawing:
     def sum_up(
         self,
         field: LightFieldTexture,
-        summation: Summation,
-        targets: Targets,
-        rounds: int,
+        accumulation: ProgressiveAccumulation,
+        targets: RenderTargets,
+        passes: int,
         budget_s: float = math.inf,
         seconds_per_sample: float = 0.0,
     ) -> None:
-        """Draw samples until so many rounds are complete or the time is spent, with at least one sample.
+        """Draw samples until so many passes are complete or the time is spent, with at least one sample.
 
         seconds_per_sample: how long one is thought to take; no more are drawn at once than there is time for.
         """
@@ -48,86 +116,94 @@ class Drawing:
         if not field.present.any():
             for target in (targets.light, targets.blurred):
                 target.framebuffer.clear()
-            summation.round = len(summation.places)
+            accumulation.pass_index = len(accumulation.places)
             return
         end = time.perf_counter() + budget_s
         at_once = int(min(max(budget_s / max(seconds_per_sample, 1e-9), 1), MAX_SAMPLES))
-        while summation.round < rounds:
-            self._draw_some(field, summation, targets, at_once)
+        while accumulation.pass_index < passes:
+            self._draw_some(field, accumulation, targets, at_once)
             if time.perf_counter() >= end:
                 break
         self._ctx.disable(moderngl.BLEND)
 
     def finish(
-        self, summation: Summation, targets: Targets, framebuffer: moderngl.Framebuffer, is_linear: bool
+        self,
+        accumulation: ProgressiveAccumulation,
+        targets: RenderTargets,
+        framebuffer: moderngl.Framebuffer,
+        is_linear: bool,
     ) -> None:
         """Smooth what is summed up and write it. is_linear: as light, unbounded, instead of sRGB-encoded."""
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
-        if summation.lens.keeps_layers:
-            narrowing = _spread(summation.lens) / math.sqrt(max(summation.round, 1))
-            self.passes.smooth(summation.lens, targets, min(narrowing, 1.0))
+        if accumulation.lens.keeps_layers:
+            narrowing = _smoothing_spread(accumulation.lens) / math.sqrt(max(accumulation.pass_index, 1))
+            self.passes.smooth(accumulation.lens, targets, min(narrowing, 1.0))
         framebuffer.use()
-        self.passes.present(summation.lens, targets, is_linear)
+        self.passes.present(accumulation.lens, targets, is_linear)
 
-    def _draw_some(self, field: LightFieldTexture, summation: Summation, targets: Targets, count: int) -> None:
-        """Draw the next samples; the pinhole's share comes with the first of a round."""
-        lens = summation.lens
-        if summation.at == 0:
-            self._start_round(field, summation, targets)
-        batch = _alike(summation.samples[summation.at :][:count], field)
+    def _draw_some(
+        self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets, count: int
+    ) -> None:
+        """Draw the next samples; the pinhole's share comes with the first of a pass."""
+        lens = accumulation.lens
+        if accumulation.at == 0:
+            self._start_pass(field, accumulation, targets)
+        batch = _first_batch(accumulation.samples[accumulation.at :][:count], field)
         layers = {"SHARP": targets.light, "BLURRED": targets.blurred} if lens.keeps_layers else {"": targets.light}
         for layer, target in layers.items():
-            if summation.at == 0 and lens.aperture_share < 1:
-                self.passes.draw_pinhole(field, lens, summation.within_px, target, targets, layer)
+            if accumulation.at == 0 and lens.aperture_share < 1:
+                self.passes.draw_pinhole(field, lens, accumulation.within_px, target, targets, layer)
             if batch:
-                self.passes.draw_aperture(field, lens, batch, summation.few, target, targets, layer)
-        summation.at += len(batch)
-        summation.done += max(len(batch), 1)
-        if summation.at >= len(summation.samples):
-            summation.round, summation.at = summation.round + 1, 0
+                self.passes.draw_aperture(field, lens, batch, accumulation.sparse, target, targets, layer)
+        accumulation.at += len(batch)
+        accumulation.done += max(len(batch), 1)
+        if accumulation.at >= len(accumulation.samples):
+            accumulation.pass_index, accumulation.at = accumulation.pass_index + 1, 0
 
-    def _start_round(self, field: LightFieldTexture, summation: Summation, targets: Targets) -> None:
-        lens, place = summation.lens, summation.places[summation.round]
+    def _start_pass(
+        self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets
+    ) -> None:
+        lens, place = accumulation.lens, accumulation.places[accumulation.pass_index]
         moved = ViewOffset(lens.stride * place.t, lens.stride * place.s)
-        summation.samples, summation.few = [], {}
+        accumulation.samples, accumulation.sparse = [], {}
         if lens.aperture_share > 0:
-            # Smoothing narrows with the rounds: in all it stays as much as that of the first, which leave room for it.
-            leaves_room = summation.round < _spread(lens) ** 2
+            # Smoothing narrows with the passes: in all it stays as much as that of the first, which leave room for it.
+            leaves_room = accumulation.pass_index < _smoothing_spread(lens) ** 2
             every = lens.samples(field.grid, field.present, moved, is_smoothed=leaves_room)
-            summation.few = _few_of(every, lens, field, moved)
-            summation.samples = sorted(
-                every, key=lambda sample: (sample.wanted not in summation.few, not _is_direct(sample, field))
+            accumulation.sparse = _sparse_weights(every, lens, field, moved)
+            accumulation.samples = sorted(
+                every, key=lambda sample: (sample.wanted not in accumulation.sparse, not _is_direct(sample, field))
             )
-        if summation.round > 0:
+        if accumulation.pass_index > 0:
             return
         targets.light.start_sum()
         targets.blurred.start_sum()
         if lens.has_dolly:
-            self.passes.update_stand_ins(field)
+            self.passes.update_fallback_views(field)
         if lens.keeps_layers:
-            self.passes.find_defocus(field, lens, summation.samples or [_eye_sample(lens, field)], targets)
+            self.passes.find_defocus(field, lens, accumulation.samples or [_eye_sample(lens, field)], targets)
 
 
-def _spread(lens: Lens) -> float:
-    """How wide smoothing is, as a share of what lies between samples of one round."""
+def _smoothing_spread(lens: Lens) -> float:
+    """How wide smoothing is, as a share of what lies between samples of one pass."""
     return HIGHLIGHT_SPREAD if lens.highlight_gain > 0 else 1.0
 
 
-def _few_of(
+def _sparse_weights(
     every: list[ApertureSample], lens: Lens, field: LightFieldTexture, moved: ViewOffset
 ) -> dict[ViewOffset, float]:
     """Weights of every other sample across and down."""
     wanted = {sample.wanted for sample in every}
     coarse = lens.samples(field.grid, field.present, moved, coarser=2, is_smoothed=False)
-    few = {sample.wanted: sample.weight for sample in coarse if sample.wanted in wanted}
-    return {place: weight / sum(few.values()) for place, weight in few.items()}
+    sparse = {sample.wanted: sample.weight for sample in coarse if sample.wanted in wanted}
+    return {place: weight / sum(sparse.values()) for place, weight in sparse.items()}
 
 
 def _is_direct(sample: ApertureSample, field: LightFieldTexture) -> bool:
     return field.grid.offset(sample.row, sample.column) == sample.wanted
 
 
-def _alike(samples: list[ApertureSample], field: LightFieldTexture) -> list[ApertureSample]:
+def _first_batch(samples: list[ApertureSample], field: LightFieldTexture) -> list[ApertureSample]:
     """The first of them that one program can draw."""
     for i, sample in enumerate(samples):
         if _is_direct(sample, field) != _is_direct(samples[0], field):
@@ -137,7 +213,7 @@ def _alike(samples: list[ApertureSample], field: LightFieldTexture) -> list[Aper
 
 def _eye_sample(lens: Lens, field: LightFieldTexture) -> ApertureSample:
     """The eye, answered by the present view nearest to it."""
-    inside = clamped_to_grid(lens.eye, field.grid)
+    inside = clamp_to_grid(lens.eye, field.grid)
     row, column = round(inside.t) + field.grid.centre[0], round(inside.s) + field.grid.centre[1]
     stored = nearest_present(field.present)[row, column]
     return ApertureSample(lens.eye, int(stored[0]), int(stored[1]), 1.0)

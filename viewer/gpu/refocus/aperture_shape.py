@@ -22,7 +22,7 @@ def opening(
     diameter: of the circle around the opening. width: what a sample stands for, view steps; edges are as wide.
     """
     if shape.kind == "mask" and shape.mask is not None:
-        t, s = _turned(t, s, -shape.rotation_deg)
+        t, s = _rotate(t, s, -shape.rotation_deg)
         return _mean_of_mask(shape.mask, t, s, diameter, width)
     return np.clip(0.5 + _inside_by(shape, t, s, diameter / 2) / width, 0.0, 1.0)
 
@@ -42,7 +42,7 @@ def _inside_by(
     return inside_by
 
 
-def _turned(
+def _rotate(
     t: NDArray[np.float64], s: NDArray[np.float64], degrees: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Clockwise as seen, t down."""

@@ -16,29 +16,29 @@ class ErrorEstimate:
 
     def __init__(self) -> None:
         self.estimate: float | None = None
-        self._haste: Hashable = None
+        self._level: Hashable = None
         self._hurried: NDArray[np.uint8] | None = None
         self._latest: NDArray[np.uint8] | None = None
-        self._by_haste: dict[Hashable, float] = {}
+        self._by_level: dict[Hashable, float] = {}
 
-    def begin(self, haste: Hashable) -> None:
-        """A picture was drawn in this haste."""
-        self._haste, self._hurried, self._latest = haste, None, None
-        self.estimate = self._by_haste.get(haste)
+    def begin(self, level: Hashable) -> None:
+        """A picture was drawn in this level."""
+        self._level, self._hurried, self._latest = level, None, None
+        self.estimate = self._by_level.get(level)
 
     @property
     def is_new(self) -> bool:
         """Whether nothing is known of the picture drawn last."""
         return self._hurried is None
 
-    def add(self, image: NDArray[np.uint8], rounds: int) -> None:
-        """The picture (H, W, 3) after so many rounds of samples, each time about twice as many; 0 = the hurried one."""
-        if rounds == 0 or self._hurried is None or self._latest is None:
+    def add(self, image: NDArray[np.uint8], passes: int) -> None:
+        """The picture (H, W, 3) after so many passes of samples, each time about twice as many; 0 = the hurried one."""
+        if passes == 0 or self._hurried is None or self._latest is None:
             self._hurried = self._latest = image
             return
         self.estimate = rms_difference(image, self._latest)
         self._latest = image
-        self._by_haste[self._haste] = rms_difference(image, self._hurried)
+        self._by_level[self._level] = rms_difference(image, self._hurried)
 
 
 def rms_difference(image: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:

@@ -15,7 +15,7 @@ from viewer.gpu.refocus.view_sampling import MAX_SOURCES
 
 
 @dataclass(frozen=True)
-class Haste:
+class QualityLevel:
     """What is left out.
 
     stride: view steps between samples of the aperture. sources: stored views that a pinhole view is made of, at most.
@@ -27,23 +27,23 @@ class Haste:
     scale: float = 1.0
 
 
-NO_HASTE = Haste()
-HASTES = (
-    NO_HASTE,
-    Haste(sources=2),
-    Haste(sources=1),
-    Haste(sources=1, scale=0.7),
-    Haste(sources=1, scale=0.5),
-    Haste(2, 1, 0.7),
-    Haste(2, 1, 0.5),
-    Haste(3, 1, 0.5),
-    Haste(4, 1, 0.35),
+BEST_QUALITY = QualityLevel()
+QUALITY_LEVELS = (
+    BEST_QUALITY,
+    QualityLevel(sources=2),
+    QualityLevel(sources=1),
+    QualityLevel(sources=1, scale=0.7),
+    QualityLevel(sources=1, scale=0.5),
+    QualityLevel(2, 1, 0.7),
+    QualityLevel(2, 1, 0.5),
+    QualityLevel(3, 1, 0.5),
+    QualityLevel(4, 1, 0.35),
 )
 """From the best picture to the quickest. Fewer pixels show less than fewer samples: see docs/optics.md."""
 
 PICTURE_FETCHES, LAYERS_FETCHES = 4.0, 8.0
 PINHOLE_FETCHES, SOURCE_FETCHES = 4.0, 5.0
-DETOUR_FETCHES = 3.0
+REPROJECTION_FETCHES = 3.0
 OVERHEAD_S = 0.003
 """What a picture takes however small it is."""
 
@@ -54,7 +54,7 @@ LATEST_COUNTS = 0.4
 """How much the latest measurement counts against those before."""
 
 
-def stretched(image: NDArray[np.uint8], size_px: tuple[int, int]) -> NDArray[np.uint8]:
+def stretch_image(image: NDArray[np.uint8], size_px: tuple[int, int]) -> NDArray[np.uint8]:
     """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it."""
     rows, columns = (_taps(there, here) for there, here in zip(size_px[::-1], image.shape))
     light = image.astype(np.float32)
@@ -71,22 +71,22 @@ def _taps(there: int, here: int) -> tuple[NDArray[np.intp], NDArray[np.intp], ND
 
 
 @dataclass(frozen=True)
-class Work:
+class DrawCost:
     """What drawing a picture takes. samples: of the aperture, 0 without. sources: of the pinhole view, 0 without.
 
-    has_detours: whether views stand in for others. keeps_layers: see `Lens`. pixels: of the picture as drawn.
+    has_reprojection: whether views stand in for others. keeps_layers: see `Lens`. pixels: of the picture as drawn.
     """
 
     samples: int
     sources: int
-    has_detours: bool
+    has_reprojection: bool
     keeps_layers: bool
     pixels: int
 
     @property
     def fetches(self) -> float:
         """How many fetches of a texel it costs, about."""
-        of_samples = self.samples * (DETOUR_FETCHES if self.has_detours else 1.0)
+        of_samples = self.samples * (REPROJECTION_FETCHES if self.has_reprojection else 1.0)
         of_pinhole = (PINHOLE_FETCHES + SOURCE_FETCHES * self.sources) * (1.5 if self.keeps_layers else 1.0)
         of_picture = PICTURE_FETCHES + LAYERS_FETCHES * self.keeps_layers
         return self.pixels * (of_picture + of_samples + of_pinhole * (self.sources > 0))
@@ -94,33 +94,35 @@ class Work:
     @property
     def kind(self) -> tuple[bool, bool, bool, bool]:
         """What sorts of work there are: the estimate of each is off in its own way."""
-        return self.samples > 0, self.sources > 0, self.has_detours, self.keeps_layers
+        return self.samples > 0, self.sources > 0, self.has_reprojection, self.keeps_layers
 
 
-class Pace:
+class FrameTimeModel:
     """How fast this machine draws. seconds_per_fetch: a first guess."""
 
     def __init__(self, seconds_per_fetch: float) -> None:
         self._guess = seconds_per_fetch
         self._measured: dict[tuple[bool, bool, bool, bool], float] = {}
 
-    def seconds(self, work: Work) -> float:
+    def seconds(self, work: DrawCost) -> float:
         """How long it will take, about."""
         return OVERHEAD_S + self._measured.get(work.kind, self._guess) * work.fetches
 
-    def learn(self, work: Work, seconds: float) -> None:
+    def learn(self, work: DrawCost, seconds: float) -> None:
         """Take note of how long it took."""
         before = self._measured.get(work.kind)
         latest = max(seconds - OVERHEAD_S, 0.2 * seconds) / work.fetches
         self._measured[work.kind] = latest if before is None else before + LATEST_COUNTS * (latest - before)
 
 
-def least_haste(work_in: Callable[[Haste], Work], pace: Pace, budget_s: float, before: int) -> int:
-    """Which of HASTES there is time for, as an index: the first, else the last. work_in: what each takes.
+def choose_quality_level(
+    work_in: Callable[[QualityLevel], DrawCost], frame_time: FrameTimeModel, budget_s: float, before: int
+) -> int:
+    """Which of QUALITY_LEVELS there is time for, as an index: the first, else the last. work_in: what each takes.
 
     before: the one of the picture before; a better one is taken up only with time to spare.
     """
-    for index, haste in enumerate(HASTES):
-        if pace.seconds(work_in(haste)) <= budget_s * (BETTER_ONLY_WITHIN if index < before else 1.0):
+    for index, level in enumerate(QUALITY_LEVELS):
+        if frame_time.seconds(work_in(level)) <= budget_s * (BETTER_ONLY_WITHIN if index < before else 1.0):
             return index
-    return len(HASTES) - 1
+    return len(QUALITY_LEVELS) - 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus.frame_budget import NO_HASTE, Haste
+from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.view_sampling import UNMOVED, ApertureSample, aperture_samples
 from viewer.model.state.app_state import ApertureShape, Optics
 
@@ -22,13 +22,13 @@ FADE_FROM_PX, FADE_TO_PX = 4.0, 6.0
 """Over these widths of the whole blur, light moves from the sharp layer to those of half the size."""
 
 LEAST_ACROSS = 2.0
-"""Samples across the aperture, at least, however great the haste."""
+"""Samples across the aperture, at least, however great the level."""
 
-FEW_UP_TO_PX = 1.2
+SPARSE_UP_TO_PX = 1.2
 """As long as the whole blur of a tile is narrower, every other sample across and down shows the same."""
 
 
-class Cell(NamedTuple):
+class PictureCell(NamedTuple):
     """A part of the picture in texture coordinates."""
 
     left: float
@@ -37,10 +37,10 @@ class Cell(NamedTuple):
     bottom: float
 
 
-WHOLE = Cell(0.0, 0.0, 1.0, 1.0)
+WHOLE = PictureCell(0.0, 0.0, 1.0, 1.0)
 
 
-class Window(NamedTuple):
+class TargetWindow(NamedTuple):
     """The part of the picture that the targets hold, in texture coordinates."""
 
     left: float
@@ -48,15 +48,15 @@ class Window(NamedTuple):
     width: float
     height: float
 
-    def seen(self, cell: Cell) -> Cell:
+    def seen(self, cell: PictureCell) -> PictureCell:
         """A part of the picture in texture coordinates of the targets, as far as they hold it."""
         x = ((edge - self.left) / self.width for edge in (cell.left, cell.right))
         y = ((edge - self.top) / self.height for edge in (cell.top, cell.bottom))
         (left, right), (top, bottom) = ((min(max(edge, 0.0), 1.0) for edge in edges) for edges in (x, y))
-        return Cell(left, top, right, bottom)
+        return PictureCell(left, top, right, bottom)
 
 
-WHOLE_PICTURE = Window(0.0, 0.0, 1.0, 1.0)
+WHOLE_PICTURE = TargetWindow(0.0, 0.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Lens:
     highlight_gain: float
     exposure: float
     most_sources: int
-    part: Window = WHOLE_PICTURE
+    part: TargetWindow = WHOLE_PICTURE
 
     @property
     def sharp_up_to_px(self) -> tuple[float, float]:
@@ -94,9 +94,9 @@ class Lens:
         return min(1.0, FADE_FROM_PX / self.samples_across), min(2.0, FADE_TO_PX / self.samples_across)
 
     @property
-    def few_up_to_px(self) -> float:
+    def sparse_up_to_px(self) -> float:
         """See FEW_UP_TO_PX, as blur from one sample to the next."""
-        return FEW_UP_TO_PX / self.samples_across
+        return SPARSE_UP_TO_PX / self.samples_across
 
     @property
     def has_dolly(self) -> bool:
@@ -129,10 +129,12 @@ class Lens:
         return aperture_samples(self.eye, self.diameter, grid, present, self.shape, stride, moved, leaves_room)
 
 
-def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, prefilter: bool, haste: Haste = NO_HASTE) -> Lens:
+def lens_of(
+    optics: Optics, field: LightFieldTexture, width_px: int, prefilter: bool, level: QualityLevel = BEST_QUALITY
+) -> Lens:
     """The lens for a picture of that width."""
     diameter = max(optics.aperture_diameter, 0.0)
-    stride = min(haste.stride, max(int(diameter / LEAST_ACROSS), 1))
+    stride = min(level.stride, max(int(diameter / LEAST_ACROSS), 1))
     step = max(min(diameter, float(stride)), 1e-6)
     blur_px = step * width_px / field.width if diameter > 0 else 0.0
     samples_across = max(min(diameter, float(max(field.grid))) / step, 1.0)
@@ -155,7 +157,7 @@ def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, prefilter: 
         keeps_layers=keeps,
         highlight_gain=0.0 if field.hdr else HIGHLIGHT_GAIN * optics.highlight_recovery * min(diameter, 1.0),
         exposure=2.0**optics.exposure_stops,
-        most_sources=haste.sources,
+        most_sources=level.sources,
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from iibr_core.types import ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
-from viewer.gpu.refocus.lens import WHOLE, WHOLE_PICTURE, Cell, Lens
+from viewer.gpu.refocus.lens import WHOLE, WHOLE_PICTURE, Lens, PictureCell
 from viewer.gpu.refocus.view_sampling import (
     MAX_SOURCES,
     ApertureSample,
@@ -23,7 +23,7 @@ from viewer.gpu.refocus.view_sampling import (
     pinhole_sources,
     pinhole_weights,
 )
-from viewer.gpu.render_targets import Target, Targets
+from viewer.gpu.render_targets import RenderTarget, RenderTargets
 
 MAX_SAMPLES = 512
 """As in shaders/include/samples.glsl; larger apertures are summed in several draws."""
@@ -37,8 +37,8 @@ OFF_BORDER_PX = 1 / 256
 TILE_PX = 16
 MAX_TILE_TAPS = 8
 
-UNITS = {"colors": 0, "disparities": 1, "tiles": 2, "stand_ins": 3, "blocks": 4}
-SPANS = "spans_of_0_and_1", "spans_of_2_and_3"
+UNITS = {"colors": 0, "disparities": 1, "tiles": 2, "fallback_views": 3, "blocks": 4}
+SPANS = "intervals_of_0_and_1", "intervals_of_2_and_3"
 
 
 class Passes:
@@ -48,17 +48,23 @@ class Passes:
         self._ctx = ctx
         self._programs = programs
         self._samples = ctx.buffer(reserve=2 * MAX_SAMPLES * 16)
-        self._stand_ins: moderngl.Texture | None = None
+        self._fallback_views: moderngl.Texture | None = None
         self.adaptive = True
 
     def release(self) -> None:
         """Free every GL object of its own."""
         self._samples.release()
-        if self._stand_ins is not None:
-            self._stand_ins.release()
+        if self._fallback_views is not None:
+            self._fallback_views.release()
 
     def draw_pinhole(
-        self, field: LightFieldTexture, lens: Lens, within_px: ViewOffset, target: Target, targets: Targets, layer: str
+        self,
+        field: LightFieldTexture,
+        lens: Lens,
+        within_px: ViewOffset,
+        target: RenderTarget,
+        targets: RenderTargets,
+        layer: str,
     ) -> None:
         """Add the share of the pinhole view. layer: "SHARP", "BLURRED", or "" for all light.
 
@@ -68,7 +74,7 @@ class Passes:
         keeps, size_px = target.holds_sum, target.framebuffer.size
         for cell in _cells(field, lens):
             if "FLAT" in kinds:
-                self._find_spans(field, lens, cell, targets)
+                self._find_march_intervals(field, lens, cell, targets)
             target.framebuffer.scissor = _pixels_of(lens.part.seen(cell), *size_px)
             target.add(keeps)
             for kind in kinds:
@@ -79,9 +85,9 @@ class Passes:
         self,
         field: LightFieldTexture,
         lens: Lens,
-        cell: Cell,
+        cell: PictureCell,
         within_px: ViewOffset,
-        targets: Targets,
+        targets: RenderTargets,
         layer: str,
         kind: str,
     ) -> None:
@@ -102,21 +108,23 @@ class Passes:
         tiles = math.prod(targets.spans.framebuffer.size)
         quad.render(moderngl.TRIANGLES, vertices=6 * tiles if kind else 3)
 
-    def _find_spans(self, field: LightFieldTexture, lens: Lens, cell: Cell, targets: Targets) -> None:
+    def _find_march_intervals(
+        self, field: LightFieldTexture, lens: Lens, cell: PictureCell, targets: RenderTargets
+    ) -> None:
         """Fill the tiles of a cell with the steps between which its searches end."""
-        program, quad = self._programs.get("search_spans.frag", _switches(lens, "", lens.has_dolly and "DOLLY"))
+        program, quad = self._programs.get("march_intervals.frag", _switches(lens, "", lens.has_dolly and "DOLLY"))
         self._set_field(program, field, lens)
         self._set_sources(program, field, lens, cell)
         self._set_blocks(program, field, targets)
         width, height = targets.blurred.framebuffer.size
         program.set_uniforms(pixel_uv=(lens.part.width / width, lens.part.height / height))
         target = targets.spans
-        target.framebuffer.scissor = _touched_by(lens.part.seen(cell), *target.framebuffer.size)
+        target.framebuffer.scissor = _covering_pixels(lens.part.seen(cell), *target.framebuffer.size)
         self._ctx.disable(moderngl.BLEND)
         target.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def _set_sources(self, program: Program, field: LightFieldTexture, lens: Lens, cell: Cell) -> None:
+    def _set_sources(self, program: Program, field: LightFieldTexture, lens: Lens, cell: PictureCell) -> None:
         """The views that a cell of the picture is made of; with dolly, their weights at its corners."""
         middle = lens.eye_at((cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2)
         sources = pinhole_sources(middle, field.grid, field.present)[: lens.most_sources]
@@ -144,42 +152,47 @@ class Passes:
         field: LightFieldTexture,
         lens: Lens,
         samples: list[ApertureSample],
-        few: dict[ViewOffset, float],
-        target: Target,
-        targets: Targets,
+        sparse: dict[ViewOffset, float],
+        target: RenderTarget,
+        targets: RenderTargets,
         layer: str,
     ) -> None:
         """Add samples of the lens, at most MAX_SAMPLES. layer: see `draw_pinhole`.
 
-        few: weights of the samples that suffice where all is sharp; those among `samples` must come first.
+        sparse: weights of the samples that suffice where all is sharp; those among `samples` must come first.
         """
         tiles = self.adaptive and bool(layer)
-        detours = _needs_detours(field, lens, samples)
+        reprojects = _needs_reprojection(field, lens, samples)
         program, quad = self._programs.get(
             "aperture.frag",
-            _switches(lens, layer, tiles and "TILES", detours and "DETOURS", detours and lens.has_dolly and "DOLLY"),
+            _switches(
+                lens, layer, tiles and "TILES", reprojects and "REPROJECT", reprojects and lens.has_dolly and "DOLLY"
+            ),
         )
         self._set_field(program, field, lens)
-        self._set_samples(program, field, lens, samples, few)
+        self._set_samples(program, field, lens, samples, sparse)
         program.set_uniforms(share=lens.aperture_share, nudge=_nudge(target, layer))
         if tiles:
             self._bind(targets.tiles.textures[0], "tiles")
-            few_count = sum(sample.wanted in few for sample in samples)
-            _set_declared(program, tiles=UNITS["tiles"], few_count=few_count, few_up_to_px=lens.few_up_to_px)
+            sparse_count = sum(sample.wanted in sparse for sample in samples)
+            _set_declared(
+                program, tiles=UNITS["tiles"], sparse_count=sparse_count, sparse_up_to_px=lens.sparse_up_to_px
+            )
         target.add()
         quad.render(moderngl.TRIANGLES, vertices=3)
 
     def find_defocus(
-        self, field: LightFieldTexture, lens: Lens, samples: list[ApertureSample], targets: Targets
+        self, field: LightFieldTexture, lens: Lens, samples: list[ApertureSample], targets: RenderTargets
     ) -> None:
         """Fill the tiles with the widest blur in each, and around each."""
         self._ctx.disable(moderngl.BLEND)
         direct = [sample for sample in samples if field.grid.offset(sample.row, sample.column) == sample.wanted]
         samples = direct if 2 * len(direct) > len(samples) else samples
         samples = samples[:: math.ceil(len(samples) / MAX_SAMPLES)]
-        detours = _needs_detours(field, lens, samples)
+        reprojects = _needs_reprojection(field, lens, samples)
         program, quad = self._programs.get(
-            "defocus_tiles.frag", _switches(lens, "", detours and "DETOURS", detours and lens.has_dolly and "DOLLY")
+            "defocus_tiles.frag",
+            _switches(lens, "", reprojects and "REPROJECT", reprojects and lens.has_dolly and "DOLLY"),
         )
         self._set_field(program, field, lens)
         self._set_samples(program, field, lens, samples, {})
@@ -198,7 +211,7 @@ class Passes:
         targets.wide_tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def smooth(self, lens: Lens, targets: Targets, narrowing: float) -> None:
+    def smooth(self, lens: Lens, targets: RenderTargets, narrowing: float) -> None:
         """Spread the blurred layers over what lies between samples. narrowing: of the blur that the tiles tell."""
         self._ctx.disable(moderngl.BLEND)
         program, quad = self._programs.get("smooth.frag")
@@ -215,7 +228,7 @@ class Passes:
             target.use()
             quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def present(self, lens: Lens, targets: Targets, is_linear: bool) -> None:
+    def present(self, lens: Lens, targets: RenderTargets, is_linear: bool) -> None:
         """The finished picture, into the framebuffer in use. is_linear: as light, unbounded, not sRGB-encoded."""
         self._ctx.disable(moderngl.BLEND)
         switches = lens.keeps_layers and "LAYERS", is_linear and "LINEAR"
@@ -228,7 +241,7 @@ class Passes:
             program.set_uniforms(weights=1, smooth_front=2, smooth_back=3)
         quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def update_stand_ins(self, field: LightFieldTexture) -> None:
+    def update_fallback_views(self, field: LightFieldTexture) -> None:
         """Tell the shaders which views are there; needed for dolly."""
         rows, columns = field.grid
         table = np.zeros((rows, columns, 4), np.float32)
@@ -236,11 +249,11 @@ class Passes:
         table[..., :2] = nearest[..., ::-1]
         table[..., 2] = field.has_disparity[nearest[..., 0], nearest[..., 1]]
         table[..., 3] = [[field.layer(int(row), int(column)) for row, column in line] for line in nearest]
-        if self._stand_ins is None or self._stand_ins.size != (columns, rows):
-            if self._stand_ins is not None:
-                self._stand_ins.release()
-            self._stand_ins = self._ctx.texture((columns, rows), 4, dtype="f4")
-        self._stand_ins.write(table.tobytes())
+        if self._fallback_views is None or self._fallback_views.size != (columns, rows):
+            if self._fallback_views is not None:
+                self._fallback_views.release()
+            self._fallback_views = self._ctx.texture((columns, rows), 4, dtype="f4")
+        self._fallback_views.write(table.tobytes())
 
     def _bind(self, texture: moderngl.Texture, name: str) -> None:
         texture.use(UNITS[name])
@@ -268,7 +281,7 @@ class Passes:
             sample_width=min(float(lens.stride), lens.diameter),
         )
 
-    def _set_blocks(self, program: Program, field: LightFieldTexture, targets: Targets) -> None:
+    def _set_blocks(self, program: Program, field: LightFieldTexture, targets: RenderTargets) -> None:
         across, down = targets.tiles.framebuffer.size
         field.blocks.use(UNITS["blocks"])
         program.set_uniforms(blocks=UNITS["blocks"], block_px=float(BLOCK_PX), tile_uv=(1 / across, 1 / down))
@@ -279,23 +292,25 @@ class Passes:
         field: LightFieldTexture,
         lens: Lens,
         samples: list[ApertureSample],
-        few: dict[ViewOffset, float],
+        sparse: dict[ViewOffset, float],
     ) -> None:
         table = np.zeros((2, MAX_SAMPLES, 4), np.float32)
         for i, (wanted, row, column, weight) in enumerate(samples):
             stored = field.grid.offset(row, column)
             table[0, i] = wanted.s - lens.eye.s, wanted.t - lens.eye.t, field.layer(row, column), weight
             detour = stored.s - wanted.s, stored.t - wanted.t
-            table[1, i] = (*detour, float(field.has_disparity[row, column]), few.get(wanted, 0.0))
+            table[1, i] = (*detour, float(field.has_disparity[row, column]), sparse.get(wanted, 0.0))
         self._samples.write(table.tobytes())
         self._samples.bind_to_uniform_block(0)
         program.bind_block("Samples", 0)
         program.set_uniforms(sample_count=len(samples))
-        if lens.has_dolly and "stand_ins" in program.declared:
-            assert self._stand_ins is not None
-            self._bind(self._stand_ins, "stand_ins")
+        if lens.has_dolly and "fallback_views" in program.declared:
+            assert self._fallback_views is not None
+            self._bind(self._fallback_views, "fallback_views")
             row, column = field.grid.centre
-            _set_declared(program, stand_ins=UNITS["stand_ins"], eye_in_grid=(column + lens.eye.s, row + lens.eye.t))
+            _set_declared(
+                program, fallback_views=UNITS["fallback_views"], eye_in_grid=(column + lens.eye.s, row + lens.eye.t)
+            )
 
 
 def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
@@ -308,13 +323,13 @@ def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
     return tuple(str(name) for name in (*names, *by_lens) if name)
 
 
-def _nudge(target: Target, layer: str) -> tuple[float, float]:
+def _nudge(target: RenderTarget, layer: str) -> tuple[float, float]:
     """From the middle of the four pixels that one of half the size covers to the first; see shaders/fullscreen.vert."""
     width, height = target.framebuffer.size
     return (-0.25 / width, -0.25 / height) if layer == "BLURRED" else (0.0, 0.0)
 
 
-def _needs_detours(field: LightFieldTexture, lens: Lens, samples: list[ApertureSample]) -> bool:
+def _needs_reprojection(field: LightFieldTexture, lens: Lens, samples: list[ApertureSample]) -> bool:
     if lens.has_dolly or lens.focus_range > 0:
         return True
     return any(field.grid.offset(sample.row, sample.column) != sample.wanted for sample in samples)
@@ -324,7 +339,7 @@ def _set_declared(program: Program, **values: Any) -> None:
     program.set_uniforms(**{name: value for name, value in values.items() if name in program.declared})
 
 
-def _search_steps(field: LightFieldTexture, lens: Lens, view: ViewOffset, cell: Cell) -> int:
+def _search_steps(field: LightFieldTexture, lens: Lens, view: ViewOffset, cell: PictureCell) -> int:
     """One per pixel of parallax, for the pixel of the cell whose ray crosses the grid farthest from the view."""
     rays = [lens.eye_at(u, v) for u in (cell.left, cell.right) for v in (cell.top, cell.bottom)]
     distance = max(math.hypot(view.s - ray.s, view.t - ray.t) for ray in rays)
@@ -332,7 +347,7 @@ def _search_steps(field: LightFieldTexture, lens: Lens, view: ViewOffset, cell: 
     return min(max(math.ceil(parallax_px), 2), MAX_SEARCH_STEPS)
 
 
-def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[Cell]:
+def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[PictureCell]:
     """Parts of the picture whose rays cross one cell of the grid each; the whole picture without dolly."""
     if not lens.has_dolly:
         yield WHOLE
@@ -342,16 +357,16 @@ def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[Cell]:
     down = _crossings(lens.eye.t, lens.dolly[1], first.t, last.t)
     for top, bottom in pairwise(down):
         for left, right in pairwise(across):
-            yield Cell(left, top, right, bottom)
+            yield PictureCell(left, top, right, bottom)
 
 
-def _pixels_of(cell: Cell, width: int, height: int) -> tuple[int, int, int, int]:
+def _pixels_of(cell: PictureCell, width: int, height: int) -> tuple[int, int, int, int]:
     """Scissor: (x, y, width, height) of the pixels whose cell this is."""
     left, top = round(cell.left * width), round(cell.top * height)
     return left, top, round(cell.right * width) - left, round(cell.bottom * height) - top
 
 
-def _touched_by(cell: Cell, width: int, height: int) -> tuple[int, int, int, int]:
+def _covering_pixels(cell: PictureCell, width: int, height: int) -> tuple[int, int, int, int]:
     """Scissor: (x, y, width, height) of all pixels (here: tiles) that the cell and its border pixels lie in."""
     left, top = max(math.ceil(cell.left * width) - 1, 0), max(math.ceil(cell.top * height) - 1, 0)
     right, bottom = min(math.floor(cell.right * width) + 1, width), min(math.floor(cell.bottom * height) + 1, height)

@@ -19,14 +19,21 @@ from iibr_core.types import FloatImage, GridShape, InputError, StoredColors
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Drawing
+from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, pass_count, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
-from viewer.gpu.refocus.frame_budget import HASTES, NO_HASTE, Haste, Pace, Work, least_haste, stretched
-from viewer.gpu.refocus.lens import Window, lens_of
+from viewer.gpu.refocus.frame_budget import (
+    BEST_QUALITY,
+    QUALITY_LEVELS,
+    DrawCost,
+    FrameTimeModel,
+    QualityLevel,
+    choose_quality_level,
+    stretch_image,
+)
+from viewer.gpu.refocus.lens import TargetWindow, lens_of
 from viewer.gpu.refocus.passes import TILE_PX
-from viewer.gpu.refocus.summation import Summation, even_places, rounds_of
-from viewer.gpu.refocus.tiling import PicturePart, parts_of
-from viewer.gpu.render_targets import Target, Targets, unbind
+from viewer.gpu.refocus.tiling import PictureTile, picture_tiles
+from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind
 from viewer.model.state.app_state import DrawReport, Optics
 
 KEPT_SIZES = 2
@@ -51,24 +58,24 @@ class Renderer:
         self.report = DrawReport()
         self.note = ""
         self.programs = ProgramCache(self.ctx)
-        self._drawing = Drawing(self.ctx, self.programs)
+        self._accumulator = Accumulator(self.ctx, self.programs)
         self.adaptive = adaptive
-        self._targets: dict[Size, Targets] = {}
-        self._shown: Targets | None = None
-        self._summation: Summation | None = None
-        self._pace = Pace(gl.seconds_per_fetch)
+        self._targets: dict[Size, RenderTargets] = {}
+        self._shown: RenderTargets | None = None
+        self._accumulation: ProgressiveAccumulation | None = None
+        self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
         self._refining_s = 4 * gl.seconds_per_fetch
-        self._haste = 0
+        self._level = 0
         self._errors = ErrorEstimate()
 
     @property
     def adaptive(self) -> bool:
         """Whether tiles skip what they have no content for."""
-        return self._drawing.passes.adaptive
+        return self._accumulator.passes.adaptive
 
     @adaptive.setter
     def adaptive(self, is_on: bool) -> None:
-        self._drawing.passes.adaptive = is_on
+        self._accumulator.passes.adaptive = is_on
 
     def open_field(self, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool) -> None:
         """Start an empty light field of this size in place of the one before.
@@ -80,30 +87,30 @@ class Renderer:
         if self.field is not None:
             self.field.release()
         self.field = field
-        self._summation = None
+        self._accumulation = None
 
     def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Add or replace one view; see LightFieldTexture.upload."""
         self._open_field().upload(row, column, colors, disparity)
-        self._summation = None
+        self._accumulation = None
 
     def render(
         self,
         optics: Optics,
         size_px: Size,
         framebuffer: moderngl.Framebuffer | None = None,
-        haste: Haste = NO_HASTE,
+        level: QualityLevel = BEST_QUALITY,
     ) -> None:
         """Draw the picture at once, stretched to size_px = (width, height), with every view the aperture sees.
 
         framebuffer: drawn into its current viewport, which should have that size; None draws into the renderer's own
-        image (`image_texture`, `read_image`). haste: what to leave out, except for its scale. Before the first view the
+        image (`image_texture`, `read_image`). level: what to leave out, except for its scale. Before the first view the
         picture is black. The framebuffer stays bound.
         """
-        self._summation = self._summation_of(optics, size_px, haste)
-        self._draw(math.inf, rounds=1)
+        self._accumulation = self._accumulation_of(optics, size_px, level)
+        self._draw(math.inf, passes=1)
         self._finish(framebuffer)
-        self._errors.begin(haste)
+        self._errors.begin(level)
 
     def render_in_time(self, optics: Optics, size_px: Size, budget_s: float) -> None:
         """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
@@ -112,37 +119,41 @@ class Renderer:
         """
         start = time.perf_counter()
         programs_before = len(self.programs)
-        self._haste = least_haste(partial(self._work, optics, size_px), self._pace, budget_s, self._haste)
-        haste = HASTES[self._haste]
-        self.render(optics, scaled(size_px, haste.scale), haste=haste)
+        self._level = choose_quality_level(
+            partial(self._work, optics, size_px), self._frame_time, budget_s, self._level
+        )
+        level = QUALITY_LEVELS[self._level]
+        self.render(optics, scale_size(size_px, level.scale), level=level)
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs_before:
-            self._pace.learn(self._work(optics, size_px, haste), seconds)
+            self._frame_time.learn(self._work(optics, size_px, level), seconds)
         drawn = self._current().done
-        if haste != NO_HASTE:
-            self._summation = self._summation_of(optics, size_px, NO_HASTE)
-        self._tell(drawn, seconds)
+        if level != BEST_QUALITY:
+            self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY)
+        self._learn(drawn, seconds)
 
     def refine(self, budget_s: float = math.inf) -> None:
-        """Draw more samples of the same picture, for about that long; the image changes after each round."""
+        """Draw more samples of the same picture, for about that long; the image changes after each pass."""
         if self.is_converged:
             return
-        summation = self._current()
+        accumulation = self._current()
         if self._errors.is_new:
             self._errors.add(self.read_image(), 0)
         start = time.perf_counter()
-        round_before, done_before, programs_before = summation.round, summation.done, len(self.programs)
-        self._draw(budget_s, rounds=len(summation.places))
-        if summation.round > round_before:
+        pass_before, done_before, programs_before = accumulation.pass_index, accumulation.done, len(self.programs)
+        self._draw(budget_s, passes=len(accumulation.places))
+        if accumulation.pass_index > pass_before:
             self._finish(None)
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs_before:
-            self._refining_s = seconds / max(summation.done - done_before, 1) / math.prod(summation.size_px)
-        if summation.round > round_before and (summation.is_complete or math.log2(summation.round).is_integer()):
-            self._errors.add(self.read_image(), summation.round)
-        self._tell(summation.done, seconds)
+            self._refining_s = seconds / max(accumulation.done - done_before, 1) / math.prod(accumulation.size_px)
+        if accumulation.pass_index > pass_before and (
+            accumulation.is_complete or math.log2(accumulation.pass_index).is_integer()
+        ):
+            self._errors.add(self.read_image(), accumulation.pass_index)
+        self._learn(accumulation.done, seconds)
 
     def converged_picture(self, optics: Optics, size_px: Size, is_linear: bool) -> NDArray[np.uint8 | np.float32]:
         """The picture with every sample it will get, (height, width, 3), of any size: drawn part by part.
@@ -151,7 +162,7 @@ class Renderer:
         """
         width, height = size_px
         image = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
-        for part in parts_of(size_px, self.gl.max_texture_size):
+        for part in picture_tiles(size_px, self.gl.max_texture_size):
             drawn = self._converged_part(optics, size_px, part, is_linear)
             image[part.kept] = drawn[part.kept_of_drawn]
         return image
@@ -159,7 +170,7 @@ class Renderer:
     @property
     def is_converged(self) -> bool:
         """Whether more samples would not make the picture better."""
-        return self._summation is None or self._summation.is_complete
+        return self._accumulation is None or self._accumulation.is_complete
 
     @property
     def samples_drawn(self) -> int:
@@ -169,11 +180,11 @@ class Renderer:
     @property
     def samples_converged(self) -> int:
         """How many the converged picture is made of, about."""
-        summation, field = self._current(), self._open_field()
-        per_round = 1
-        if summation.lens.aperture_share > 0 and field.present.any():
-            per_round = len(summation.lens.samples(field.grid, field.present))
-        return summation.done if self.is_converged else max(per_round * len(summation.places), summation.done)
+        accumulation, field = self._current(), self._open_field()
+        per_pass = 1
+        if accumulation.lens.aperture_share > 0 and field.present.any():
+            per_pass = len(accumulation.lens.samples(field.grid, field.present))
+        return accumulation.done if self.is_converged else max(per_pass * len(accumulation.places), accumulation.done)
 
     @property
     def image_texture(self) -> int:
@@ -185,8 +196,8 @@ class Renderer:
         """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller."""
         assert self._shown is not None, "render first"
         image: NDArray[np.uint8] = read_pixels(self._shown.image.framebuffer, np.uint8)
-        size_px = self._current().size_px if self._summation else self._shown.size_px
-        return image if self._shown.size_px == size_px else stretched(image, size_px)
+        size_px = self._current().size_px if self._accumulation else self._shown.size_px
+        return image if self._shown.size_px == size_px else stretch_image(image, size_px)
 
     def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
         """The picture at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
@@ -199,7 +210,7 @@ class Renderer:
     def release(self) -> None:
         """Free every GL object."""
         self.programs.release()
-        self._drawing.release()
+        self._accumulator.release()
         for targets in self._targets.values():
             targets.release()
         self._targets.clear()
@@ -208,18 +219,18 @@ class Renderer:
             self.field.release()
             self.field = None
 
-    def _current(self) -> Summation:
-        assert self._summation is not None, "render first"
-        return self._summation
+    def _current(self) -> ProgressiveAccumulation:
+        assert self._accumulation is not None, "render first"
+        return self._accumulation
 
     def _open_field(self) -> LightFieldTexture:
         if self.field is None:
             raise ValueError("no light field is open")
         return self.field
 
-    def _targets_of(self, size_px: Size) -> Targets:
+    def _targets_of(self, size_px: Size) -> RenderTargets:
         """Those of this size; beside them only the ones that were asked for last are kept."""
-        targets = self._targets.pop(size_px, None) or Targets(self.ctx, size_px, TILE_PX)
+        targets = self._targets.pop(size_px, None) or RenderTargets(self.ctx, size_px, TILE_PX)
         while len(self._targets) >= KEPT_SIZES:
             oldest = self._targets.pop(next(iter(self._targets)))
             self._shown = None if self._shown is oldest else self._shown
@@ -227,55 +238,55 @@ class Renderer:
         self._targets[size_px] = targets
         return targets
 
-    def _summation_of(self, optics: Optics, size_px: Size, haste: Haste) -> Summation:
+    def _accumulation_of(self, optics: Optics, size_px: Size, level: QualityLevel) -> ProgressiveAccumulation:
         field = self._open_field()
-        lens = lens_of(optics, field, size_px[0], self.prefilter, haste)
-        count = rounds_of(lens, field) if haste == NO_HASTE and field.present.any() else 1
-        return Summation(lens, size_px, tuple(even_places(count)))
+        lens = lens_of(optics, field, size_px[0], self.prefilter, level)
+        count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
+        return ProgressiveAccumulation(lens, size_px, tuple(r2_sequence(count)))
 
-    def _draw(self, budget_s: float, rounds: int) -> None:
-        summation = self._current()
-        sample_s = self._refining_s * math.prod(summation.size_px)
-        targets = self._targets_of(summation.size_px)
-        self._drawing.sum_up(self._open_field(), summation, targets, rounds, budget_s, sample_s)
+    def _draw(self, budget_s: float, passes: int) -> None:
+        accumulation = self._current()
+        sample_s = self._refining_s * math.prod(accumulation.size_px)
+        targets = self._targets_of(accumulation.size_px)
+        self._accumulator.sum_up(self._open_field(), accumulation, targets, passes, budget_s, sample_s)
 
     def _finish(self, framebuffer: moderngl.Framebuffer | None) -> None:
         targets = self._targets_of(self._current().size_px)
-        self._drawing.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
+        self._accumulator.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
         self._shown = targets
 
     def _converged_part(
-        self, optics: Optics, size_px: Size, part: PicturePart, is_linear: bool
+        self, optics: Optics, size_px: Size, part: PictureTile, is_linear: bool
     ) -> NDArray[np.uint8 | np.float32]:
-        whole = self._summation_of(optics, size_px, NO_HASTE)
-        summation = replace(whole, lens=replace(whole.lens, part=Window(*part.window)), size_px=part.size_px)
+        whole = self._accumulation_of(optics, size_px, BEST_QUALITY)
+        accumulation = replace(whole, lens=replace(whole.lens, part=TargetWindow(*part.window)), size_px=part.size_px)
         targets = self._targets_of(part.size_px)
-        self._drawing.sum_up(self._open_field(), summation, targets, len(summation.places))
-        target = Target(self.ctx, [self.ctx.texture(part.size_px, 4, dtype="f4" if is_linear else "f1")])
-        self._drawing.finish(summation, targets, target.framebuffer, is_linear)
+        self._accumulator.sum_up(self._open_field(), accumulation, targets, len(accumulation.places))
+        target = RenderTarget(self.ctx, [self.ctx.texture(part.size_px, 4, dtype="f4" if is_linear else "f1")])
+        self._accumulator.finish(accumulation, targets, target.framebuffer, is_linear)
         pixels = read_pixels(target.framebuffer, np.float32 if is_linear else np.uint8)
         unbind(self.ctx)
         target.release()
         return pixels
 
-    def _work(self, optics: Optics, size_px: Size, haste: Haste) -> Work:
+    def _work(self, optics: Optics, size_px: Size, level: QualityLevel) -> DrawCost:
         field = self._open_field()
-        lens = lens_of(optics, field, round(size_px[0] * haste.scale), self.prefilter, haste)
+        lens = lens_of(optics, field, round(size_px[0] * level.scale), self.prefilter, level)
         samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []
-        return Work(
+        return DrawCost(
             samples=len(samples),
             sources=min(lens.most_sources, int(field.present.sum())) if lens.aperture_share < 1 else 0,
-            has_detours=lens.has_dolly or lens.focus_range > 0 or not field.present.all(),
+            has_reprojection=lens.has_dolly or lens.focus_range > 0 or not field.present.all(),
             keeps_layers=lens.keeps_layers,
-            pixels=math.prod(scaled(size_px, haste.scale)),
+            pixels=math.prod(scale_size(size_px, level.scale)),
         )
 
-    def _tell(self, samples: int, seconds: float) -> None:
+    def _learn(self, samples: int, seconds: float) -> None:
         in_all = max(self.samples_converged, samples)
         self.report = DrawReport(samples, in_all, 1e3 * seconds, self._errors.estimate)
 
 
-def scaled(size_px: Size, scale: float) -> Size:
+def scale_size(size_px: Size, scale: float) -> Size:
     """That size times scale, at least one pixel."""
     return max(round(size_px[0] * scale), 1), max(round(size_px[1] * scale), 1)
 

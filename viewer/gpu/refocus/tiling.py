@@ -16,7 +16,7 @@ ALIGNED_PX = 16
 
 
 @dataclass(frozen=True)
-class PicturePart:
+class PictureTile:
     """A rectangle of a picture that is drawn, and what of it is kept.
 
     first_px, size_px: (x, y) and (width, height) of what is drawn. kept_from_px, kept_to_px: (x, y) in the picture.
@@ -41,17 +41,17 @@ class PicturePart:
         return slice(top - y, bottom - y), slice(left - x, right - x)
 
 
-def parts_of(size_px: tuple[int, int], largest_px: int) -> list[PicturePart]:
+def picture_tiles(size_px: tuple[int, int], largest_px: int) -> list[PictureTile]:
     """Parts that together are kept as the whole picture, each at most largest_px wide and high.
 
     size_px: (width, height). A picture that can be drawn at once is one part, without margins.
     """
     side = min(PART_PX, largest_px)
     if max(size_px) <= side:
-        return [PicturePart((0, 0), size_px, (0, 0), size_px, (0.0, 0.0, 1.0, 1.0))]
+        return [PictureTile((0, 0), size_px, (0, 0), size_px, (0.0, 0.0, 1.0, 1.0))]
     (width, height), columns, rows = size_px, _spans(size_px[0], side), _spans(size_px[1], side)
     return [
-        PicturePart(
+        PictureTile(
             (x, y),
             (drawn_x, drawn_y),
             (from_x, from_y),

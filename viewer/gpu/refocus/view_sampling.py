@@ -23,7 +23,7 @@ LEAST_WEIGHT = 2e-4
 """A sample that counts for less is not worth its drawing: it changes white by a twentieth of an 8-bit step."""
 
 
-class Source(NamedTuple):
+class WeightedView(NamedTuple):
     """A stored view that takes part in a picture: its index, and its weight (all weights sum to 1)."""
 
     row: int
@@ -40,13 +40,13 @@ class ApertureSample(NamedTuple):
     weight: float
 
 
-def clamped_to_grid(eye: ViewOffset, grid: GridShape) -> ViewOffset:
+def clamp_to_grid(eye: ViewOffset, grid: GridShape) -> ViewOffset:
     """The point of the grid's rectangle nearest to the eye."""
     first, last = grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)
     return ViewOffset(min(max(eye.t, first.t), last.t), min(max(eye.s, first.s), last.s))
 
 
-def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[Source]:
+def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
     """Up to four views around the eye, nearest first: bilinear where the four corners of its cell are present.
 
     Elsewhere the nearest ones, weighted by reciprocal distance less that of the next view left out: continuous in the
@@ -55,12 +55,12 @@ def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
     return _cell_corners(eye, grid, present) or _nearest_present(eye, grid, present)
 
 
-def pinhole_weights(sources: list[Source], eyes: list[ViewOffset], grid: GridShape) -> NDArray[np.float64]:
+def pinhole_weights(sources: list[WeightedView], eyes: list[ViewOffset], grid: GridShape) -> NDArray[np.float64]:
     """(sources, eyes): bilinear weights for other eyes in the same cell; where the sources are no cell's, as given."""
     rows, columns = {source.row for source in sources}, {source.column for source in sources}
     if max(rows) - min(rows) > 1 or max(columns) - min(columns) > 1 or len(sources) != len(rows) * len(columns):
         return np.repeat([[source.weight] for source in sources], len(eyes), axis=1)
-    inside = [clamped_to_grid(eye, grid) for eye in eyes]
+    inside = [clamp_to_grid(eye, grid) for eye in eyes]
     v, u = (np.array([eye[axis] + grid.centre[axis] for eye in inside]) for axis in (0, 1))
     weights = np.ones((len(sources), len(eyes)))
     for i, source in enumerate(sources):
@@ -69,11 +69,11 @@ def pinhole_weights(sources: list[Source], eyes: list[ViewOffset], grid: GridSha
     return weights
 
 
-def _cell_corners(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[Source]:
-    inside = clamped_to_grid(eye, grid)
+def _cell_corners(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
+    inside = clamp_to_grid(eye, grid)
     v, u = inside.t + grid.centre[0], inside.s + grid.centre[1]
     rows, columns = _bracket(v, grid.rows), _bracket(u, grid.columns)
-    corners = [Source(row, column, wv * wu) for row, wv in rows for column, wu in columns if wv * wu > 0]
+    corners = [WeightedView(row, column, wv * wu) for row, wv in rows for column, wu in columns if wv * wu > 0]
     if not all(present[row, column] for row, column, _ in corners):
         return []
     return sorted(corners, key=lambda source: -source.weight)
@@ -85,7 +85,7 @@ def _bracket(index: float, count: int) -> list[tuple[int, float]]:
     return [(low, 1 - fraction), (min(low + 1, count - 1), fraction)]
 
 
-def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[Source]:
+def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
     rows, columns = np.nonzero(present)
     if len(rows) == 0:
         return []
@@ -96,7 +96,7 @@ def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_
     if closeness.sum() == 0:
         closeness[:] = 1
     weights = closeness / closeness.sum()
-    return [Source(int(rows[i]), int(columns[i]), float(w)) for i, w in zip(order, weights) if w > 1e-5]
+    return [WeightedView(int(rows[i]), int(columns[i]), float(w)) for i, w in zip(order, weights) if w > 1e-5]
 
 
 def aperture_samples(
@@ -128,9 +128,9 @@ def aperture_samples(
         weights = (np.hypot(t - eye.t, s - eye.s) == np.hypot(t - eye.t, s - eye.s).min()).astype(float)
     chosen = weights > LEAST_WEIGHT * weights.sum()
     weights /= weights[chosen].sum()
-    stand_in = nearest_present(present)
+    fallback_view = nearest_present(present)
     return [
-        ApertureSample(wanted, *_answer_to(wanted, grid, stand_in), weight)
+        ApertureSample(wanted, *_fallback_view(wanted, grid, fallback_view), weight)
         for wanted, weight in zip(map(ViewOffset, t[chosen].tolist(), s[chosen].tolist()), weights[chosen].tolist())
     ]
 
@@ -140,10 +140,10 @@ def _lattice(middle: float, reach: float, stride: int, start: float) -> NDArray[
     return start + stride * np.arange(first, last + 1, dtype=float)
 
 
-def _answer_to(wanted: ViewOffset, grid: GridShape, stand_in: NDArray[np.intp]) -> tuple[int, int]:
+def _fallback_view(wanted: ViewOffset, grid: GridShape, fallback_view: NDArray[np.intp]) -> tuple[int, int]:
     row = min(max(math.floor(wanted.t + 0.5) + grid.centre[0], 0), grid.rows - 1)
     column = min(max(math.floor(wanted.s + 0.5) + grid.centre[1], 0), grid.columns - 1)
-    return int(stand_in[row, column, 0]), int(stand_in[row, column, 1])
+    return int(fallback_view[row, column, 0]), int(fallback_view[row, column, 1])
 
 
 def nearest_present(present: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -31,7 +31,7 @@ def read_mask(path: Path) -> ApertureMask:
     grey = _as_share(raster.pixels).mean(axis=2)
     if raster.alpha is not None:
         grey = grey * _as_share(raster.alpha)
-    cells = _averaged(grey)
+    cells = _downsample(grey)
     brightest = float(cells.max())
     values = np.round(255 * cells / brightest).astype(np.uint8) if brightest > 0 else None
     if values is None:
@@ -45,7 +45,7 @@ def _as_share(values: NDArray[Any]) -> NDArray[np.float64]:
     return np.clip(np.nan_to_num(values.astype(np.float64) / full, posinf=0.0), 0, 1)
 
 
-def _averaged(grey: NDArray[np.float64]) -> NDArray[np.float64]:
+def _downsample(grey: NDArray[np.float64]) -> NDArray[np.float64]:
     """Means over blocks, so that neither side has more than LARGEST_SIDE cells."""
     for axis in (0, 1):
         size = grey.shape[axis]

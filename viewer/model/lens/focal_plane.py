@@ -36,12 +36,12 @@ def sharp_disparity(optics: Optics, place: Place) -> float:
     return optics.focus_disparity + optics.focus_tilt[0] * place[0] + optics.focus_tilt[1] * place[1]
 
 
-def focused_on(optics: Optics, place: Place, disparity: float) -> Optics:
+def focus_on(optics: Optics, place: Place, disparity: float) -> Optics:
     """The plane moved, not tilted, so that this disparity is sharp at this place."""
     return replace(optics, focus_disparity=optics.focus_disparity + disparity - sharp_disparity(optics, place))
 
 
-def tilted_through(optics: Optics, moved: Place, disparity: float, kept: Place, aspect: float) -> Optics:
+def tilt_through(optics: Optics, moved: Place, disparity: float, kept: Place, aspect: float) -> Optics:
     """The plane through `disparity` at the moved handle and what is sharp at the kept one; level across that line.
 
     aspect: the picture's height / width, so that "across" means what the eye sees.
@@ -50,7 +50,7 @@ def tilted_through(optics: Optics, moved: Place, disparity: float, kept: Place, 
     across_x, across_y = moved[0] - kept[0], (moved[1] - kept[1]) * aspect
     distance = math.hypot(across_x, across_y)
     if distance < CLOSEST_HANDLES:
-        return focused_on(optics, moved, disparity)
+        return focus_on(optics, moved, disparity)
     slope = (disparity - there) / distance**2
     tilt = (slope * across_x, slope * across_y * aspect)
     return replace(optics, focus_tilt=tilt, focus_disparity=there - tilt[0] * kept[0] - tilt[1] * kept[1])

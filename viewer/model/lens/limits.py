@@ -22,7 +22,7 @@ STEEPEST_TILT = 4.0
 FONT_SCALE_LIMITS = (0.6, 2.5)
 
 
-def clamped(value: float, low: float, high: float) -> float:
+def clamp(value: float, low: float, high: float) -> float:
     """The nearest value from low to high."""
     return float(min(max(value, low), high))
 
@@ -38,9 +38,9 @@ def eye_limits(views: int) -> tuple[float, float]:
     return first - eye_margin(views), last + eye_margin(views)
 
 
-def clamped_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:
+def clamp_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:
     """The nearest viewpoint within the limits."""
-    return ViewOffset(*(clamped(x, *eye_limits(views)) for x, views in zip(eye, grid)))
+    return ViewOffset(*(clamp(x, *eye_limits(views)) for x, views in zip(eye, grid)))
 
 
 def is_extrapolated(eye: ViewOffset, grid: GridShape) -> bool:
@@ -80,29 +80,29 @@ def is_finite(optics: Optics) -> bool:
     return all(map(math.isfinite, (*of_optics, *of_light, *of_shape, *optics.eye, *optics.focus_tilt)))
 
 
-def clamped_optics(optics: Optics, scene: Scene) -> Optics:
+def clamp_optics(optics: Optics, scene: Scene) -> Optics:
     """The nearest optics that this scene allows. All numbers must be finite."""
     span = focus_span(scene)
-    tilt_x, tilt_y = (clamped(tilt, -STEEPEST_TILT * span, STEEPEST_TILT * span) for tilt in optics.focus_tilt)
+    tilt_x, tilt_y = (clamp(tilt, -STEEPEST_TILT * span, STEEPEST_TILT * span) for tilt in optics.focus_tilt)
     return Optics(
-        eye=clamped_eye(optics.eye, scene.grid),
-        dolly=clamped(optics.dolly, -dolly_limit(scene.grid), dolly_limit(scene.grid)),
-        focus_disparity=clamped(optics.focus_disparity, *focus_limits(scene)),
-        focus_range=clamped(optics.focus_range, 0.0, span),
+        eye=clamp_eye(optics.eye, scene.grid),
+        dolly=clamp(optics.dolly, -dolly_limit(scene.grid), dolly_limit(scene.grid)),
+        focus_disparity=clamp(optics.focus_disparity, *focus_limits(scene)),
+        focus_range=clamp(optics.focus_range, 0.0, span),
         focus_tilt=(tilt_x, tilt_y),
-        aperture_diameter=clamped(optics.aperture_diameter, 0.0, aperture_limit(scene.grid)),
-        aperture_shape=_clamped_shape(optics.aperture_shape),
-        highlight_recovery=clamped(optics.highlight_recovery, 0.0, 1.0),
-        exposure_stops=clamped(optics.exposure_stops, -EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS),
+        aperture_diameter=clamp(optics.aperture_diameter, 0.0, aperture_limit(scene.grid)),
+        aperture_shape=_clamp_shape(optics.aperture_shape),
+        highlight_recovery=clamp(optics.highlight_recovery, 0.0, 1.0),
+        exposure_stops=clamp(optics.exposure_stops, -EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS),
     )
 
 
-def _clamped_shape(shape: ApertureShape) -> ApertureShape:
+def _clamp_shape(shape: ApertureShape) -> ApertureShape:
     return replace(
         shape,
         kind="disc" if shape.kind == "mask" and shape.mask is None else shape.kind,
-        blades=round(clamped(shape.blades, *BLADES_LIMITS)),
+        blades=round(clamp(shape.blades, *BLADES_LIMITS)),
         rotation_deg=shape.rotation_deg % 360.0 % 360.0,  # the first may round up to 360
-        ring_inner=clamped(shape.ring_inner, 0.0, RING_INNER_LIMIT),
-        cat_eye=clamped(shape.cat_eye, 0.0, 1.0),
+        ring_inner=clamp(shape.ring_inner, 0.0, RING_INNER_LIMIT),
+        cat_eye=clamp(shape.cat_eye, 0.0, 1.0),
     )

@@ -16,14 +16,14 @@ FULL_FRAME_WIDTH_M = 0.036
 
 def relative_distance(scene: Scene, disparity: float) -> float | None:
     """Distance of a field disparity, 1 = the plane that stays still; None where not known or beyond infinity."""
-    given = _given(scene, disparity)
-    still = _given(scene, 0.0)
+    given = _disparity_as_given(scene, disparity)
+    still = _disparity_as_given(scene, 0.0)
     return still / given if given is not None and still is not None and given > 0 and still > 0 else None
 
 
 def disparity_at(scene: Scene, distance: float) -> float | None:
     """The inverse of `relative_distance`."""
-    still = _given(scene, 0.0)
+    still = _disparity_as_given(scene, 0.0)
     if still is None or scene.plan is None or still <= 0 or distance <= 0:
         return None
     return (still / distance - scene.plan.disparity_zero) * scene.plan.disparity_scale
@@ -38,7 +38,7 @@ def distance_limits(scene: Scene) -> tuple[float, float] | None:
 
 def f_number(scene: Scene, aperture_diameter: float) -> float | None:
     """The f-number of an aperture in view steps; None where not known, and for a pinhole."""
-    still = _given(scene, 0.0)
+    still = _disparity_as_given(scene, 0.0)
     if still is None or scene.plan is None or scene.focal_px is None or still <= 0 or aperture_diameter <= 0:
         return None
     view_step_m = abs(scene.plan.disparity_scale) * still * ASSUMED_DISTANCE_M / scene.focal_px
@@ -46,7 +46,7 @@ def f_number(scene: Scene, aperture_diameter: float) -> float | None:
     return focal_m / (aperture_diameter * view_step_m)
 
 
-def _given(scene: Scene, disparity: float) -> float | None:
+def _disparity_as_given(scene: Scene, disparity: float) -> float | None:
     """The disparity as given, before the plan; None where that tells no distance."""
     plan = scene.plan
     if scene.focal_px is None or plan is None or plan.disparity_scale == 0:

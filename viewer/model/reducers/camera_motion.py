@@ -19,17 +19,17 @@ LOOP_REACH = 0.8
 """Of the grid's radius: the loops stay within what is stored."""
 
 
-def begun(motion: Motion, kind: LoopKind | None, optics: Optics) -> Motion:
+def start_motion(motion: Motion, kind: LoopKind | None, optics: Optics) -> Motion:
     """The motion that starts at the present viewpoint; None stops."""
     return Motion(kind, start=optics.eye, start_dolly=optics.dolly, speed=motion.speed)
 
 
-def homeward(motion: Motion, optics: Optics) -> Motion:
+def glide_home(motion: Motion, optics: Optics) -> Motion:
     """The glide to the middle viewpoint."""
     return Motion("home", start=optics.eye, start_dolly=optics.dolly, speed=motion.speed)
 
 
-def stepped(motion: Motion, optics: Optics, grid: GridShape, now_s: float) -> tuple[Motion, Optics]:
+def advance_motion(motion: Motion, optics: Optics, grid: GridShape, now_s: float) -> tuple[Motion, Optics]:
     """Motion and optics when the clock shows now_s. A glide that has arrived is over."""
     if not motion.is_running or not math.isfinite(now_s):
         return motion, optics
@@ -37,17 +37,17 @@ def stepped(motion: Motion, optics: Optics, grid: GridShape, now_s: float) -> tu
     turns = motion.turns + step_s * (1 / HOME_S if motion.kind == "home" else motion.speed)
     motion = replace(motion, turns=turns, ticked_s=now_s)
     if motion.kind == "home":
-        left = 1 - eased(turns)
+        left = 1 - ease(turns)
         eye = ViewOffset(motion.start.t * left, motion.start.s * left)
         there = replace(optics, eye=eye, dolly=motion.start_dolly * left)
         return (replace(motion, kind=None), replace(there, eye=CENTRE, dolly=0.0)) if turns >= 1 else (motion, there)
-    share = eased(turns / EASE_IN_TURNS)
-    goal = on_path(motion.kind, turns, grid)
+    share = ease(turns / EASE_IN_TURNS)
+    goal = point_on_loop(motion.kind, turns, grid)
     eye = ViewOffset(*(a + share * (b - a) for a, b in zip(motion.start, goal)))
     return motion, replace(optics, eye=eye)
 
 
-def on_path(kind: LoopKind | None, turns: float, grid: GridShape) -> ViewOffset:
+def point_on_loop(kind: LoopKind | None, turns: float, grid: GridShape) -> ViewOffset:
     """The viewpoint on a loop after so many turns, in view steps from the middle of the grid's views."""
     angle = 2 * math.pi * turns
     match kind:
@@ -62,7 +62,7 @@ def on_path(kind: LoopKind | None, turns: float, grid: GridShape) -> ViewOffset:
     return ViewOffset((rows - 1) / 2 - v + down * radius_t, (columns - 1) / 2 - u + right * radius_s)
 
 
-def eased(share: float) -> float:
+def ease(share: float) -> float:
     """0..1 to 0..1, slow at both ends."""
     x = min(max(share, 0.0), 1.0)
     return x * x * (3 - 2 * x)

@@ -6,14 +6,14 @@ from dataclasses import replace
 from math import hypot, isfinite
 
 from iibr_core.depth.editing.edits import GAMMA_LIMITS, MOST_POINTS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
-from viewer.model.lens.limits import clamped
-from viewer.model.reducers.history import recorded
-from viewer.model.reducers.worker_events import noticed
+from viewer.model.lens.limits import clamp
+from viewer.model.reducers.history import record_edit
+from viewer.model.reducers.worker_events import add_notice
 from viewer.model.state.app_state import AppState, Notice
 from viewer.model.state.depth_editing import (
     Brush,
-    DepthEdit,
-    DepthWork,
+    DepthAction,
+    DepthSettings,
     DropStroke,
     Paint,
     ResetDepth,
@@ -28,41 +28,43 @@ LEAST_CLIP_GAP = 0.01
 NO_DEPTH_HERE = "The depth of a light field read from disk cannot be edited; open a photo."
 
 
-def depth_edited(state: AppState, action: DepthEdit) -> AppState:
+def reduce_depth(state: AppState, action: DepthAction) -> AppState:
     """The state after an action on the depth."""
     if state.scene is None or state.source is None:
         return state
     if state.scene.plan is None:
-        return noticed(state, Notice(NO_DEPTH_HERE)) if isinstance(action, SetBrush) and action.brush.is_on else state
+        return (
+            add_notice(state, Notice(NO_DEPTH_HERE)) if isinstance(action, SetBrush) and action.brush.is_on else state
+        )
     match action:
         case SetRefine(strength, is_finished) if isfinite(strength):
-            work = replace(state.depth, refine=clamped(strength, 0.0, 1.0))
-            return _worked(state, work, "SetRefine", is_finished)
+            depth_settings = replace(state.depth, refine=clamp(strength, 0.0, 1.0))
+            return _with_settings(state, depth_settings, "SetRefine", is_finished)
         case SetTone(tone, is_finished) if all(map(isfinite, (tone.far_clip, tone.near_clip, tone.gamma))):
-            edits = replace(_clamped_tone(tone, state.depth.edits), strokes=state.depth.edits.strokes)
-            return _worked(state, replace(state.depth, edits=edits), "SetTone", is_finished)
+            edits = replace(_clamp_tone(tone, state.depth.edits), strokes=state.depth.edits.strokes)
+            return _with_settings(state, replace(state.depth, edits=edits), "SetTone", is_finished)
         case SetBrush(brush) if isfinite(brush.radius) and isfinite(brush.strength):
-            return replace(state, brush=_clamped_brush(brush))
+            return replace(state, brush=_clamp_brush(brush))
         case Paint(place) if all(map(isfinite, place)):
-            return _painted(state, place)
+            return _paint(state, place)
         case DropStroke() if state.stroke is not None:
             # the worker was stopped when the stroke began
             return replace(state, stroke=None, generation=state.generation + 1)
         case ResetDepth():
-            return _worked(state, DepthWork(state.scene.source.refine), "ResetDepth", is_finished=True)
+            return _with_settings(state, DepthSettings(state.scene.source.refine), "ResetDepth", is_finished=True)
     return state
 
 
-def stroke_ended(state: AppState) -> AppState:
+def end_stroke(state: AppState) -> AppState:
     """The pointer went up: the stroke under way is one of the edits now."""
     if state.stroke is None:
         return state
     edits = state.depth.edits
-    work = replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, state.stroke)))
-    return _worked(replace(state, stroke=None), work, "Paint", is_finished=True)
+    depth_settings = replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, state.stroke)))
+    return _with_settings(replace(state, stroke=None), depth_settings, "Paint", is_finished=True)
 
 
-def wanted_work(state: AppState) -> DepthWork:
+def current_depth_settings(state: AppState) -> DepthSettings:
     """What is to be made of the depth of the open scene, the stroke under way included."""
     if state.stroke is None:
         return state.depth
@@ -70,25 +72,25 @@ def wanted_work(state: AppState) -> DepthWork:
     return replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, state.stroke)))
 
 
-def work_asked_for(state: AppState) -> DepthWork:
+def depth_settings_for_worker(state: AppState) -> DepthSettings:
     """What the worker is to make of the depth. Where another scene is asked for, it begins with its own."""
     source, scene = state.source, state.scene
     is_open = source is None or (scene is not None and scene.source is source)
-    return state.depth if source is None or is_open else DepthWork(source.refine)
+    return state.depth if source is None or is_open else DepthSettings(source.refine)
 
 
-def is_depth_ahead(state: AppState, asked_for: DepthWork) -> bool:
+def is_depth_ahead(state: AppState, asked_for: DepthSettings) -> bool:
     """Whether the depth of the open scene is being edited: it is not what the worker was asked for."""
     is_open = state.scene is not None and state.scene.source is state.source
-    return is_open and wanted_work(state) != asked_for
+    return is_open and current_depth_settings(state) != asked_for
 
 
-def _worked(state: AppState, work: DepthWork, kind: str, is_finished: bool) -> AppState:
-    after = replace(state, depth=work, generation=state.generation + is_finished)
-    return recorded(state, after, kind)
+def _with_settings(state: AppState, depth_settings: DepthSettings, kind: str, is_finished: bool) -> AppState:
+    after = replace(state, depth=depth_settings, generation=state.generation + is_finished)
+    return record_edit(state, after, kind)
 
 
-def _painted(state: AppState, place: tuple[float, float]) -> AppState:
+def _paint(state: AppState, place: tuple[float, float]) -> AppState:
     scene, stroke, brush = state.scene, state.stroke, state.brush
     assert scene is not None
     if stroke is None:
@@ -100,17 +102,17 @@ def _painted(state: AppState, place: tuple[float, float]) -> AppState:
     return replace(state, stroke=replace(stroke, points=(*stroke.points, place)))
 
 
-def _clamped_tone(tone: DepthEdits, before: DepthEdits) -> DepthEdits:
+def _clamp_tone(tone: DepthEdits, before: DepthEdits) -> DepthEdits:
     """Gamma and clips within their limits; the clip that was moved gives way to the other."""
-    far, near = clamped(tone.far_clip, 0.0, 1.0), clamped(tone.near_clip, 0.0, 1.0)
+    far, near = clamp(tone.far_clip, 0.0, 1.0), clamp(tone.near_clip, 0.0, 1.0)
     if far > near - LEAST_CLIP_GAP and far != before.far_clip:
         far = max(near - LEAST_CLIP_GAP, 0.0)
     if near < far + LEAST_CLIP_GAP:
         near = min(far + LEAST_CLIP_GAP, 1.0)
     return replace(
-        UNEDITED, is_inverted=tone.is_inverted, far_clip=far, near_clip=near, gamma=clamped(tone.gamma, *GAMMA_LIMITS)
+        UNEDITED, is_inverted=tone.is_inverted, far_clip=far, near_clip=near, gamma=clamp(tone.gamma, *GAMMA_LIMITS)
     )
 
 
-def _clamped_brush(brush: Brush) -> Brush:
-    return replace(brush, radius=clamped(brush.radius, *RADIUS_LIMITS), strength=clamped(brush.strength, 0.0, 1.0))
+def _clamp_brush(brush: Brush) -> Brush:
+    return replace(brush, radius=clamp(brush.radius, *RADIUS_LIMITS), strength=clamp(brush.strength, 0.0, 1.0))

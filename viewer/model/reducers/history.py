@@ -15,7 +15,7 @@ def edit_of(state: AppState) -> Edit:
     return Edit(state.optics, state.depth_strength, state.depth)
 
 
-def recorded(before: AppState, after: AppState, kind: str, always: bool = False) -> AppState:
+def record_edit(before: AppState, after: AppState, kind: str, always: bool = False) -> AppState:
     """`after`, with what it replaced remembered; nothing if nothing changed, unless `always`.
 
     kind: edits of one kind in a row are one, until the gesture ends.
@@ -28,32 +28,32 @@ def recorded(before: AppState, after: AppState, kind: str, always: bool = False)
     return replace(after, history=History(past, (), kind, kind))
 
 
-def gesture_ended(state: AppState) -> AppState:
+def end_gesture(state: AppState) -> AppState:
     """The next edit is one of its own, and no tilt handle is held."""
     if state.tilt_handles is not None and state.tilt_handles.taken is not None:
         state = replace(state, tilt_handles=replace(state.tilt_handles, taken=None))
     return replace(state, history=replace(state.history, gesture="")) if state.history.gesture else state
 
 
-def undone(state: AppState) -> AppState:
+def undo(state: AppState) -> AppState:
     """The state before the last edit that made a difference; without one, the same."""
     now, past = edit_of(state), state.history.past
     while past and past[-1] == now:
         past = past[:-1]
     if not past:
         return replace(state, history=replace(state.history, past=()))
-    return _restored(state, past[-1], History(past[:-1], (now, *state.history.future)))
+    return _restore(state, past[-1], History(past[:-1], (now, *state.history.future)))
 
 
-def redone(state: AppState) -> AppState:
-    """The state before the last `undone`; without one, the same."""
+def redo(state: AppState) -> AppState:
+    """The state before the last `undo`; without one, the same."""
     if not state.history.future:
         return state
     edit, *rest = state.history.future
-    return _restored(state, edit, History((*state.history.past, edit_of(state)), tuple(rest)))
+    return _restore(state, edit, History((*state.history.past, edit_of(state)), tuple(rest)))
 
 
-def mapped(history: History, carried: Callable[[Optics], Optics]) -> History:
+def map_optics(history: History, carried: Callable[[Optics], Optics]) -> History:
     """The history in the units of another plan of the same scene."""
     past, future = (
         tuple(replace(edit, optics=carried(edit.optics)) for edit in edits) for edits in (history.past, history.future)
@@ -61,7 +61,7 @@ def mapped(history: History, carried: Callable[[Optics], Optics]) -> History:
     return replace(history, past=past, future=future)
 
 
-def _restored(state: AppState, edit: Edit, history: History) -> AppState:
+def _restore(state: AppState, edit: Edit, history: History) -> AppState:
     """Other depth needs a new field, which then brings the optics along."""
     is_same_depth = (edit.depth_strength, edit.depth) == (state.depth_strength, state.depth)
     restarts = not is_same_depth and state.source is not None

@@ -6,14 +6,14 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from viewer.model.lens.limits import clamped
-from viewer.model.reducers.worker_events import noticed
+from viewer.model.lens.limits import clamp
+from viewer.model.reducers.worker_events import add_notice
 from viewer.model.state.app_state import AppState, ChooseTask, Hover, Notice, Scene
 from viewer.model.state.inspection import (
     Compare,
     Comparison,
     GroundTruth,
-    InspectionEdit,
+    InspectionAction,
     MoveDivider,
     OverlayKind,
     PairCompared,
@@ -33,7 +33,7 @@ NOT_MADE_HERE = "Only of views made here: these were read from disk."
 NO_DISPARITY = "These views come without disparity."
 
 
-def inspected(state: AppState, action: InspectionEdit) -> AppState:
+def reduce_inspection(state: AppState, action: InspectionAction) -> AppState:
     """The state after an inspection action."""
     match action:
         case ShowEpis(is_shown):
@@ -43,15 +43,15 @@ def inspected(state: AppState, action: InspectionEdit) -> AppState:
         case ShowValues(is_shown):
             return _with(state, shows_values=is_shown, probe=None)
         case SetOverlay(kind):
-            return _overlaid(state, kind)
+            return _set_overlay(state, kind)
         case SetOpacity(opacity) if math.isfinite(opacity):
-            return _with(state, opacity=clamped(opacity, 0.0, 1.0))
+            return _with(state, opacity=clamp(opacity, 0.0, 1.0))
         case Compare(comparison):
-            return _compared(state, comparison)
+            return _set_comparison(state, comparison)
         case MoveDivider(place) if math.isfinite(place):
-            return _with(state, divider=clamped(place, DIVIDER_MARGIN, 1 - DIVIDER_MARGIN), divider_taken=True)
+            return _with(state, divider=clamp(place, DIVIDER_MARGIN, 1 - DIVIDER_MARGIN), divider_taken=True)
         case TruthRead(truth):
-            return _truth_read(state, truth)
+            return _set_truth(state, truth)
         case PairCompared(pair) if pair.kind == state.inspection.comparison and pair.generation == state.generation:
             return _with(state, pair=pair)
         case Probed(probe):
@@ -59,12 +59,12 @@ def inspected(state: AppState, action: InspectionEdit) -> AppState:
     return state
 
 
-def divider_released(state: AppState) -> AppState:
+def release_divider(state: AppState) -> AppState:
     """The pointer went up: the divider is not held any more."""
     return _with(state, divider_taken=False) if state.inspection.divider_taken else state
 
 
-def pointed_at(state: AppState, hover: Hover | None) -> AppState:
+def move_pointer(state: AppState, hover: Hover | None) -> AppState:
     """The pointer is here. Where it was last in the picture is remembered, and what was found elsewhere is not."""
     if hover is None:
         return _with(replace(state, hover=None), probe=None)
@@ -101,28 +101,28 @@ def misfit(truth: GroundTruth, scene: Scene) -> str:
     return ""
 
 
-def _overlaid(state: AppState, kind: OverlayKind | None) -> AppState:
+def _set_overlay(state: AppState, kind: OverlayKind | None) -> AppState:
     if kind is None or state.scene is None:
         return _with(state, overlay=None)
     obstacle = obstacle_to_overlay(state.scene, kind)
-    return noticed(state, Notice(obstacle)) if obstacle else _with(state, overlay=kind, comparison=None, pair=None)
+    return add_notice(state, Notice(obstacle)) if obstacle else _with(state, overlay=kind, comparison=None, pair=None)
 
 
-def _compared(state: AppState, kind: Comparison | None) -> AppState:
+def _set_comparison(state: AppState, kind: Comparison | None) -> AppState:
     if kind is None or state.scene is None:
         return _with(state, comparison=None, pair=None, divider_taken=False)
     if kind == "truth" and state.inspection.truth is None:
         return replace(state, tasks=(*state.tasks, ChooseTask("truth")))
     obstacle = obstacle_to_comparison(state.scene, kind)
-    return noticed(state, Notice(obstacle)) if obstacle else _with(state, comparison=kind, overlay=None, pair=None)
+    return add_notice(state, Notice(obstacle)) if obstacle else _with(state, comparison=kind, overlay=None, pair=None)
 
 
-def _truth_read(state: AppState, truth: GroundTruth) -> AppState:
+def _set_truth(state: AppState, truth: GroundTruth) -> AppState:
     if state.scene is None:
         return state
     problem = misfit(truth, state.scene)
     if problem:
-        return noticed(state, Notice(problem, is_error=True))
+        return add_notice(state, Notice(problem, is_error=True))
     return _with(state, truth=truth, comparison="truth", overlay=None, pair=None)
 
 

@@ -8,9 +8,9 @@ from iibr_core.types import ViewOffset
 from viewer.model.actions import (
     ApplyPreset,
     FocusOn,
+    LensAction,
     MoveEye,
     MoveTiltHandle,
-    OpticsEdit,
     ResetOptics,
     SetAperture,
     SetApertureShape,
@@ -21,23 +21,23 @@ from viewer.model.actions import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.lens.focal_plane import focused_on, sharp_disparity, tilted_through
-from viewer.model.lens.limits import aperture_limit, clamped, clamped_eye, clamped_optics, is_finite
+from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
+from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, is_finite
 from viewer.model.lens.presets import preset_optics
 from viewer.model.state.app_state import AppState, Optics, Scene, TiltHandles
 
 
-def optics_edited(state: AppState, action: OpticsEdit) -> AppState:
+def reduce_lens(state: AppState, action: LensAction) -> AppState:
     """The state with edited optics; the same state where no scene is open or a value is not finite."""
     if state.scene is None:
         return state
-    optics = _edited(state.optics, state.scene, action)
+    optics = _edit_optics(state.optics, state.scene, action)
     if isinstance(action, MoveTiltHandle):
-        return _handle_moved(state, state.scene, action)
-    return replace(state, optics=clamped_optics(optics, state.scene)) if is_finite(optics) else state
+        return _move_handle(state, state.scene, action)
+    return replace(state, optics=clamp_optics(optics, state.scene)) if is_finite(optics) else state
 
 
-def _edited(optics: Optics, scene: Scene, action: OpticsEdit) -> Optics:
+def _edit_optics(optics: Optics, scene: Scene, action: LensAction) -> Optics:
     match action:
         case MoveEye(eye):
             return replace(optics, eye=eye)
@@ -46,7 +46,7 @@ def _edited(optics: Optics, scene: Scene, action: OpticsEdit) -> Optics:
         case SetFocus(disparity):
             return replace(optics, focus_disparity=disparity)
         case FocusOn(place, disparity):
-            return focused_on(optics, place, disparity)
+            return focus_on(optics, place, disparity)
         case SetFocusRange(disparity):
             return replace(optics, focus_range=disparity)
         case SetTilt(tilt):
@@ -66,21 +66,21 @@ def _edited(optics: Optics, scene: Scene, action: OpticsEdit) -> Optics:
     return optics
 
 
-def _handle_moved(state: AppState, scene: Scene, action: MoveTiltHandle) -> AppState:
+def _move_handle(state: AppState, scene: Scene, action: MoveTiltHandle) -> AppState:
     """The handle goes where the pointer is, and the plane of focus runs through what lies there."""
     handles = state.tilt_handles or TiltHandles()
-    x, y = (clamped(value, -1.0, 1.0) for value in action.place)
+    x, y = (clamp(value, -1.0, 1.0) for value in action.place)
     old, kept = (handles.first, handles.second) if action.index == 0 else (handles.second, handles.first)
     disparity = sharp_disparity(state.optics, old) if action.disparity is None else action.disparity
-    optics = tilted_through(state.optics, (x, y), disparity, kept, scene.height / scene.width)
+    optics = tilt_through(state.optics, (x, y), disparity, kept, scene.height / scene.width)
     if not is_finite(optics):
         return state
     first, second = ((x, y), kept) if action.index == 0 else (kept, (x, y))
     moved = TiltHandles(first, second, taken=action.index)
-    return replace(state, optics=clamped_optics(optics, scene), tilt_handles=moved)
+    return replace(state, optics=clamp_optics(optics, scene), tilt_handles=moved)
 
 
-def carried_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
+def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
     """The optics that show a newly planned scene as it was seen before; a scene not seen before starts afresh."""
     if old is None or old.source is not new.source or old.plan is None or new.plan is None:
         return Optics()
@@ -92,7 +92,7 @@ def carried_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
     aperture = min(optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0]), aperture_limit(new.grid))
     return replace(
         optics,
-        eye=clamped_eye(eye, new.grid),
+        eye=clamp_eye(eye, new.grid),
         dolly=optics.dolly * columns,
         focus_disparity=optics.focus_disparity * ratio + shift,
         focus_range=optics.focus_range * abs(ratio),

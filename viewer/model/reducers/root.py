@@ -1,4 +1,4 @@
-"""`apply`: the only place where the state changes. Pure; what the outside world must do comes out as tasks."""
+"""`reduce`: the only place where the state changes. Pure; what the outside world must do comes out as tasks."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from viewer.model.actions import (
     DoTask,
     EndGesture,
     FocusOn,
-    MotionEdit,
+    LensAction,
+    MotionAction,
     MoveEye,
     Notify,
     OpenPath,
-    OpticsEdit,
     PauseMotion,
     PictureDrawn,
     PlaceWindow,
+    PreferencesAction,
     Quit,
     Redo,
     ResetOptics,
@@ -34,7 +35,6 @@ from viewer.model.actions import (
     SetLoop,
     SetSpeed,
     SetTheme,
-    SettingsEdit,
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
@@ -43,23 +43,23 @@ from viewer.model.actions import (
     Tick,
     ToggleSection,
     Undo,
+    WorkerEvent,
     WorkerLost,
-    WorkerNews,
 )
 from viewer.model.lens.limits import (
     DEPTH_STRENGTH_LIMIT,
     FONT_SCALE_LIMITS,
     SPEED_LIMITS,
-    clamped,
-    clamped_optics,
+    clamp,
+    clamp_optics,
     is_finite,
 )
-from viewer.model.reducers.camera_motion import begun, homeward, stepped
-from viewer.model.reducers.depth_editing import depth_edited, stroke_ended
-from viewer.model.reducers.history import gesture_ended, recorded, redone, undone
-from viewer.model.reducers.inspection import divider_released, inspected, pointed_at
-from viewer.model.reducers.lens import optics_edited
-from viewer.model.reducers.worker_events import heard, noticed, stopped
+from viewer.model.reducers.camera_motion import advance_motion, glide_home, start_motion
+from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
+from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
+from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
+from viewer.model.reducers.lens import reduce_lens
+from viewer.model.reducers.worker_events import add_notice, reduce_worker_event, stop_work
 from viewer.model.state.app_state import (
     SECTIONS,
     AppState,
@@ -73,42 +73,42 @@ from viewer.model.state.app_state import (
     SavePrompt,
     TiltHandles,
 )
-from viewer.model.state.depth_editing import DepthEdit
-from viewer.model.state.inspection import InspectionEdit
+from viewer.model.state.depth_editing import DepthAction
+from viewer.model.state.inspection import InspectionAction
 
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
 
 
-def apply(state: AppState, action: Action) -> AppState:
+def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
-    if isinstance(action, OpticsEdit):
+    if isinstance(action, LensAction):
         moves = isinstance(action, MoveEye | SetDolly | ResetOptics)
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
-        edited = optics_edited(still, action)
+        edited = reduce_lens(still, action)
         # ReturnHome takes the click back that it began with: so a click is remembered even where it changed nothing
         is_click = isinstance(action, FocusOn) and state.scene is not None
-        return recorded(state, edited, type(action).__name__, always=is_click)
-    if isinstance(action, MotionEdit):
-        return _moved(state, action)
-    if isinstance(action, WorkerNews):
-        return heard(state, action)
-    if isinstance(action, InspectionEdit):
-        return inspected(state, action)
-    if isinstance(action, DepthEdit):
-        return depth_edited(state, action)
-    if isinstance(action, SettingsEdit):
-        return replace(state, preferences=_preferences_edited(state.preferences, action))
+        return record_edit(state, edited, type(action).__name__, always=is_click)
+    if isinstance(action, MotionAction):
+        return _reduce_motion(state, action)
+    if isinstance(action, WorkerEvent):
+        return reduce_worker_event(state, action)
+    if isinstance(action, InspectionAction):
+        return reduce_inspection(state, action)
+    if isinstance(action, DepthAction):
+        return reduce_depth(state, action)
+    if isinstance(action, PreferencesAction):
+        return replace(state, preferences=_reduce_preferences(state.preferences, action))
     match action:
         case SetDepthStrength():
-            return recorded(state, _depth_strength_set(state, action), "SetDepthStrength")
+            return record_edit(state, _set_depth_strength(state, action), "SetDepthStrength")
         case TakeSettings(settings):
-            return recorded(state, _settings_taken(state, settings), "TakeSettings")
+            return record_edit(state, _take_settings(state, settings), "TakeSettings")
         case EndGesture():
-            return divider_released(gesture_ended(stroke_ended(state)))
+            return release_divider(end_gesture(end_stroke(state)))
         case Undo():
-            return undone(state)
+            return undo(state)
         case Redo():
-            return redone(state)
+            return redo(state)
         case Quit():
             return replace(state, should_quit=True)
     return _file_or_prompt(state, action)
@@ -121,11 +121,13 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             generation = state.generation + 1
             return replace(state, source=source, progress=progress, generation=generation, prompt=None)
         case StopWork():
-            return stopped(state)
+            return stop_work(state)
         case ResumeWork() if state.scene is not None:
             return replace(state, generation=state.generation + 1, stopped=None)
         case WorkerLost():
-            return replace(noticed(state, Notice(LOST, is_error=True)), progress=Progress(), stopped=state.generation)
+            return replace(
+                add_notice(state, Notice(LOST, is_error=True)), progress=Progress(), stopped=state.generation
+            )
         case DoTask(task):
             return replace(state, tasks=(*state.tasks, task))
         case TaskTaken(task):
@@ -140,9 +142,9 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case PictureDrawn(report):
             return replace(state, report=report)
         case SetHover(hover):
-            return pointed_at(state, hover)
+            return move_pointer(state, hover)
         case Notify(notice):
-            return noticed(state, notice)
+            return add_notice(state, notice)
         case DismissNotice(notice):
             return replace(state, notices=tuple(other for other in state.notices if other != notice))
         case ShowTiltHandles(is_shown):
@@ -150,24 +152,26 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
     return state
 
 
-def _moved(state: AppState, action: MotionEdit) -> AppState:
+def _reduce_motion(state: AppState, action: MotionAction) -> AppState:
     motion, scene = state.motion, state.scene
     if scene is None:
         return state
     match action:
         case ReturnHome():
             state = _without_click(state)
-            gliding = replace(state, motion=homeward(motion, state.optics))
-            return recorded(state, gliding, "ReturnHome", always=True)
+            gliding = replace(state, motion=glide_home(motion, state.optics))
+            return record_edit(state, gliding, "ReturnHome", always=True)
         case SetLoop(kind):
-            return recorded(state, replace(state, motion=begun(motion, kind, state.optics)), "SetLoop", always=True)
+            return record_edit(
+                state, replace(state, motion=start_motion(motion, kind, state.optics)), "SetLoop", always=True
+            )
         case SetSpeed(speed) if math.isfinite(speed):
-            return replace(state, motion=replace(motion, speed=clamped(speed, *SPEED_LIMITS)))
+            return replace(state, motion=replace(motion, speed=clamp(speed, *SPEED_LIMITS)))
         case PauseMotion(is_paused):
             return replace(state, motion=replace(motion, is_paused=is_paused, ticked_s=None))
         case Tick(now_s):
-            motion, optics = stepped(motion, state.optics, scene.grid, now_s)
-            return replace(state, motion=motion, optics=clamped_optics(optics, scene))
+            motion, optics = advance_motion(motion, state.optics, scene.grid, now_s)
+            return replace(state, motion=motion, optics=clamp_optics(optics, scene))
     return state
 
 
@@ -179,29 +183,29 @@ def _without_click(state: AppState) -> AppState:
     return replace(state, optics=history.past[-1].optics, history=replace(history, past=history.past[:-1], last=""))
 
 
-def _depth_strength_set(state: AppState, action: SetDepthStrength) -> AppState:
+def _set_depth_strength(state: AppState, action: SetDepthStrength) -> AppState:
     if not math.isfinite(action.strength):
         return state
-    strength = clamped(action.strength, 0.0, DEPTH_STRENGTH_LIMIT)
+    strength = clamp(action.strength, 0.0, DEPTH_STRENGTH_LIMIT)
     restarts = action.is_finished and state.source is not None
     return replace(state, depth_strength=strength, generation=state.generation + restarts)
 
 
-def _settings_taken(state: AppState, settings: SavedSettings) -> AppState:
+def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
     """The optics, made to fit. What needs a new field, depth strength and all that is decided at opening, stays."""
     if state.scene is None or not is_finite(settings.optics):
         return state
-    optics = clamped_optics(settings.optics, state.scene)
+    optics = clamp_optics(settings.optics, state.scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
     return replace(state, optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
 
 
-def _preferences_edited(preferences: Preferences, action: SettingsEdit) -> Preferences:
+def _reduce_preferences(preferences: Preferences, action: PreferencesAction) -> Preferences:
     match action:
         case SetTheme(theme):
             return replace(preferences, theme=theme)
         case SetFontScale(scale) if math.isfinite(scale):
-            return replace(preferences, font_scale=clamped(scale, *FONT_SCALE_LIMITS))
+            return replace(preferences, font_scale=clamp(scale, *FONT_SCALE_LIMITS))
         case ToggleSection(section):
             is_open = preferences.open_sections
             return replace(preferences, open_sections=tuple(s for s in SECTIONS if (s in is_open) != (s == section)))

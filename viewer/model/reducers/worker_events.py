@@ -5,45 +5,45 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.types import InputError
-from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerNews
-from viewer.model.reducers.history import mapped
-from viewer.model.reducers.lens import carried_optics
+from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerEvent
+from viewer.model.reducers.history import map_optics
+from viewer.model.reducers.lens import carry_optics
 from viewer.model.saved_settings import settings_from_text
 from viewer.model.state.app_state import AppState, History, Motion, Notice, Progress, Scene
-from viewer.model.state.depth_editing import DepthWork
+from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import of_next_scene
 
 NOTICES_KEPT = 5
 RECENT_KEPT = 8
 
 
-def heard(state: AppState, news: WorkerNews) -> AppState:
+def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
     """The state after a word of the worker."""
     if news.generation != state.generation:
         return state
     match news:
         case SceneOpened(_, scene):
-            return _opened(state, scene)
+            return _open_scene(state, scene)
         case ProgressMade(_, progress, view):
             there = state.views_there if view is None else state.views_there | {view}
             shown = state.progress if state.stopped == state.generation else progress
             return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
-            return _left(noticed(state, Notice(message, is_error=True)))
+            return _leave_job(add_notice(state, Notice(message, is_error=True)))
 
 
-def noticed(state: AppState, notice: Notice) -> AppState:
+def add_notice(state: AppState, notice: Notice) -> AppState:
     """The state with one more notice; the oldest go."""
     others = tuple(other for other in state.notices if other != notice)
     return replace(state, notices=(*others, notice)[-NOTICES_KEPT:])
 
 
-def stopped(state: AppState) -> AppState:
+def stop_work(state: AppState) -> AppState:
     """The state when the user stops the work: the views made so far stay; what was only being read is left."""
     progress = state.progress
     is_reading = state.scene is None or state.scene.source is not state.source
     if is_reading and state.source is not None:
-        left = _left(state)
+        left = _leave_job(state)
         return left if left.generation != state.generation else replace(left, stopped=state.generation, source=None)
     if not 0 < progress.total > progress.done:
         return state
@@ -51,15 +51,15 @@ def stopped(state: AppState) -> AppState:
     return replace(state, stopped=state.generation, progress=Progress(doing=doing))
 
 
-def _opened(state: AppState, scene: Scene) -> AppState:
+def _open_scene(state: AppState, scene: Scene) -> AppState:
     old = state.scene
     opened = replace(
         state,
         scene=scene,
         progress=Progress(doing="making views"),
         views_there=frozenset({scene.grid.centre}),
-        optics=carried_optics(state.optics, old, scene),
-        history=mapped(state.history, lambda optics: carried_optics(optics, old, scene)),
+        optics=carry_optics(state.optics, old, scene),
+        history=map_optics(state.history, lambda optics: carry_optics(optics, old, scene)),
         inspection=replace(state.inspection, pair=None, probe=None),
     )
     if old is not None and old.source is scene.source:
@@ -67,14 +67,14 @@ def _opened(state: AppState, scene: Scene) -> AppState:
     # the same file, opened again, is new
     notices = (*(Notice(note) for note in scene.notes), *_offers(scene))[-NOTICES_KEPT:]
     motion = Motion(speed=state.motion.speed)
-    recent = remembered(state.recent, scene.source.path)
+    recent = remember_recent(state.recent, scene.source.path)
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
-    depth = DepthWork(scene.source.refine)
+    depth = DepthSettings(scene.source.refine)
     return replace(opened, notices=notices, history=History(), motion=motion, recent=recent, depth=depth, stroke=None)
 
 
-def remembered(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
+def remember_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
     """The recent paths with this one first."""
     return (path, *(other for other in recent if other != path))[:RECENT_KEPT]
 
@@ -90,7 +90,7 @@ def _offers(scene: Scene) -> tuple[Notice, ...]:
     return (Notice("This picture was saved by iibr, with its settings.", offer=settings),)
 
 
-def _left(state: AppState) -> AppState:
+def _leave_job(state: AppState) -> AppState:
     """Nothing more comes of this job. Where another scene was open before, the program returns to it: its views may
     not all have been made.
     """

@@ -12,11 +12,11 @@ from iibr_core.depth.choice import DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
-from viewer.model.state.depth_editing import Brush, DepthWork
+from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.inspection import Inspection
 
 CENTRE = ViewOffset(0.0, 0.0)
-AS_FOUND = DepthWork()
+AS_FOUND = DepthSettings()
 
 
 ApertureKind = Literal["disc", "polygon", "ring", "cat_eye", "mask"]
@@ -207,7 +207,7 @@ class Edit:
 
     optics: Optics
     depth_strength: float
-    depth: DepthWork = AS_FOUND
+    depth: DepthSettings = AS_FOUND
 
 
 @dataclass(frozen=True)
@@ -372,7 +372,7 @@ class AppState:
     recent: tuple[str, ...] = ()
     report: DrawReport | None = None
     inspection: Inspection = field(default_factory=Inspection)
-    depth: DepthWork = AS_FOUND
+    depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None
 

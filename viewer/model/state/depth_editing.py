@@ -11,7 +11,7 @@ from iibr_core.depth.editing.edits import UNEDITED, BrushTool, DepthEdits
 
 
 @dataclass(frozen=True)
-class DepthWork:
+class DepthSettings:
     """What disparity is made of what was found: refined this far (see `Source.refine`), then edited."""
 
     refine: float = 1.0
@@ -70,4 +70,4 @@ class ResetDepth:
     """Depth as it was found and opened."""
 
 
-DepthEdit = SetRefine | SetTone | SetBrush | Paint | DropStroke | ResetDepth
+DepthAction = SetRefine | SetTone | SetBrush | Paint | DropStroke | ResetDepth

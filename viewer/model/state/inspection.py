@@ -156,7 +156,7 @@ class Probed:
     probe: Probe | None
 
 
-InspectionEdit = (
+InspectionAction = (
     ShowEpis
     | ShowGrid
     | ShowValues

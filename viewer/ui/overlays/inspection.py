@@ -5,13 +5,13 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from iibr_core.types import ViewOffset
-from viewer.model.colormap import VIRIDIS, mapped
-from viewer.model.inspection_request import Aids, compared_grid, sheet_cells, view_near, view_words
+from viewer.model.colormap import VIRIDIS, map_color
+from viewer.model.inspection_request import InspectionTextures, grid_to_compare, sheet_cells, view_label, view_near
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.photographic_units import relative_distance
 from viewer.model.state.app_state import AppState, Hover, Scene
 from viewer.model.state.inspection import Comparison, Origin, Probe
-from viewer.ui.style import DARK, Color, packed, palette_of
+from viewer.ui.style import DARK, Color, pack_color, palette_of
 
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
 SIDES: dict[Comparison, tuple[str, str]] = {
@@ -28,32 +28,32 @@ ORIGIN_WORDS: dict[Origin, str] = {
 BLACK: Color = (0.0, 0.0, 0.0, 1.0)
 
 
-def draw_over_picture(state: AppState, layout: Layout, aids: Aids) -> None:
+def draw_over_picture(state: AppState, layout: Layout, textures: InspectionTextures) -> None:
     """Draw overlay, comparison and sheet over the picture. Colours do not follow the theme: below is a photo."""
     scene, picture = state.scene, layout.picture
     if scene is None or picture is None:
         return
-    if aids.overlay is not None:
-        _image(aids.overlay, picture)
+    if textures.overlay is not None:
+        _image(textures.overlay, picture)
         _draw_legend(state, scene, layout, picture)
-    if aids.left is not None:
-        _draw_comparison(state, scene, layout, picture, aids)
-    if aids.sheet is not None:
-        _draw_sheet(state, scene, layout, picture, aids.sheet)
+    if textures.left is not None:
+        _draw_comparison(state, scene, layout, picture, textures)
+    if textures.sheet is not None:
+        _draw_sheet(state, scene, layout, picture, textures.sheet)
 
 
-def draw_beside_picture(state: AppState, layout: Layout, aids: Aids) -> None:
+def draw_beside_picture(state: AppState, layout: Layout, textures: InspectionTextures) -> None:
     """Draw EPIs and status line."""
     scene, picture = state.scene, layout.picture
     if scene is None or picture is None:
         return
     if layout.strip_across is not None and layout.strip_down is not None:
-        _draw_strips(state, scene, layout, picture, aids)
+        _draw_strips(state, scene, layout, picture, textures)
     if layout.status is not None:
         _draw_status(state, scene, layout, layout.status)
 
 
-def status_words(scene: Scene, hover: Hover, probe: Probe | None) -> list[str]:
+def status_text(scene: Scene, hover: Hover, probe: Probe | None) -> list[str]:
     """What is under the pointer, in order of importance."""
     words = [f"{hover.x_px:.0f}, {hover.y_px:.0f}"]
     if hover.disparity is not None:
@@ -76,7 +76,7 @@ def _line(x0: float, y0: float, x1: float, y1: float, color: int, width: float) 
     """Legible on any ground: the line, in a dark one."""
     draw = imgui.get_background_draw_list()
     ends = imgui.ImVec2(x0, y0), imgui.ImVec2(x1, y1)
-    draw.add_line(*ends, packed(BLACK, 0.55), 2.5 * width)
+    draw.add_line(*ends, pack_color(BLACK, 0.55), 2.5 * width)
     draw.add_line(*ends, color, width)
 
 
@@ -85,8 +85,8 @@ def _words(words: str, x: float, y: float, scale: float, align: float = 0.0) -> 
     draw, size, room = imgui.get_background_draw_list(), imgui.calc_text_size(words), 5 * scale
     left = x - align * (size.x + 2 * room)
     corners = imgui.ImVec2(left, y), imgui.ImVec2(left + size.x + 2 * room, y + size.y + room)
-    draw.add_rect_filled(*corners, packed(DARK.background, 0.72), 4 * scale)
-    draw.add_text(imgui.ImVec2(left + room, y + room / 2), packed(DARK.text), words)
+    draw.add_rect_filled(*corners, pack_color(DARK.background, 0.72), 4 * scale)
+    draw.add_text(imgui.ImVec2(left + room, y + room / 2), pack_color(DARK.text), words)
 
 
 def _draw_legend(state: AppState, scene: Scene, layout: Layout, picture: Rect) -> None:
@@ -101,50 +101,54 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, picture: Rect) -
     ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
     labels = [f"{value:.2f}".replace("-", "−") for value in ends]
     far = imgui.ImVec2(x + width + 2 * room, y + height + line + 2.5 * room)
-    draw.add_rect_filled(imgui.ImVec2(x, y), far, packed(DARK.background, 0.72), 4 * scale)
+    draw.add_rect_filled(imgui.ImVec2(x, y), far, pack_color(DARK.background, 0.72), 4 * scale)
     left, top = x + room, y + room
     step = width / (len(VIRIDIS) - 1)
     for i in range(len(VIRIDIS) - 1):
-        low, high = (packed((*mapped(j / (len(VIRIDIS) - 1)), 1.0)) for j in (i, i + 1))
+        low, high = (pack_color((*map_color(j / (len(VIRIDIS) - 1)), 1.0)) for j in (i, i + 1))
         corner, end = imgui.ImVec2(left + i * step, top), imgui.ImVec2(left + (i + 1) * step, top + height)
         draw.add_rect_filled_multi_color(corner, end, low, high, high, low)
     below = top + height + room / 2
-    draw.add_text(imgui.ImVec2(left, below), packed(DARK.text), labels[0])
-    draw.add_text(imgui.ImVec2(left + width - imgui.calc_text_size(labels[1]).x, below), packed(DARK.text), labels[1])
+    draw.add_text(imgui.ImVec2(left, below), pack_color(DARK.text), labels[0])
+    draw.add_text(
+        imgui.ImVec2(left + width - imgui.calc_text_size(labels[1]).x, below), pack_color(DARK.text), labels[1]
+    )
     name = "px per step" if kind == "disparity" else "entropy"
     middle = left + (width - imgui.calc_text_size(name).x) / 2
-    draw.add_text(imgui.ImVec2(middle, below), packed(DARK.quiet), name)
+    draw.add_text(imgui.ImVec2(middle, below), pack_color(DARK.quiet), name)
     if kind == "disparity" and state.hover is not None and state.hover.disparity is not None and ends[1] > ends[0]:
         share = min(max((state.hover.disparity - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
         at = left + share * width
-        _line(at, top - 2 * scale, at, top + height + 2 * scale, packed(DARK.text), 1.5 * scale)
+        _line(at, top - 2 * scale, at, top + height + 2 * scale, pack_color(DARK.text), 1.5 * scale)
 
 
-def _draw_comparison(state: AppState, scene: Scene, layout: Layout, picture: Rect, aids: Aids) -> None:
+def _draw_comparison(
+    state: AppState, scene: Scene, layout: Layout, picture: Rect, textures: InspectionTextures
+) -> None:
     """Left image, right image, the divider between them, and what each is."""
     kind, scale, draw = state.inspection.comparison, layout.ui_scale, imgui.get_background_draw_list()
     assert kind is not None
     x, bottom = picture.x + state.inspection.divider * picture.width, picture.y + picture.height
-    for texture, left, right in ((aids.left, picture.x, x), (aids.right, x, picture.x + picture.width)):
+    for texture, left, right in ((textures.left, picture.x, x), (textures.right, x, picture.x + picture.width)):
         if texture is not None:
             draw.push_clip_rect(imgui.ImVec2(left, picture.y), imgui.ImVec2(right, bottom), True)
             _image(texture, picture)
             draw.pop_clip_rect()
-    _line(x, picture.y, x, bottom, packed(DARK.text), 1.5 * scale)
+    _line(x, picture.y, x, bottom, pack_color(DARK.text), 1.5 * scale)
     knob = imgui.ImVec2(x, picture.y + picture.height / 2)
-    draw.add_circle_filled(knob, 9 * scale, packed(BLACK, 0.55))
-    draw.add_circle_filled(knob, 7.5 * scale, packed(DARK.text))
+    draw.add_circle_filled(knob, 9 * scale, pack_color(BLACK, 0.55))
+    draw.add_circle_filled(knob, 7.5 * scale, pack_color(DARK.text))
     for side in (-1, 1):
         tip, back = knob.x + side * 5 * scale, knob.x + side * 1.5 * scale
         corners = imgui.ImVec2(back, knob.y - 3 * scale), imgui.ImVec2(back, knob.y + 3 * scale)
-        draw.add_triangle_filled(imgui.ImVec2(tip, knob.y), *corners, packed(DARK.background))
+        draw.add_triangle_filled(imgui.ImVec2(tip, knob.y), *corners, pack_color(DARK.background))
     names, top = SIDES[kind], picture.y + 8 * scale
     draw.push_clip_rect(imgui.ImVec2(picture.x, picture.y), imgui.ImVec2(picture.x + picture.width, bottom), True)
     _words(names[0], x - 10 * scale, top, scale, align=1.0)
     _words(names[1], x + 10 * scale, top, scale)
     pair = state.inspection.pair
     if pair is not None and kind != "photo":
-        words = view_words(pair.view, compared_grid(scene, kind, state.inspection.truth))
+        words = view_label(pair.view, grid_to_compare(scene, kind, state.inspection.truth))
         _words(words, picture.x + 8 * scale, bottom - imgui.get_text_line_height() - 13 * scale, scale)
     draw.pop_clip_rect()
 
@@ -162,16 +166,16 @@ def _draw_sheet(state: AppState, scene: Scene, layout: Layout, picture: Rect, te
             room = 1.5 * scale
             corner = imgui.ImVec2(cell.x - room, cell.y - room)
             far = imgui.ImVec2(cell.x + cell.width + room, cell.y + cell.height + room)
-            color = packed(DARK.accent if is_current else DARK.text)
+            color = pack_color(DARK.accent if is_current else DARK.text)
             draw.add_rect(corner, far, color, 2 * scale, 3 * scale if is_current else 1.5 * scale)
 
 
-def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, aids: Aids) -> None:
+def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, textures: InspectionTextures) -> None:
     """The EPIs, where the eye is in them, and the pointer's column and row."""
     across, down, scale = layout.strip_across, layout.strip_down, layout.ui_scale
     assert across is not None
     assert down is not None
-    for texture, rect in ((aids.strip_across, across), (aids.strip_down, down)):
+    for texture, rect in ((textures.strip_across, across), (textures.strip_down, down)):
         if texture is not None:
             _image(texture, rect)
     draw = imgui.get_background_draw_list()
@@ -180,7 +184,7 @@ def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, a
         _draw_marks(state, scene, rect, scale, is_upright=rect is down)
         draw.pop_clip_rect()
     x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
-    quiet = packed(palette_of(state.preferences.theme).quiet)
+    quiet = pack_color(palette_of(state.preferences.theme).quiet)
     text, line = imgui.ImVec2(down.x + 2 * scale, across.y + 2 * scale), imgui.get_text_line_height()
     for i, words in enumerate((f"x {x:.0f}", f"y {y:.0f}")):
         draw.add_text(imgui.ImVec2(text.x, text.y + i * line), quiet, words)
@@ -206,12 +210,12 @@ def _draw_marks(state: AppState, scene: Scene, rect: Rect, scale: float, is_upri
             first, second = first[::-1], second[::-1]
         _line(rect.x + first[0], rect.y + first[1], rect.x + second[0], rect.y + second[1], color, width)
 
-    line(0, eye_at, long_side, eye_at, packed(DARK.accent), 2 * scale)
-    line(pointer_at, 0, pointer_at, short_side, packed(DARK.text, 0.8), scale)
+    line(0, eye_at, long_side, eye_at, pack_color(DARK.accent), 2 * scale)
+    line(pointer_at, 0, pointer_at, short_side, pack_color(DARK.text, 0.8), scale)
     if state.hover is not None and state.hover.disparity is not None:
         slope = -state.hover.disparity / size * long_side / band
         ends = [pointer_at + slope * (end - eye_at) for end in (0.0, short_side)]
-        line(ends[0], 0, ends[1], short_side, packed(DARK.warning, 0.9), 1.5 * scale)
+        line(ends[0], 0, ends[1], short_side, pack_color(DARK.warning, 0.9), 1.5 * scale)
 
 
 def _draw_status(state: AppState, scene: Scene, layout: Layout, rect: Rect) -> None:
@@ -220,10 +224,10 @@ def _draw_status(state: AppState, scene: Scene, layout: Layout, rect: Rect) -> N
     hover, probe = state.hover, state.inspection.probe
     y = rect.y + rect.height - imgui.get_text_line_height()
     if hover is None:
-        draw.add_text(imgui.ImVec2(rect.x, y), packed(palette.quiet), "Point at the picture to see its values.")
+        draw.add_text(imgui.ImVec2(rect.x, y), pack_color(palette.quiet), "Point at the picture to see its values.")
         return
     x, gap = rect.x, 18 * scale
-    for words in status_words(scene, hover, probe):
+    for words in status_text(scene, hover, probe):
         is_color = words.startswith("RGB")
         swatch = imgui.get_text_line_height() if is_color else 0.0
         width = imgui.calc_text_size(words).x + (swatch + 5 * scale if swatch else 0)
@@ -232,7 +236,7 @@ def _draw_status(state: AppState, scene: Scene, layout: Layout, rect: Rect) -> N
         if is_color and probe is not None:
             red, green, blue = (value / 255 for value in probe.rgb)
             corner, far = imgui.ImVec2(x, y), imgui.ImVec2(x + swatch, y + swatch)
-            draw.add_rect_filled(corner, far, packed((red, green, blue, 1.0)), 3 * scale)
+            draw.add_rect_filled(corner, far, pack_color((red, green, blue, 1.0)), 3 * scale)
             x, width = x + swatch + 5 * scale, width - swatch - 5 * scale
-        draw.add_text(imgui.ImVec2(x, y), packed(palette.text), words)
+        draw.add_text(imgui.ImVec2(x, y), pack_color(palette.text), words)
         x += width + gap

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from viewer.model.actions import Action, DoTask, ShowPrompt
 from viewer.model.commands import COMMANDS, commands_matching
 from viewer.model.layout import Layout
-from viewer.model.opening import chosen
+from viewer.model.opening import action_for_path
 from viewer.model.state.app_state import AppState, PalettePrompt, PathPrompt, Prompt, SavePrompt, SaveTask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
@@ -87,7 +87,7 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     label("File", layout)
     path, entered = _text_field("path", prompt.path)
     edited = replace(prompt, path=path, already_there=prompt.already_there and path == prompt.path)
-    edited = edited if is_map else _resized(edited, state, layout)
+    edited = edited if is_map else _size_rows(edited, state, layout)
     gap(layout, 2)
     quiet(MAP_ENDINGS if is_map else "The name's ending decides: .png, or .exr in linear light.")
     if prompt.already_there:
@@ -98,10 +98,10 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     if pressed or entered:
         task = SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what)
         return [DoTask(task), ShowPrompt(None)]
-    return _closed_or_edited(closed, edited, prompt)
+    return _prompt_actions(closed, edited, prompt)
 
 
-def _resized(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
+def _size_rows(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
     """Rows for width and height."""
     label("Width", layout, "Pixels; the height follows.")
     changed, width = imgui.input_int("##width", prompt.size_px[0], 0, 0)
@@ -123,8 +123,8 @@ def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
     quiet("This system has no file dialog (zenity or kdialog): type a path, or drop a file on the window.")
     pressed, closed = _buttons("Open", layout)
     if (pressed or entered) and path.strip():
-        return [ShowPrompt(None), chosen(prompt.what, path.strip(), state)]
-    return _closed_or_edited(closed, replace(prompt, path=path), prompt)
+        return [ShowPrompt(None), action_for_path(prompt.what, path.strip(), state)]
+    return _prompt_actions(closed, replace(prompt, path=path), prompt)
 
 
 def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
@@ -146,7 +146,7 @@ def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Act
         quiet("No command of that name.")
     if chosen is not None:
         return [ShowPrompt(None), chosen.action(replace(state, prompt=None))]
-    return _closed_or_edited(False, PalettePrompt(text), prompt)
+    return _prompt_actions(False, PalettePrompt(text), prompt)
 
 
 def _help(layout: Layout) -> list[Action]:
@@ -164,7 +164,7 @@ def _help(layout: Layout) -> list[Action]:
     return [ShowPrompt(None)] if button("Close", layout) else []
 
 
-def _closed_or_edited(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:
+def _prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:
     if closed:
         return [ShowPrompt(None)]
     return [ShowPrompt(edited)] if edited != prompt else []

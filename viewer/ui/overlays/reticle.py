@@ -8,7 +8,7 @@ from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.lens.photographic_units import relative_distance
 from viewer.model.state.app_state import AppState, Hover, Optics, Scene, TiltHandles
-from viewer.ui.style import DARK, packed
+from viewer.ui.style import DARK, pack_color
 
 RETICLE_RADIUS = 11.0
 HANDLE_RADIUS = 8.0
@@ -30,7 +30,7 @@ def overlays(state: AppState, layout: Layout) -> None:
         _draw_reticle(state.optics, scene, state.hover, layout, picture)
 
 
-def hover_words(optics: Optics, scene: Scene, hover: Hover) -> str:
+def hover_text(optics: Optics, scene: Scene, hover: Hover) -> str:
     """What lies under the pointer and how it stands to the focus: "1.24 px · × 0.80 · 0.36 in front"."""
     assert hover.disparity is not None
     ahead = hover.disparity - sharp_disparity(optics, place_of(hover.x_px, hover.y_px, scene))
@@ -52,15 +52,15 @@ def _draw_reticle(optics: Optics, scene: Scene, hover: Hover, layout: Layout, pi
     x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
     y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
     radius = RETICLE_RADIUS * scale
-    _ring(draw, x, y, radius, scale, packed(DARK.text))
-    words = hover_words(optics, scene, hover)
+    _ring(draw, x, y, radius, scale, pack_color(DARK.text))
+    words = hover_text(optics, scene, hover)
     size, room = imgui.calc_text_size(words), 6 * scale
     left = x + radius + room if x + radius + 3 * room + size.x <= picture.x + picture.width else x - radius - size.x
     left = max(left - (room if left < x else 0), picture.x + room)
     top = min(max(y - size.y / 2, picture.y + room), picture.y + picture.height - size.y - room)
     corners = imgui.ImVec2(left - room, top - room / 2), imgui.ImVec2(left + size.x + room, top + size.y + room / 2)
-    draw.add_rect_filled(*corners, packed(DARK.background, 0.72), 4 * scale)
-    draw.add_text(imgui.ImVec2(left, top), packed(DARK.text), words)
+    draw.add_rect_filled(*corners, pack_color(DARK.background, 0.72), 4 * scale)
+    draw.add_text(imgui.ImVec2(left, top), pack_color(DARK.text), words)
 
 
 def _draw_brush(state: AppState, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
@@ -68,28 +68,28 @@ def _draw_brush(state: AppState, scene: Scene, hover: Hover, layout: Layout, pic
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
     y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
-    _ring(draw, x, y, max(state.brush.radius * picture.width, 2 * scale), scale, packed(DARK.text))
+    _ring(draw, x, y, max(state.brush.radius * picture.width, 2 * scale), scale, pack_color(DARK.text))
     if state.brush.tool != "smooth":
         arm = 4 * scale
-        draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), packed(DARK.text), 1.5 * scale)
+        draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), pack_color(DARK.text), 1.5 * scale)
     if state.brush.tool == "nearer":
-        draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), packed(DARK.text), 1.5 * scale)
+        draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), pack_color(DARK.text), 1.5 * scale)
 
 
 def _draw_handles(handles: TiltHandles, layout: Layout, picture: Rect) -> None:
     """A line between two knobs: the focus changes along it."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     first, second = (imgui.ImVec2(*point) for point in handle_points(handles, picture))
-    draw.add_line(first, second, packed((0, 0, 0, 1), 0.45), 4 * scale)
-    draw.add_line(first, second, packed(DARK.text, 0.9), 1.5 * scale)
+    draw.add_line(first, second, pack_color((0, 0, 0, 1), 0.45), 4 * scale)
+    draw.add_line(first, second, pack_color(DARK.text, 0.9), 1.5 * scale)
     for point in (first, second):
-        draw.add_circle_filled(point, HANDLE_RADIUS * scale, packed((0, 0, 0, 1), 0.45))
-        draw.add_circle_filled(point, (HANDLE_RADIUS - 1.5) * scale, packed(DARK.text))
-        draw.add_circle_filled(point, (HANDLE_RADIUS - 4) * scale, packed(DARK.accent))
+        draw.add_circle_filled(point, HANDLE_RADIUS * scale, pack_color((0, 0, 0, 1), 0.45))
+        draw.add_circle_filled(point, (HANDLE_RADIUS - 1.5) * scale, pack_color(DARK.text))
+        draw.add_circle_filled(point, (HANDLE_RADIUS - 4) * scale, pack_color(DARK.accent))
 
 
 def _ring(draw: imgui.ImDrawList, x: float, y: float, radius: float, scale: float, color: int) -> None:
     """Legible on any ground: a light ring in a dark one."""
-    draw.add_circle(imgui.ImVec2(x, y), radius, packed((0, 0, 0, 1), 0.5), 0, 3.5 * scale)
+    draw.add_circle(imgui.ImVec2(x, y), radius, pack_color((0, 0, 0, 1), 0.5), 0, 3.5 * scale)
     draw.add_circle(imgui.ImVec2(x, y), radius, color, 0, 1.5 * scale)
     draw.add_circle_filled(imgui.ImVec2(x, y), 1.5 * scale, color)

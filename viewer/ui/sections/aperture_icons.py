@@ -8,7 +8,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from viewer.model.state.app_state import ApertureShape
-from viewer.ui.style import Palette, packed
+from viewer.ui.style import Palette, pack_color
 
 SEGMENTS = 32
 MASK_CELLS = 6
@@ -17,7 +17,7 @@ MASK_CELLS = 6
 def draw_shape(shape: ApertureShape, middle: tuple[float, float], radius: float, palette: Palette) -> None:
     """Draw the opening into the present window around a point (window units)."""
     draw = imgui.get_window_draw_list()
-    color = packed(palette.text, 0.85)
+    color = pack_color(palette.text, 0.85)
     centre = imgui.ImVec2(*middle)
     match shape.kind:
         case "disc":
@@ -64,7 +64,7 @@ def _draw_mask(
     mask = shape.mask
     if mask is None:
         arm, thick = 0.6 * radius, max(0.12 * radius, 1.0)
-        color = packed(palette.quiet)
+        color = pack_color(palette.quiet)
         draw.add_line(imgui.ImVec2(middle[0] - arm, middle[1]), imgui.ImVec2(middle[0] + arm, middle[1]), color, thick)
         draw.add_line(imgui.ImVec2(middle[0], middle[1] - arm), imgui.ImVec2(middle[0], middle[1] + arm), color, thick)
         return
@@ -74,4 +74,4 @@ def _draw_mask(
             x = min(int((column + 0.5) / MASK_CELLS * mask.columns), mask.columns - 1)
             corner = imgui.ImVec2(left + column * cell, top + row * cell)
             far = imgui.ImVec2(corner.x + cell, corner.y + cell)
-            draw.add_rect_filled(corner, far, packed(palette.text, 0.85 * mask.values[y * mask.columns + x] / 255))
+            draw.add_rect_filled(corner, far, pack_color(palette.text, 0.85 * mask.values[y * mask.columns + x] / 255))

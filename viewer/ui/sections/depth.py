@@ -73,14 +73,14 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     source = state.source
     if source is None:
         return []
-    wanted = _choice_words(source.depth_start, source.depth_model, source.disparity_path)
+    wanted = _choice_text(source.depth_start, source.depth_model, source.disparity_path)
     ways: list[tuple[DepthStart, str | None]] = [("auto", None), ("embedded", None)]
     ways += [("model", name) for name in _models(scene, source.depth_model)] + [("rough", None), ("flat", None)]
     actions: list[Action] = []
     label("From", layout, "Where depth is looked for. The photo is opened anew.")
     if imgui.begin_combo("##depth from", wanted):
         for start, model in ways:
-            words = _choice_words(start, model, None)
+            words = _choice_text(start, model, None)
             if imgui.selectable(words, words == wanted)[0]:
                 actions.append(OpenPath(source_with_depth(source, start, model)))
         imgui.end_combo()
@@ -92,7 +92,7 @@ def _models(scene: Scene, chosen: str | None) -> list[str]:
     return list(dict.fromkeys([*([chosen] if chosen else []), *scene.depth_models]))
 
 
-def _choice_words(start: DepthStart, model: str | None, path: str | None) -> str:
+def _choice_text(start: DepthStart, model: str | None, path: str | None) -> str:
     if path is not None:
         return _last_part(path)
     return _last_part(model) if start == "model" and model else START_WORDS[start]

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from iibr_core.depth.editing.edits import DepthEdits, Levels, share_before_tone, toned_share
+from iibr_core.depth.editing.edits import DepthEdits, Levels, invert_tone_curve, tone_curve
 from viewer.model.actions import Action
-from viewer.model.colormap import mapped
+from viewer.model.colormap import map_color
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, Scene
 from viewer.model.state.depth_editing import SetTone
-from viewer.ui.style import packed, palette_of
+from viewer.ui.style import pack_color, palette_of
 from viewer.ui.widgets import tooltip
 
 HEIGHT = 56.0
@@ -53,7 +53,7 @@ def focus_share(state: AppState, scene: Scene, levels: Levels) -> float | None:
     if plan is None or not plan.disparity_scale:
         return None
     given = state.optics.focus_disparity / plan.disparity_scale + plan.disparity_zero
-    share = share_before_tone((given - levels.low) / (levels.high - levels.low), state.depth.edits)
+    share = invert_tone_curve((given - levels.low) / (levels.high - levels.low), state.depth.edits)
     return share if 0 <= share <= 1 else None
 
 
@@ -68,7 +68,7 @@ def _draw_bars(levels: Levels, edits: DepthEdits, left: float, top: float, width
     for i, share in enumerate(heights):
         place = (i + 0.5) / len(heights)
         is_clipped = not edits.far_clip <= place <= edits.near_clip
-        color = packed((*mapped(toned_share(place, tone)), 1.0), 0.3 if is_clipped else 1.0)
+        color = pack_color((*map_color(tone_curve(place, tone)), 1.0), 0.3 if is_clipped else 1.0)
         corner = imgui.ImVec2(left + i * step, top + height * (1 - share))
         draw.add_rect_filled(corner, imgui.ImVec2(left + (i + 1) * step, top + height), color)
 
@@ -78,7 +78,7 @@ def _draw_focus(
 ) -> None:
     share = focus_share(state, scene, levels)
     if share is not None:
-        x, color = left + share * width, packed(palette_of(state.preferences.theme).accent)
+        x, color = left + share * width, pack_color(palette_of(state.preferences.theme).accent)
         draw = imgui.get_window_draw_list()
         draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, top + height), color, 1.5 * scale)
 
@@ -94,7 +94,7 @@ def _handle(
     imgui.set_next_item_allow_overlap()
     imgui.invisible_button(f"handle {name}", imgui.ImVec2(grip, height + 4 * scale))
     is_held, is_released = imgui.is_item_active(), imgui.is_item_deactivated()
-    color = packed(palette.accent if is_held or imgui.is_item_hovered() else palette.text)
+    color = pack_color(palette.accent if is_held or imgui.is_item_hovered() else palette.text)
     draw, bottom = imgui.get_window_draw_list(), top + height
     draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, bottom), color, scale)
     side, up = grip / 2, 7 * scale

@@ -7,7 +7,7 @@ import math
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action, DoTask
-from viewer.model.inspection_request import compared_grid, compared_view, view_words
+from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
 from viewer.model.reducers.inspection import obstacle_to_comparison, obstacle_to_overlay
 from viewer.model.state.app_state import AppState, ChooseTask, Scene
@@ -45,7 +45,7 @@ def inspect_section(state: AppState, scene: Scene, layout: Layout) -> list[Actio
     return _toggles(state, layout) + _overlays(state, scene, layout) + _comparisons(state, scene, layout)
 
 
-def score_words(psnr_db: float | None, flip: float | None) -> str:
+def score_text(psnr_db: float | None, flip: float | None) -> str:
     """PSNR and FLIP in one line: "41.2 dB PSNR, 0.031 FLIP"; "identical" where nothing differs."""
     if psnr_db is None or flip is None:
         return "PSNR and FLIP follow when all is still"
@@ -95,18 +95,18 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         imgui.align_text_to_frame_padding()
         quiet(inspection.truth.name)
     if chosen in ("quality", "truth"):
-        quiet(pair_words(state, scene, chosen))
+        quiet(pair_text(state, scene, chosen))
     return actions
 
 
-def pair_words(state: AppState, scene: Scene, kind: Comparison) -> str:
+def pair_text(state: AppState, scene: Scene, kind: Comparison) -> str:
     """Which view is compared, and how far its two images are apart."""
     truth, pair = state.inspection.truth, state.inspection.pair
-    grid, wanted = compared_grid(scene, kind, truth), compared_view(scene, state.optics.eye, kind, truth)
+    grid, wanted = grid_to_compare(scene, kind, truth), view_to_compare(scene, state.optics.eye, kind, truth)
     if pair is None or pair.view != wanted:
-        return f"Making the {view_words(wanted, grid)}…"
-    words = view_words(pair.view, grid)
-    return f"{words[0].upper()}{words[1:]}: {score_words(pair.psnr_db, pair.flip)}"
+        return f"Making the {view_label(wanted, grid)}…"
+    words = view_label(pair.view, grid)
+    return f"{words[0].upper()}{words[1:]}: {score_text(pair.psnr_db, pair.flip)}"
 
 
 def _choices(row: list[tuple[str, bool, str, str]], layout: Layout) -> int | None:

@@ -10,7 +10,7 @@ from viewer.model.layout import Layout
 from viewer.model.lens.limits import SPEED_LIMITS, dolly_limit, is_extrapolated
 from viewer.model.state.app_state import LOOPS, AppState, Scene
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
-from viewer.ui.style import Palette, packed
+from viewer.ui.style import Palette, pack_color
 from viewer.ui.widgets import button, choice, slider, tooltip
 
 PAD_TIP = "Drag to move the viewpoint. Dots are views, faint ones still to be made; beyond the light area is a guess."
@@ -54,7 +54,7 @@ def _place(state: AppState, scene: Scene, palette: Palette) -> None:
     outside = is_extrapolated(eye, scene.grid)
     s, t = (round(value, 1) + 0.0 for value in (eye.s, eye.t))  # + 0.0 takes the sign of -0.0 away
     words = f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}"
-    imgui.push_style_color(imgui.Col_.text, packed(palette.warning if outside else palette.quiet))
+    imgui.push_style_color(imgui.Col_.text, pack_color(palette.warning if outside else palette.quiet))
     imgui.text(words)
     imgui.pop_style_color()
 

@@ -11,7 +11,7 @@ from viewer.model.actions import Action, MoveEye
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.limits import eye_limits, is_extrapolated
 from viewer.model.state.app_state import AppState, Scene
-from viewer.ui.style import Palette, packed
+from viewer.ui.style import Palette, pack_color
 
 PAD_SIDE = 136.0
 EDGE = 7.0
@@ -61,7 +61,7 @@ def pad(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list
 def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float, palette: Palette) -> None:
     draw, rect = imgui.get_window_draw_list(), chart.rect
     corners = imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height)
-    draw.add_rect_filled(*corners, packed(palette.frame), 4 * scale)
+    draw.add_rect_filled(*corners, pack_color(palette.frame), 4 * scale)
     draw.push_clip_rect(*corners, True)
     _draw_stored(draw, grid, chart, scale, palette)
     _draw_views(draw, state.views_there, grid, chart, scale, palette)
@@ -69,10 +69,10 @@ def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float, palette
     outside = is_extrapolated(state.optics.eye, grid)
     color = palette.warning if outside else palette.accent
     if outside:
-        inside = ViewOffset(*(_held(value, views) for value, views in zip(state.optics.eye, grid)))
-        draw.add_line(imgui.ImVec2(*chart.point(inside)), imgui.ImVec2(x, y), packed(color, 0.7), 1.5 * scale)
-    draw.add_circle_filled(imgui.ImVec2(x, y), 6 * scale, packed(color))
-    draw.add_circle(imgui.ImVec2(x, y), 6 * scale, packed(palette.panel), 0, 1.5 * scale)
+        inside = ViewOffset(*(_snap(value, views) for value, views in zip(state.optics.eye, grid)))
+        draw.add_line(imgui.ImVec2(*chart.point(inside)), imgui.ImVec2(x, y), pack_color(color, 0.7), 1.5 * scale)
+    draw.add_circle_filled(imgui.ImVec2(x, y), 6 * scale, pack_color(color))
+    draw.add_circle(imgui.ImVec2(x, y), 6 * scale, pack_color(palette.panel), 0, 1.5 * scale)
     draw.pop_clip_rect()
 
 
@@ -82,7 +82,7 @@ def _draw_stored(draw: imgui.ImDrawList, grid: GridShape, chart: PadMap, scale: 
     right, bottom = chart.point(grid.offset(grid.rows - 1, grid.columns - 1))
     room = 4 * scale
     corners = imgui.ImVec2(left - room, top - room), imgui.ImVec2(right + room, bottom + room)
-    draw.add_rect_filled(*corners, packed(palette.frame_hovered), 3 * scale)
+    draw.add_rect_filled(*corners, pack_color(palette.frame_hovered), 3 * scale)
 
 
 def _draw_views(
@@ -95,7 +95,7 @@ def _draw_views(
 ) -> None:
     """A dot for every view; faint where it has not come yet."""
     radius = min(max(0.16 * chart.units_per_view, 0.75 * scale), 2.5 * scale)
-    known, missing = packed(palette.quiet), packed(palette.quiet, 0.28)
+    known, missing = pack_color(palette.quiet), pack_color(palette.quiet, 0.28)
     as_circles = grid.rows * grid.columns <= MOST_ROUND_DOTS
     for row in range(grid.rows):
         for column in range(grid.columns):
@@ -107,5 +107,5 @@ def _draw_views(
                 draw.add_rect_filled(imgui.ImVec2(x - radius, y - radius), imgui.ImVec2(x + radius, y + radius), color)
 
 
-def _held(value: float, views: int) -> float:
+def _snap(value: float, views: int) -> float:
     return min(max(value, -(views // 2)), views - 1 - views // 2)

@@ -1,6 +1,6 @@
 #version 330 core
 // Per tile of the picture and per source: the first and the last step of the search for the front-most surface that can
-// tell anything. Before it there is only empty space, behind it only the inside of things; see front_most.glsl. Where
+// tell anything. Before it there is only empty space, behind it only the inside of things; see first_hit.glsl. Where
 // no source sees an edge: about the disparity of the surface, and -1.
 #include "part.glsl"
 #include "sources.glsl"
@@ -13,8 +13,8 @@ uniform vec2 pixel_uv;          // of a pixel: surfaces are looked for beside it
 const int CHUNKS = 16;          // so many parts of the search are told apart
 const float SEAM_PX = 3.0;      // farther than edges are looked for beside a surface
 
-layout(location = 0) out vec4 spans_of_0_and_1;
-layout(location = 1) out vec4 spans_of_2_and_3;
+layout(location = 0) out vec4 intervals_of_0_and_1;
+layout(location = 1) out vec4 intervals_of_2_and_3;
 
 // Least and greatest disparity of all that the tile's pixels may meet from one disparity to another.
 vec2 seen_between(int i, float from, float to) {
@@ -37,7 +37,7 @@ vec2 seen_between(int i, float from, float to) {
     return seen;
 }
 
-ivec2 span_of(int i, float stride) {
+ivec2 interval_of(int i, float stride) {
     int steps = search_steps[i], chunk = (steps + CHUNKS) / CHUNKS;  // steps 0..steps, both included
     int first = 0, last = steps;
     for (; first <= steps; first += chunk) {
@@ -57,7 +57,7 @@ void main() {
     bool is_flat = true;
     for (int i = 0; i < source_count; i++) {
         float stride = (nearest - farthest) / float(max(search_steps[i], 1));
-        spans[i] = span_of(i, stride);
+        spans[i] = interval_of(i, stride);
         seen[i] = seen_between(i, nearest - stride * float(spans[i].x), nearest - stride * float(spans[i].y));
         is_flat = is_flat && search_steps[i] > 0 && seen[i].y - seen[i].x < 1.5 * stride;
     }
@@ -66,6 +66,6 @@ void main() {
         int k = min(i, source_count - 1);
         found[i] = is_flat ? vec2(0.5 * (seen[k].x + seen[k].y), -1.0) : vec2(spans[k]);
     }
-    spans_of_0_and_1 = vec4(found[0], found[1]);
-    spans_of_2_and_3 = vec4(found[2], found[3]);
+    intervals_of_0_and_1 = vec4(found[0], found[1]);
+    intervals_of_2_and_3 = vec4(found[2], found[3]);
 }

@@ -24,7 +24,7 @@ vec2 clear_of_seam(vec2 at, float layer, float disparity, float edge_height, vec
 // span: the first and the last of them that can tell anything.
 // The search goes from near to far. A step over a depth edge is no surface (accepting it stretches the foreground like a
 // rubber sheet): the search goes on behind it, and where it ends there, the eye sees what the view does not.
-Surface front_most(vec2 uv, float layer, vec2 delta, int steps, ivec2 span) {
+Surface first_hit(vec2 uv, float layer, vec2 delta, int steps, ivec2 span) {
     float stride = (nearest - farthest) / float(steps);
     vec2 parallax_px = delta * (nearest - farthest) * view_size_px;
     vec2 seam = parallax_px * min(1.0, 2.0 / max(length(parallax_px), 1e-6)) / view_size_px;
