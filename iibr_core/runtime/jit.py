@@ -6,14 +6,30 @@ written out.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from math import floor
+from typing import Any
 
 import numba
 import numpy as np
 
+from iibr_core.runtime.kernel_cache import KernelCache
+
 # Reassociation and contraction only: NaN and infinity keep their meaning.
-kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
-"""Threads run these at the same time, and each is compiled once per machine."""
+_compile = numba.njit(nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """The function, compiled at its first call; threads run it at the same time. The only decorator for hot loops.
+
+    It is compiled once per machine and source (`runtime/kernel_cache.py`), or in every process where nothing can be kept.
+    """
+    compiled = _compile(function)
+    if not numba.config.DISABLE_JIT:
+        with suppress(OSError, RuntimeError):
+            compiled._cache = KernelCache(function)
+    return compiled
 
 
 KNOTS = 4096
