@@ -23,7 +23,7 @@ _compile = numba.njit(nogil=True, error_model="numpy", fastmath={"reassoc", "con
 def kernel(function: Callable[..., Any]) -> Any:
     """The function, compiled at its first call; threads run it at the same time. The only decorator for hot loops.
 
-    It is compiled once per machine and source (`runtime/kernel_cache.py`), or in every process where nothing can be kept.
+    It is compiled once per machine and source (`runtime/kernel_cache.py`); in every process where nothing can be kept.
     """
     compiled = _compile(function)
     if not numba.config.DISABLE_JIT:

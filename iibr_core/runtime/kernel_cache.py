@@ -23,7 +23,7 @@ _LINE_NUMBER = re.compile(r"-\d+(?=\.py\d+\w*$)")
 
 
 class KernelCache(FunctionCache):  # type: ignore[misc]  # numba has no types
-    """Of one kernel: Numba's, but for the stamp, the names of its files, and that what goes wrong with a file is a miss.
+    """Of one kernel: Numba's, but for the stamp, the names of the files, and that a file gone bad is a miss.
 
     Raises OSError or RuntimeError where the kernel's source cannot be read, or nothing can be written.
     """

@@ -19,7 +19,7 @@ from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
 HEIGHT, WIDTH = 18, 22
-few = settings(max_examples=20, deadline=None)
+few = settings(max_examples=20)
 seeds = st.integers(0, 10_000)
 steps = st.integers(-8, 8).map(lambda quarter: quarter / 4)
 offsets = st.builds(ViewOffset, steps, steps)

@@ -72,7 +72,7 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
     return distance
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 1000), st.floats(0.05, 0.25), st.floats(0.1, 0.9), st.floats(0.1, 0.9))
 def test_distances_are_shortest_ways(seed: int, radius: float, x: float, y: float) -> None:
     rng = np.random.default_rng(seed)
@@ -163,7 +163,7 @@ def begun(wanted: DepthEdits, points: int) -> DepthEdits:
     return DepthEdits(wanted.is_inverted, gamma=wanted.gamma, strokes=(*wanted.strokes[:-1], short))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(edits, min_size=1, max_size=4), st.randoms())
 def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdits], random: object) -> None:
     rng = np.random.default_rng(0)

@@ -76,7 +76,7 @@ def test_larger_photos_give_the_same_map_larger() -> None:
     np.testing.assert_allclose(large[1::3, 1::3], small, atol=0.1)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(1, 30), st.integers(1, 30), st.sampled_from([0.0, 1.0, 60000.0]), st.integers(0, 9))
 def test_any_photo_gives_a_finite_map_of_its_size(height: int, width: int, brightest: float, seed: int) -> None:
     pixels = np.random.default_rng(seed).random((height, width, 3)) * brightest

@@ -149,7 +149,7 @@ def test_unknown_disparity_is_filled() -> None:
     assert np.isfinite(refine(photo.pixels, values)).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     hnp.arrays(
         np.float32,

@@ -119,7 +119,7 @@ def test_bad_distances_are_told(baseline_m: float, focus_m: float) -> None:
         disparity_from(MetricDepth(np.ones((2, 2), np.float32), 100.0), GRID, baseline_m, focus_m)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     hnp.arrays(np.float32, st.tuples(st.integers(1, 8), st.integers(1, 8)), elements=st.floats(width=32)),
     st.sampled_from([RelativeInverseDepth, MetricDepth, DisparityMap]),

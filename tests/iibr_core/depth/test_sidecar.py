@@ -79,7 +79,6 @@ def walk(values, y, x, dy, dx):
     return None
 
 
-@settings(deadline=None)
 @given(MAPS)
 def test_fill_agrees_with_its_slow_twin(values):
     if np.isnan(values).all():
@@ -170,7 +169,7 @@ def test_resampling_agrees_with_its_slow_twin():
         )
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(MAPS)
 def test_same_size_is_the_identity(values):
     assert np.array_equal(resample_surfaces(values, image_size(values)), values, equal_nan=True)

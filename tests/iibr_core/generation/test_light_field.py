@@ -186,7 +186,7 @@ def test_a_wire_keeps_its_width():
     assert (view.colors[5:-5, [10, 11, 13, 14]] < 60).all()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(-3, 3), st.integers(-3, 3), st.integers(0, 3))
 def test_shifting_the_photo_shifts_the_views(down, right, seed):
     random = np.random.default_rng(seed)

@@ -88,7 +88,7 @@ def test_disparities_of_any_size(renderer: Renderer, disparity: float) -> None:
 eyes = st.floats(*eye_limits(3))
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.builds(
         Optics,
