@@ -7,8 +7,7 @@ Disparity d     pixels per view step, of the view it is given for. A point seen 
 Pixel centres   integers in arrays (the picture spans -0.5 .. width - 0.5); + 0.5 only in GL texture coordinates.
 Rows            row 0 is the top everywhere on the CPU.
 Colour          sRGB-encoded, 1 = white, as photos are; HDR values exceed 1 on the same curve, continued. Sums of
-light are
-                taken in linear light (`iibr_core.color`).
+                light are taken in linear light (`iibr_core.color`).
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatImage = NDArray[np.float32]
-"""(H, W, 3) or (H, W) float32."""
+"""float32: (H, W) or (H, W, 3) where no other shape is given."""
 
 StoredColors = NDArray[np.uint8] | NDArray[np.float16]
 """(H, W, 3), sRGB-encoded: uint8 for ordinary photos (255 = white), float16 for HDR ones (1 = white)."""
@@ -72,7 +71,7 @@ class GridShape(NamedTuple):
 
 
 def image_size(pixels: NDArray[Any]) -> ImageSize:
-    """The size of an image (H, W) or (H, W, C)."""
+    """The size of an image (H, W, ...)."""
     return ImageSize(pixels.shape[0], pixels.shape[1])
 
 
@@ -82,7 +81,7 @@ class Photo:
 
     pixels: (H, W, 3) float32, sRGB-encoded, finite, >= 0; `is_hdr` photos exceed 1.
     focal_px: focal length in pixels of this size. notes: what reading it changed, one sentence each, for people.
-    Raises InputError for pixels that are not finite, so that nobody behind has to look.
+    Raises InputError for pixels that are not finite, so that no later step has to check.
     """
 
     pixels: FloatImage
@@ -107,7 +106,7 @@ class Disparity:
 
     values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
     ("scene.pfm", "none").
-    Raises InputError for values that are not finite, so that nobody behind has to look.
+    Raises InputError for values that are not finite, so that no later step has to check.
     """
 
     values: FloatImage

@@ -39,6 +39,7 @@ void main() {
     vec2 line = blur_from_depth(focus);
     vec4 front = vec4(0.0), back = vec4(0.0);
     float all = 0.0;
+    // Tiles without defocused light add to the weights only.
     bool is_empty = false;
 #ifdef TILES
     vec2 widest = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xy;
@@ -55,6 +56,7 @@ void main() {
         all += weight;
         vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
         float blur = blur_beyond_range(light.a * line.x + line.y);
+        // Alpha-weighted light, less the share of the sharp layer, on its side of the focus plane.
         vec4 weighted = vec4(light.rgb, 1.0) * (weight - weight * sharpness(blur));
         front += blur > 0.0 ? weighted : vec4(0.0);
         back += blur > 0.0 ? vec4(0.0) : weighted;
@@ -69,6 +71,7 @@ void main() {
     int count = sample_count;
 #ifdef TILES
     vec3 tile = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xyz;
+    // All sharp: the first few samples suffice, with weights of their own. All defocused: nothing to gather.
     bool is_sparse = max(tile.x, tile.y) < sparse_up_to_px;
     if (is_sparse) count = sparse_count;
     if (tile.z >= sharp_up_to_px.y) count = 0;
@@ -83,6 +86,7 @@ void main() {
         if (is_sparse) weight = reprojections[i].w;
 #endif
         vec3 place = place_of(i, focus, weight);
+        // Backward warp: the sample's light from its view, in linear light.
         vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
 #ifdef SHARP
         weight *= sharpness(blur_beyond_range(light.a * line.x + line.y));

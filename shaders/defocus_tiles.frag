@@ -27,11 +27,13 @@ void main() {
     vec2 tile = floor(gl_FragCoord.xy);
     vec2 widest = vec2(0.0);
     float least = 1e6;
+    // Places of the tile, borders included, and for each what every sample sees there.
     for (int y = 0; y < taps; y++)
         for (int x = 0; x < taps; x++) {
             vec2 place = picture_uv((tile + vec2(x, y) / float(taps - 1)) * tile_uv);
             float focus = focus_at(place);
             for (int i = 0; i < sample_count; i++) {
+                // Beside the focus by how much, less what the focus range leaves sharp.
                 vec2 beside = disparities_at(i, place, focus) - focus;
                 beside -= clamp(beside, -focus_range, focus_range);
                 widest = max(widest, vec2(beside.y, -beside.x));

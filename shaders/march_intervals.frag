@@ -19,6 +19,7 @@ layout(location = 1) out vec4 intervals_of_2_and_3;
 // Least and greatest disparity of all that the tile's pixels may meet from one disparity to another.
 vec2 seen_between(int i, float from, float to) {
     vec2 tile = floor(gl_FragCoord.xy), low = vec2(1e9), high = vec2(-1e9);
+    // Where the tile's rays lie in the view between both disparities: the extremes are at its corners and at both ends.
     for (int corner = 0; corner < 4; corner++) {
         vec2 uv = picture_uv((tile + vec2(corner & 1, corner >> 1)) * tile_uv), delta = delta_to(i, uv);
         low = min(low, uv - max(delta * from, delta * to));
@@ -28,6 +29,7 @@ vec2 seen_between(int i, float from, float to) {
     ivec2 last_block = textureSize(blocks, 0).xy - 1;
     ivec2 first = clamp(ivec2(floor((low * view_size_px - margin) / block_px)), ivec2(0), last_block);
     ivec2 last = clamp(ivec2(floor((high * view_size_px + margin) / block_px)), ivec2(0), last_block);
+    // The range of all blocks there, by their least and greatest disparity.
     vec2 seen = vec2(1e9, -1e9);
     for (int y = first.y; y <= last.y; y++)
         for (int x = first.x; x <= last.x; x++) {
@@ -40,14 +42,17 @@ vec2 seen_between(int i, float from, float to) {
 ivec2 interval_of(int i, float stride) {
     int steps = search_steps[i], chunk = (steps + CHUNKS) / CHUNKS;  // steps 0..steps, both included
     int first = 0, last = steps;
+    // From the front: skip chunks whose steps are all nearer than any surface there; see first_hit for the bounds.
     for (; first <= steps; first += chunk) {
         float from = nearest - stride * float(first), to = from - stride * float(chunk - 1);
         if (seen_between(i, from, to).y >= to - 0.5 * stride) break;
     }
+    // From behind: skip chunks whose steps all lie behind the surfaces there.
     for (; last > first; last -= chunk) {
         float to = nearest - stride * float(last), from = to + stride * float(chunk - 1);
         if (seen_between(i, from, to).x <= from + 1.5 * stride) break;
     }
+    // From the step before, which is in empty space.
     return ivec2(max(first - 1, 0), min(max(last, first), steps));
 }
 
@@ -59,8 +64,10 @@ void main() {
         float stride = (nearest - farthest) / float(max(search_steps[i], 1));
         spans[i] = interval_of(i, stride);
         seen[i] = seen_between(i, nearest - stride * float(spans[i].x), nearest - stride * float(spans[i].y));
+        // One surface without edges, as far as the march could tell.
         is_flat = is_flat && search_steps[i] > 0 && seen[i].y - seen[i].x < 1.5 * stride;
     }
+    // Flat only if it is so in all sources; unused slots repeat the last one.
     vec2 found[MAX_SOURCES];
     for (int i = 0; i < MAX_SOURCES; i++) {
         int k = min(i, source_count - 1);

@@ -22,6 +22,7 @@ in vec2 uv;
 
 float weight_of(int i) {
 #ifdef DOLLY
+    // Bilinear between the corners of the cell.
     vec2 place = (uv - cell.xy) / (cell.zw - cell.xy);
     vec2 column = mix(corner_weights[i].xz, corner_weights[i].yw, place.x);
     return clamp(mix(column.x, column.y, place.y), 1e-6, 1.0);
@@ -40,11 +41,12 @@ vec2 interval_of(int i) {
 #endif
 }
 
-// Which surface shows is asked somewhere in the pixel, elsewhere in each round, so that edges become smooth; its colour
+// Which surface shows is asked somewhere in the pixel, elsewhere in each pass, so that edges become smooth; its colour
 // is that of the pixel's middle, so that nothing else is blurred.
 Surface surface_in(int i) {
     vec2 delta = delta_to(i, uv);
 #ifdef FLAT
+    // No edges: two steps of the fixed point, from about where the surface is.
     float seen = disparity_at(uv - delta * interval_of(i).x, sources[i].z);
     vec2 at = uv - delta * disparity_at(uv - delta * seen, sources[i].z);
     return Surface(seen, at, in_picture(at) < 1.0);
@@ -62,15 +64,18 @@ float share_left(Surface surfaces[MAX_SOURCES], int i) {
     float own = weight_of(i), weight = own;
     for (int j = 0; j < source_count; j++) {
         float in_front_by = surfaces[j].is_hidden ? 0.0 : surfaces[j].disparity - surfaces[i].disparity;
+        // A soft z-test; a view hides the less, the less it weighs.
         float hides = clamp(in_front_by / hiding_tolerance() - 1.0, 0.0, 1.0);
         weight *= 1.0 - hides * min(weight_of(j) / own, 1.0);
     }
+    // What a view does not see itself, or only beyond its border, counts where no other knows better.
     if (surfaces[i].is_hidden) weight *= 1e-3;
     return max(weight * in_picture(surfaces[i].at), 1e-8 * own);
 }
 
 void main() {
     Surface surfaces[MAX_SOURCES];
+    // Each view's surface, then their blend in linear light.
     for (int i = 0; i < source_count; i++) surfaces[i] = surface_in(i);
     vec4 sum = vec4(0.0);
     float total = 0.0;
@@ -81,6 +86,7 @@ void main() {
     }
     vec4 light = vec4(sum.rgb / total, 1.0) * share;
 #if defined(SHARP) || defined(BLURRED)
+    // Its defocus decides which layer the light goes to.
     vec2 line = blur_from_depth(focus_at(uv));
     float blur = blur_beyond_range(sum.a / total * line.x + line.y);
     float sharp = sharpness(blur);

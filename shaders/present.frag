@@ -22,8 +22,10 @@ vec3 composed(vec2 at) {
     vec4 focus = texelFetch(focus_layer, ivec2(at * vec2(textureSize(focus_layer, 0))), 0);
     vec2 weight = textureLod(weights, half_at, 0.0).rg;
     float total = max(weight.r, 1e-9);
+    // The smoothed background gets the weight that it had before smoothing.
     float back_weight = max(total - focus.a - weight.g, 0.0);
     float back_scale = back_weight / max(back.a, 1e-4 * total);
+    // Over both lies the smoothed foreground (alpha compositing).
     vec4 beyond = focus + back_scale * back + 1e-3 * front;
     return mix(beyond.rgb / max(beyond.a, 1e-9), front.rgb / max(front.a, 1e-9), min(front.a / total, 1.0));
 }

@@ -2,7 +2,7 @@
 // Spreads the defocused layers over what lies between neighbouring samples: one direction of a box as wide as the blur.
 uniform sampler2D front_layer, back_layer, tiles;
 uniform ivec2 direction;
-uniform float narrowing;      // what remains of the blur that the tiles tell: more rounds leave less in between
+uniform float narrowing;      // what remains of the blur that the tiles tell: more passes leave less in between
 uniform float empty_up_to_px; // as wide a blur is in the sharp layer
 
 const float HALF_SIZE_BLUR = 8.0;  // px squared: half the size is a blur too, as wide as a box of this width squared
@@ -15,9 +15,11 @@ vec4 box_mean(sampler2D layer, float width_px) {
     if (width_px <= empty_up_to_px) return vec4(0.0);
     ivec2 here = ivec2(gl_FragCoord.xy), last = textureSize(layer, 0) - 1;
     width_px *= narrowing;
+    // Variances add: what the half size blurs already is taken off. reach: half the box, texels.
     float reach = 0.25 * sqrt(max(width_px * width_px - HALF_SIZE_BLUR, 4.0));  // a texel is two px wide
     int whole = int(min(ceil(reach - 0.5), 40.0));
     vec4 sum = vec4(0.0);
+    // A box with antialiased ends.
     for (int i = -whole; i <= whole; i++)
         sum += clamp(reach + 0.5 - abs(float(i)), 0.0, 1.0)
             * texelFetch(layer, clamp(here + i * direction, ivec2(0), last), 0);

@@ -1,5 +1,5 @@
-"""A rough guess at depth without any model: things stand lower in the picture, and edges lie before them, the nearer
-they are.
+"""A rough guess at depth without any model: the nearer things are, the lower they stand in the picture, and the more
+edges lie between them and its upper border.
 
 Two cues are kept: the height in the picture, and how much change of colour lies on the way from the upper border, which
 shows what is far. Sharpness, haze, saturation, brightness and a prior for the middle did not help
@@ -92,6 +92,7 @@ def _box_filter(image: FloatImage, radius: int) -> FloatImage:
     """Means over squares, (H, W, ...); at the frame over what of them lies inside."""
     for axis in (0, 1):
         count = image.shape[axis]
+        # A difference of running sums: the cost does not depend on the radius. float64, as the sums grow large.
         sums = np.insert(np.cumsum(image, axis=axis, dtype=np.float64), 0, 0.0, axis=axis)
         first, last = np.maximum(np.arange(count) - radius, 0), np.minimum(np.arange(count) + radius + 1, count)
         widths = (last - first).reshape([-1 if a == axis else 1 for a in range(image.ndim)])
@@ -112,9 +113,11 @@ def _guided_upsample(
 
     He et al., Guided Image Filtering, PAMI 2013, in its fast form: the linear model is enlarged, not the map.
     """
+    # The regression of the map on the guide in every square: gain = covariance / (variance + contrast^2).
     products = np.stack([values, guide, guide * values, guide * guide], axis=2)
     mean, guide_mean, product, square = np.moveaxis(_box_filter(products, GUIDE_PX), 2, 0)
     gain = (product - guide_mean * mean) / (square - guide_mean**2 + GUIDE_CONTRAST**2)
+    # Every pixel lies in many squares: it takes the mean of their models.
     model = _box_filter(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
     model = _resize(model, image_size(pixels), "triangle", should_stop)
     guided = np.empty(pixels.shape[:2], np.float32)
@@ -131,6 +134,7 @@ def _guided_upsample(
 def _grow_way(image, way):  # type: ignore[no-untyped-def]
     """Shortest ways from the pixels where `way` (H, W) is 0, over 8 neighbours, sweeping to and fro."""
     height, width, channels = image.shape
+    # Geodesic distance by raster scans (Toivanen 1996): there and back instead of the queue of Dijkstra.
     for sweep in range(2 * SWEEPS):
         to = 1 if sweep % 2 == 0 else -1
         for row in range(height):
@@ -143,6 +147,8 @@ def _grow_way(image, way):  # type: ignore[no-untyped-def]
                     u = x - to if n == 0 else x + n - 2
                     if not (0 <= v < height and 0 <= u < width):
                         continue
+                    # The way over this neighbour: root of the summed squares of the change in colour, and the step
+                    # itself.
                     change = 0.0
                     for c in range(channels):
                         change += (image[y, x, c] - image[v, u, c]) ** 2

@@ -90,6 +90,7 @@ def edge_blur_px(disparity: FloatImage, should_stop: ShouldStop = never) -> floa
     extent = _extent(disparity)
     if not extent > 0 or min(height, width) < 2:
         return 0.0
+    # Measured on ever smaller maps until ramps are short against the reach of the search.
     coarser = 0
     while True:
         sigmas, heights = _edges(disparity, MEASURED_EDGE * extent, should_stop)
@@ -146,6 +147,7 @@ def _downsample(values: FloatImage) -> FloatImage:
 def _at(values, x, y):  # type: ignore[no-untyped-def]
     """The map at a real position, bilinear; its border pixels continue outside."""
     height, width = values.shape
+    # The last cell of pixels is used up to its far end: both taps exist even there.
     x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
     left, top = min(int(x), width - 2), min(int(y), height - 2)
     u, v = x - left, y - top
@@ -159,6 +161,7 @@ def _steepest_direction(values, x, y):  # type: ignore[no-untyped-def]
     """Gradient (x, y) of the map about a pixel, over 5 x 5."""
     height, width = values.shape
     across = down = 0.0
+    # Separable: binomial smoothing (1 4 6 4 1) along one axis, smoothed differences (-1 -2 0 2 1) along the other.
     for j in range(-2, 3):
         row = min(max(y + j, 0), height - 1)
         smooth_j = (6.0 if j == 0 else 4.0 if abs(j) == 1 else 1.0) / 16.0
@@ -179,11 +182,14 @@ def _walk(values, x, y, across, down, sign, reach, pace, beyond):  # type: ignor
     reach: at most so many steps; pace: of so many pixels; beyond: no farther than that past the steepest place, px.
     """
     before, steepest, slope, last, steepest_at = _at(values, x, y), 0.0, 0.0, 0.0, 0.0
+    # A march along the gradient, one sample a step.
     for k in range(1, reach + 1):
         far = sign * k * pace
         value = _at(values, x + far * across, y + far * down)
+        # Rise a pixel since the last sample, positive both ways along the ramp.
         slope = (value - before) * sign / pace
         levelled = slope < 0.5 * steepest and slope > 0.85 * last
+        # The plateau: nearly flat, or no longer rising, or levelled off on a slanted surface, or too far past the edge.
         if slope <= FLATNESS * steepest or slope <= 0 or levelled or (k - 1) * pace > steepest_at + beyond:
             return (k - 1) * pace, before, slope, steepest, steepest_at
         if slope > steepest:
@@ -205,14 +211,18 @@ def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights
         for x in range(width):
             across, down = _steepest_direction(values, x, y)
             slope = sqrt(across * across + down * down)
+            # Even this slope, kept up over the whole search, makes no edge.
             if not slope * 2 * reach > least_edge:
                 continue
             across, down = across / slope, down / slope
+            # Both ends of the ramp, as far as they go.
             _, top, end_up, steepest_up, at_up = _walk(values, x, y, across, down, 1.0, reach, 1.0, np.inf)
             _, bottom, end_down, steepest_down, at_down = _walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
             steepest = max(steepest_up, steepest_down)
             nearest = at_up if steepest_up >= steepest_down else at_down
+            # Only from the steepest pixel of an edge, and where plateaus are flat: else it is a slanted surface.
             if top - bottom > least_edge and nearest < 1 and max(end_up, end_down) <= STEEPEST_PLATEAU * steepest:
+                # A step blurred by a Gaussian is height / (sqrt(2 pi) sigma) steep at its middle.
                 sigmas[count] = (top - bottom) / (EDGE_SIGMAS * steepest)
                 heights[count] = top - bottom
                 count += 1
@@ -223,10 +233,12 @@ def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights
 def _foreground_colour(photo, x, y, across, down, front, behind):  # type: ignore[no-untyped-def]
     """Matting: a colour between those so far away; -0.5 background .. 0.5 foreground, nearer 0 the less sure."""
     height, width = photo.shape[:2]
+    # Pixels of both surfaces, beyond the ramp.
     front_x = min(max(floor(x + across * front + 0.5), 0), width - 1)
     front_y = min(max(floor(y + down * front + 0.5), 0), height - 1)
     back_x = min(max(floor(x - across * behind + 0.5), 0), width - 1)
     back_y = min(max(floor(y - down * behind + 0.5), 0), height - 1)
+    # Matting: where the colour lies on the line between theirs, how far apart they are, how far off it is.
     along = contrast = away = 0.0
     for c in range(3):
         background = photo[back_y, back_x, c]
@@ -234,6 +246,7 @@ def _foreground_colour(photo, x, y, across, down, front, behind):  # type: ignor
         own = photo[y, x, c] - background
         along, contrast, away = along + own * difference, contrast + difference**2, away + own**2
     share = along / max(contrast, 1e-9)
+    # Sure where both surfaces differ by more than noise and the colour lies on the line.
     residual = max(away - share * along, 0.0)
     return (min(max(share, 0.0), 1.0) - 0.5) * contrast / (contrast + residual + COLOR_NOISE)
 
@@ -242,6 +255,7 @@ def _foreground_colour(photo, x, y, across, down, front, behind):  # type: ignor
 def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, refined):  # type: ignore[no-untyped-def]
     """Rows [first_row, last_row) of the refined map. softness: 0 = steps, 1 = as given."""
     width = values.shape[1]
+    # Wide ramps are walked in longer steps: all of them take about as many.
     pace = max(1.0, sigma / STEPS_A_SIGMA)
     reach = ceil(5.0 * sigma / pace) + 1
     for y in range(first_row, last_row):
@@ -250,9 +264,11 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
             refined[y, x] = here
             across, down = _steepest_direction(values, x, y)
             slope = sqrt(across * across + down * down)
+            # Too flat to belong to an edge: most pixels end here.
             if not slope * 4 * reach * pace > least_edge:
                 continue
             across, down = across / slope, down / slope
+            # Where the ramp ends both ways; its height there.
             up, top, _, steepest_up, at_up = _walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
             back, bottom, _, steepest_down, at_down = _walk(
                 values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
@@ -260,13 +276,15 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
             steepest = max(steepest_up, steepest_down)
             if top - bottom < least_edge:
                 continue
-            # The step was where the ramp is steepest; its plateaus lie some sigmas to both sides.
+            # The step was where the ramp is steepest (px up it from here); its plateaus lie some sigmas to both sides.
             edge = at_up if steepest_up >= steepest_down else -at_down
             up, back = min(up, edge + PLATEAU_SIGMAS * sigma), min(back, PLATEAU_SIGMAS * sigma - edge)
             top = _at(values, x + across * up, y + down * up)
             bottom = _at(values, x - across * back, y - down * back)
+            # Higher than a step of this slope can be after a blur of sigma: a slanted surface.
             if not (least_edge <= top - bottom <= TOLERANCE * EDGE_SIGMAS * sigma * steepest):
                 continue
+            # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
             limit = MOST_EXTENSION * steepest
             beyond = (_at(values, x + across * (up + 2), y + down * (up + 2)) - top) / 2
             top = max(top - EXTENSION * up * min(max(beyond, -limit), limit), here)
@@ -275,9 +293,11 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
             if not top > bottom:
                 continue
 
+            # Where does this pixel belong? By its height on the ramp and by its colour in the photo, ...
             front = min(up, edge + COLOR_SIGMAS * sigma + 1)
             behind = min(back, COLOR_SIGMAS * sigma + 1 - edge)
             colour = _foreground_colour(photo, x, y, across, down, front, behind)
+            # ... steepened about the middle of the ramp; softness near 0 makes a step.
             place = (here - bottom) / (top - bottom) - 0.5
             place = (place + COLOR_SHARE * (1.0 - softness) * colour) / softness + 0.5
             refined[y, x] = bottom + (top - bottom) * min(max(place, 0.0), 1.0)

@@ -68,6 +68,7 @@ def _splat(disparity, t, s):  # type: ignore[no-untyped-def]
                 for i in range(SAMPLES):
                     point_x = x + (i + 0.5) / SAMPLES - 0.5
                     point_y = y + (j + 0.5) / SAMPLES - 0.5
+                    # Forward warp: x lands at x - d (s, t). A z-test keeps the nearest.
                     d = _surface_at(disparity, x, y, point_x, point_y)
                     to_x, to_y = math.floor(point_x - d * s + 0.5), math.floor(point_y - d * t + 0.5)
                     if 0 <= to_x < width and 0 <= to_y < height and d > nearest[int(to_y), int(to_x)]:
@@ -83,6 +84,7 @@ def _surface_at(disparity, x, y, point_x, point_y):  # type: ignore[no-untyped-d
         return disparity[y, x]
     a, b = disparity[top, left], disparity[top, left + 1]
     c, d = disparity[top + 1, left], disparity[top + 1, left + 1]
+    # Across a depth edge nothing is interpolated: such points would fly free.
     if not max(a, b, c, d) - min(a, b, c, d) < SAME_SURFACE:
         return disparity[y, x]
     across, down = np.float32(point_x - left), np.float32(point_y - top)
@@ -95,6 +97,7 @@ def _lanczos_weight(distance):  # type: ignore[no-untyped-def]
         return 1.0
     if abs(distance) >= LOBES:
         return 0.0
+    # sinc(x) sinc(x / LOBES).
     angle = math.pi * distance
     return LOBES * math.sin(angle) * math.sin(angle / LOBES) / (angle * angle)
 
@@ -109,6 +112,7 @@ def _lanczos(photo, from_x, from_y):  # type: ignore[no-untyped-def]
         for column in range(from_x.shape[1]):
             x = min(max(from_x[row, column], -0.5), width - 0.5)
             y = min(max(from_y[row, column], -0.5), height - 0.5)
+            # The 6 x 6 taps around the position; separable weights.
             left, top = math.floor(x) - LOBES + 1, math.floor(y) - LOBES + 1
             for k in range(2 * LOBES):
                 weights_x[k], weights_y[k] = _lanczos_weight(x - left - k), _lanczos_weight(y - top - k)
@@ -122,6 +126,7 @@ def _lanczos(photo, from_x, from_y):  # type: ignore[no-untyped-def]
                     red += w * photo[v, u, 0]
                     green += w * photo[v, u, 1]
                     blue += w * photo[v, u, 2]
+            # Lanczos weights do not sum to exactly 1.
             result[row, column, 0] = red / total
             result[row, column, 1] = green / total
             result[row, column, 2] = blue / total
@@ -138,6 +143,7 @@ def _fill_holes(colors, hole, disparity):  # type: ignore[no-untyped-def]
         for x in range(width):
             if not hole[y, x]:
                 continue
+            # What is met first in each direction, and the farthest disparity of all that.
             count, farthest = 0, np.inf
             for k in range(8):
                 step_x, step_y = EIGHT[k]
@@ -156,6 +162,7 @@ def _fill_holes(colors, hole, disparity):  # type: ignore[no-untyped-def]
                     count += 1
                     break
             total = red = green = blue = 0.0
+            # The mean of the farthest surface, by 1 / distance^2: the background continues into the hole.
             for k in range(count):
                 v, u, length = met[k]
                 if disparity[v, u] >= farthest + SIMILAR:

@@ -1,7 +1,7 @@
 """What making a scene's views will cost, before any is made: time and memory in each quality.
 
-Cost follows what the scene needs: how many views, how many of their rays several surfaces contest, whether views look
-beyond the photo's frame. The constants were measured; `python -m benchmarks.prediction` fits them anew.
+Cost follows what the scene needs: how many views, how many of their rays are ambiguous, whether views look beyond the
+photo's frame. The constants were measured; `python -m benchmarks.prediction` fits them anew.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ GAP_PX = 1.0
 MOST_PARALLAX_PX = 1e6
 
 RAY_BYTES, STATISTICS_BYTES = 21, 12
-"""Of one pixel of one source image: colours, disparity, coverage, flag (rays.RaySet); what lies around it."""
+"""Of one pixel of one source image: colours, disparity, coverage, flag (ray_set.RaySet); its statistics."""
 WORKING_BYTES = 18
 """Of one pixel of a view in the making: float colours, disparity, flags."""
 CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
@@ -38,8 +38,8 @@ class Workload(NamedTuple):
 
     photo_pixels: made rays of, once. view_pixels: each gets candidates, weights, a colour. meeting_pixels: those of
     them where surfaces meet. framed_pixels: view_pixels, where views look beyond the photo's frame. ambiguous_rays,
-    soft_rays, plain_rays: that the transformer is asked for, where surfaces contest a ray in maps with sharp and with
-    soft edges, and where none do.
+    soft_rays, plain_rays: that the transformer is asked for; ambiguous ones in maps with sharp and with soft edges, and
+    rays that are not.
     """
 
     photo_pixels: float
@@ -82,7 +82,7 @@ NO_COST = CostEstimates(*3 * [CostEstimate(0.0, 0)])
 @dataclass(frozen=True, eq=False)
 class ParallaxStatistics:
     """How content moves in the outermost view, px. step (H, W): the largest difference between neighbours near each
-    pixel. change (H, W): from least to most around it. softness: see `Statistics`. most_px: of all content.
+    pixel. change (H, W): from least to most around it. softness: see `DisparityStatistics`. most_px: of all content.
     frame_px: of what lies at the frame.
     """
 
@@ -104,7 +104,7 @@ class ParallaxStatistics:
 
     @property
     def is_soft(self) -> bool:
-        """Whether depth edges are slopes: then rays are searched for what contests them farther around."""
+        """Whether depth edges are slopes: then surfaces that make a ray ambiguous are looked for farther around."""
         from iibr_core.rendering.ambiguous_rays import SOFT
 
         return self.softness > SOFT
@@ -116,7 +116,7 @@ class ParallaxStatistics:
         return float((self.step * np.float32(parallax) > AMBIGUOUS_PX).mean())
 
     def ambiguous_share(self, parallax: float) -> float:
-        """Share of the rays that several surfaces contest there: more where edges are soft."""
+        """Share of the rays that are ambiguous there: more where edges are soft."""
         from iibr_core.rendering.ambiguous_rays import AMBIGUOUS_AROUND_PX
 
         if not self.is_soft:
@@ -160,6 +160,7 @@ def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstim
 def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> Workload:
     """What there is to do for all views of a grid in one quality."""
     pixels, views = statistics.step.size, grid.rows * grid.columns - 1
+    # The farthest views are made twice: to inpaint the ray set in closed form, then with the transformer.
     twice = _inpainted_views(statistics, grid) if quality != "fast" else 0
     made = pixels * (views + twice)
     meeting = pixels * (_sum_over_views(statistics.meeting_share, grid) + twice * statistics.meeting_share(1.0))

@@ -104,9 +104,11 @@ def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):  # type
     """
     height, width = hole.shape
     total = len(pixels)
+    # In the order in which the next pixel in that direction, if a hole, comes first.
     downwards = step_y < 0 or (step_y == 0 and step_x < 0)
     for n in range(total):
         i = n if downwards else total - 1 - n
+        # The neighbour: off the frame, a hole that passes on what it found, or known.
         y, x = pixels[i] // width + step_y, pixels[i] % width + step_x
         known[i] = -1
         if not (0 <= x < width and 0 <= y < height):
@@ -114,6 +116,7 @@ def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):  # type
         if hole[y, x]:
             known[i] = known[number[y, x]]
             continue
+        # One farther if that is known too: the first may be mixed with what hides the hole.
         beyond_x, beyond_y = x + step_x, y + step_y
         if 0 <= beyond_x < width and 0 <= beyond_y < height and not hole[beyond_y, beyond_x]:
             x, y = beyond_x, beyond_y
@@ -130,16 +133,19 @@ def _fill(colors, disparity, pixels, known, photo_disparity, s, t):  # type: ign
         y, x = pixels[i] // width, pixels[i] % width
         farthest = np.inf
         any_possible = False
+        # Which of the surfaces around may continue to here: where each would lie in the photo (backward warp), ...
         for k in range(directions):
             possible[k] = False
             if known[i, k] < 0:
                 continue
             d = disparity[known[i, k] // width, known[i, k] % width]
             farthest = min(farthest, d)
+            # ... something nearer must hide it by HIDDEN_PX, or it must be off the frame.
             column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
             inside = 0 <= column < width and 0 <= row < height
             possible[k] = not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX
             any_possible = any_possible or possible[k]
+        # Their mean, weighted by 1 / distance.
         total = r = g = b = sum_d = 0.0
         for k in range(directions):
             if known[i, k] < 0:
@@ -167,6 +173,7 @@ def _smooth(colors, disparity, hole, pixels, tolerance, smoothed):  # type: igno
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         count = r = g = b = 0.0
+        # A box mean over the hole's pixels of one surface: known pixels stay sharp, and do not bleed in.
         for v in range(max(y - SMOOTH_PX, 0), min(y + SMOOTH_PX + 1, height)):
             for u in range(max(x - SMOOTH_PX, 0), min(x + SMOOTH_PX + 1, width)):
                 if hole[v, u] and abs(disparity[v, u] - disparity[y, x]) <= tolerance:

@@ -62,12 +62,14 @@ def _nearest_before(values, near, steps):  # type: ignore[no-untyped-def]
         left_steps = 0
         for x in range(width):
             value = values[y, x]
+            # A known value is the nearest for whoever comes next, on all lines.
             if not math.isnan(value):
                 left, left_steps = value, 0
                 for k in range(3):
                     row[k, x + 1] = value
                     row_steps[k, x + 1] = 0
                 continue
+            # Each unknown pixel inherits what its predecessor on the line saw, one step farther away.
             left_steps += 1
             for k in range(3):
                 row[k, x + 1] = above[k, x + k]
@@ -77,6 +79,7 @@ def _nearest_before(values, near, steps):  # type: ignore[no-untyped-def]
             near[count, 3] = left
             steps[count, 3] = left_steps
             count += 1
+        # Swapped, not copied: the next row overwrites what was above.
         above, row = row, above
         above_steps, row_steps = row_steps, above_steps
 
@@ -89,11 +92,13 @@ def _farther_side(near, steps, step_lengths):  # type: ignore[no-untyped-def]
     farther = np.empty(4)
     for n in range(near.shape[1]):
         for k in range(4):
+            # A line with one end: the hole is open there, up to the frame. With none: nothing.
             before, after = near[0, n, k], near[1, n, k]
             if math.isnan(before) or math.isnan(after):
                 farther[k] = after if math.isnan(before) else before
                 spans[k] = OPEN_LINE * step_lengths[k] * (steps[1, n, k] if math.isnan(before) else steps[0, n, k])
             else:
+                # Two ends: the background is the farther one; the way across the hole is the line's span.
                 farther[k] = min(before, after)
                 spans[k] = step_lengths[k] * (steps[0, n, k] + steps[1, n, k])
             if math.isnan(farther[k]):
@@ -102,6 +107,7 @@ def _farther_side(near, steps, step_lengths):  # type: ignore[no-untyped-def]
         total, weights = 0.0, 0.0
         for k in range(4):
             if spans[k] < np.inf:
+                # Relative to the shortest, so that no power overflows.
                 weight = (shortest / spans[k]) ** SHORTNESS
                 total += weight * farther[k]
                 weights += weight

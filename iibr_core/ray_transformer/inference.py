@@ -1,4 +1,4 @@
-"""Runs a trained ray transformer: the arithmetic of `ray_transformer.RayTransformer` as one loop, without torch.
+"""Runs a trained ray transformer: the arithmetic of `model.RayTransformer` as one loop, without torch.
 
 Importing torch takes longer than a light field; for networks this small a compiled loop is as fast.
 """
@@ -53,6 +53,7 @@ def _add_product(inputs, w, outputs, lanes):  # type: ignore[no-untyped-def]
     for j in range(w.shape[1]):
         out = outputs[j]
         for i in range(0, w.shape[0], 4):
+            # Four inputs at a time: one load and store of the output for four products.
             a, b, c, d = w[i, j], w[i + 1, j], w[i + 2, j], w[i + 3, j]
             x, y, z, u = inputs[i], inputs[i + 1], inputs[i + 2], inputs[i + 3]
             for lane in range(lanes):
@@ -73,6 +74,7 @@ def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weigh
     zero = np.float32(0.0)
     for first in range(0, rays, RAYS_A_BLOCK):
         count = min(RAYS_A_BLOCK, rays - first)
+        # Pack the hypotheses in use: unused ones cost nothing, and no mask is needed below.
         for r in range(count):
             used = mask[first + r].sum()
             start[r + 1] = start[r] + used
@@ -80,13 +82,16 @@ def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weigh
                 for i in range(len(inputs)):
                     inputs[i, start[r] + a] = features[first + r, a, i]
         lanes = start[count]
+        # Biases. That of the keys is added once a ray, to its query.
         for j in range(WIDTH):
             hidden[j, :lanes], embedded[j, :lanes], query[j] = b1[j], b2[j], b_key[j]
+        # Embedding: two layers with ReLU, the second one's below.
         _add_product(inputs, w1, hidden, lanes)
         for j in range(WIDTH):
             for lane in range(lanes):
                 hidden[j, lane] = max(hidden[j, lane], zero)
         _add_product(hidden, w2, embedded, lanes)
+        # Pooling over the hypotheses of each ray: their mean and maximum.
         for j in range(WIDTH):
             for r in range(count):
                 total = peak = zero
@@ -95,15 +100,19 @@ def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weigh
                     embedded[j, lane] = value
                     total, peak = total + value, max(peak, value)
                 pooled[j, r], pooled[WIDTH + j, r] = total / np.float32(max(start[r + 1] - start[r], 1)), peak
+        # Query from the pooled ray, keys from its hypotheses; hidden begins as the query.
         _add_product(pooled, w_query, query, count)
         for j in range(WIDTH):
             for r in range(count):
                 hidden[j, start[r] : start[r + 1]] = query[j, r]
         _add_product(embedded, w_key, hidden, lanes)
+        # Additive attention: score = w . ReLU(query + key).
         score[:] = zero
         for j in range(WIDTH):
             for lane in range(lanes):
                 score[lane] += max(hidden[j, lane], zero) * w_score[j, 0]
+        # The closed form as prior: its weights are added as logarithms. Softmax, less the highest score against
+        # overflow.
         for r in range(count):
             highest, total = np.float32(-np.inf), zero
             for lane in range(start[r], start[r + 1]):

@@ -2,7 +2,7 @@
 
 Cross-attention of the target ray over its hypotheses (paper, section 3.2), additive: the query comes from the ray and
 all its hypotheses pooled, so their order does not matter; keys from each hypothesis. T starts as the closed form, whose
-share is the prior, and learns where to depart from it. This is T for training; `ray_weights` runs it without torch.
+share is the prior, and learns where to depart from it. This is T for training; `inference` runs it without torch.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Ambiguous rays: what they show lies near a depth edge of its source, so that someone has to decide what it is.
+"""Ambiguous rays: what they show lies near a depth edge of its source, so that it is open which surface they show.
 
 For each of them K hypotheses are laid out: surfaces that land within a few pixels, as different from each other as
 possible. A hypothesis says "this ray shows the source ray that disparity d leads to"; its features say how well that
@@ -21,7 +21,7 @@ from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_sca
 from iibr_core.types import FloatImage, ViewOffset
 
 HYPOTHESES = 6
-"""K: the paper's 5 surfaces and the plain look-up. More cost time and gain little (docs/transformer.md)."""
+"""K: the paper's 5 surfaces and the plain look-up. More take time and gain little (docs/transformer.md)."""
 PLAIN = 128
 """Added to the source of the hypothesis that the ray shows the front-most surface as the photo mixed it at its edge."""
 REACH_PX = 6
@@ -38,13 +38,13 @@ AROUND_SHARP = 12
 SOFT = 0.5
 """Where depth edges are softer than this, all of AROUND is looked at, else the first AROUND_SHARP."""
 AMBIGUOUS_PX = 1.5
-"""A step of disparity that moves its sides apart by less than this does not contest a ray."""
+"""A step of disparity that moves its sides apart by less than this makes no ray ambiguous."""
 OWN_LANDING_PX = 0.75
-"""What lands near by at less than this from a hypothesis is of its surface."""
+"""What lands near by and differs from a hypothesis by less parallax than this is of its surface."""
 AMBIGUOUS_AROUND_PX = 1.5
-"""Where edges are soft there are no steps: there a surface within REACH_PX contests a ray if it is this far off."""
+"""Soft edges have no steps: there a surface within REACH_PX whose parallax differs by this makes a ray ambiguous."""
 DISTINCT_PX = 0.5
-"""Hypotheses closer than this are one; a ray whose surfaces all are has nothing to decide."""
+"""Hypotheses closer than this are one; where all of a ray's are, nothing is to be decided."""
 LEAST_WEIGHT = 0.02
 LEAST_VOTE = 0.004
 """Weights below this change no colour by a visible step."""
@@ -89,8 +89,8 @@ def find_ambiguous_rays(
 ) -> AmbiguousRays:
     """The ambiguous rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
 
-    shown: disparity and source (N, W) of the candidates that `lookup.heaviest` gives. every: take all rays
-    near which anything lands, ambiguous or not. hypotheses: K, at least 2.
+    shown: what `resampling.heaviest_candidate` gives: disparity and source (N, W). every: take all rays near which
+    anything lands, ambiguous or not. hypotheses: K, at least 2.
     """
     first, last = rows
     shape = (last - first) * candidates.count.shape[1], hypotheses
@@ -162,6 +162,7 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
             w = weights[n, a]
             if not w > LEAST_VOTE:
                 continue
+            # Each hypothesis votes with the colour that its disparity leads to (paper, section 3.2).
             d, k = disparity[n, a], np.int64(source[n, a] % PLAIN)
             t, s = offsets[k, 0], offsets[k, 1]
             x = min(max(pixel[n, 1] + d * s, -0.5), width - 0.5)
@@ -170,13 +171,16 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
                 r, g, b = cubic(images, k, x, y)
             else:
                 r, g, b = resample(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
+            # How far the votes lie apart; the first is kept as it is.
             if total == 0.0:
                 first_r, first_g, first_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
             apart = max(apart, abs(r - first_r), abs(g - first_g), abs(b - first_b))
+            # The weighted sum of the paper's equation 1, in linear light.
             total += w
             red += w * linear_scalar(r)
             green += w * linear_scalar(g)
             blue += w * linear_scalar(b)
+        # To linear light and back costs the last digits: votes that agree do without.
         colors[n, 0], colors[n, 1], colors[n, 2] = first_r, first_g, first_b
         if apart > SAME_COLOR:
             colors[n, 0] = srgb_scalar(red / total)
@@ -198,10 +202,12 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
     near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
     found = 0
     for y in range(first, last):
+        # Band rows count from first_row, cells from the picture's first row.
         certain_cells = certain[(y + first_row % CELL_PX) // CELL_PX]
         for x in range(width):
             if certain_cells[x // CELL_PX]:
                 continue
+            # Ambiguous by its weights: several surfaces share the pixel, or they leave some of it open.
             heavy = 0
             covered = 0.0
             for k in range(np.int64(count[y, x])):
@@ -209,12 +215,14 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
                 covered += weights[k, y, x]
             is_ambiguous = every or heavy != 1 or covered < 1.0 - LEAST_WEIGHT
             if not is_ambiguous and is_soft:
+                # Soft edges: another surface shows near by.
                 for i in range(looks):
                     v, u = y + AROUND[i, 0], x + AROUND[i, 1]
                     if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
                         apart = abs(shown_disparity[v, u] - shown_disparity[y, x]) * parallax
                         is_ambiguous |= apart > AMBIGUOUS_AROUND_PX
             elif not is_ambiguous:
+                # Sharp edges: the source ray that shows here has a depth edge beside it.
                 d, origin_here = shown_disparity[y, x], np.int64(shown_source[y, x])
                 t, s = offsets[origin_here, 0], offsets[origin_here, 1]
                 u = min(max(nearest_pixel(x + d * s), 0), width - 1)
@@ -222,12 +230,14 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
                 is_ambiguous = step[origin_here, v, u] * parallax > AMBIGUOUS_PX
             if not is_ambiguous:
                 continue
+            # First the surfaces on the ray itself. One slot stays free for the plain hypothesis.
             picked = 0
             for k in range(np.int64(count[y, x])):
                 if weights[k, y, x] > LEAST_WEIGHT and picked < disparity.shape[1] - 1:
                     disparity[found, picked], source[found, picked] = surface[k, y, x], origin[k, y, x]
                     share[found, picked] = weights[k, y, x]
                     picked += 1
+            # What shows around it, the nearest first.
             n = 0
             for i in range(looks):
                 v, u = y + AROUND[i, 0], x + AROUND[i, 1]
@@ -239,10 +249,12 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
                 if is_inside or image >= photo_images:  # the photo shows nothing beyond its frame
                     near_d[n], near_k[n], near_px[n] = d, image, AROUND_DISTANCE[i]
                     n += 1
+            # In a hole: begin with the front-most surface around it.
             if picked == 0 and n > 0:
                 front = np.argmax(near_d[:n])
                 disparity[found, 0], source[found, 0], share[found, 0] = near_d[front], near_k[front], 0.0
                 picked = 1
+            # Farthest-point sampling of the disparities around it, until slots or distinct ones run out.
             own_picked = picked
             while 0 < picked < disparity.shape[1] - 1:
                 best, best_distance = -1, DISTINCT_PX
@@ -260,10 +272,12 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
                 disparity[found, picked], source[found, picked] = near_d[best], near_k[best]
                 share[found, picked] = 0.0
                 picked += 1
+            # Is there anything to decide?
             apart = 0.0
             for j in range(picked):
                 apart = max(apart, abs(disparity[found, j] - disparity[found, 0]) * parallax)
             if picked > 0 and (every or apart > DISTINCT_PX):
+                # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
                 mixed = 0
                 for j in range(own_picked):
                     if disparity[found, j] > disparity[found, mixed]:
@@ -271,6 +285,7 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
                 disparity[found, picked], source[found, picked] = disparity[found, mixed], source[found, mixed] + PLAIN
                 share[found, picked] = 0.0
                 picked += 1
+                # How near each surface lands: 0 on the ray itself, else by the first landing like it.
                 for j in range(picked):
                     nearest[found, j] = 0.0 if share[found, j] > 0 else REACH_PX + 1.0
                     if share[found, j] > 0:
@@ -285,10 +300,11 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _signed_log(px):  # type: ignore[no-untyped-def]
+def _softsign(px):  # type: ignore[no-untyped-def]
     """Pixels on a scale of -4..4 where small differences count most; 0 where there is no difference to tell."""
     if px != px:
         return 0.0
+    # 4 softsign(px / 4), finite for all input.
     px = min(max(px, -MOST_PX), MOST_PX)
     return px / (1.0 + 0.25 * abs(px))
 
@@ -299,12 +315,14 @@ def _describe_hypotheses(  # type: ignore[no-untyped-def]
     count, weights, first_row, parallax, pixel, number, disparity, source, share, nearest, features,
 ):  # fmt: skip
     _, height, width = surfaces.shape
+    # Unit vectors along each source's parallax.
     steps = np.empty_like(offsets)
     for image in range(len(offsets)):
         steps[image] = offsets[image] / max(np.hypot(offsets[image, 0], offsets[image, 1]), 1e-9)
     log_parallax = np.log1p(parallax)
     for n in range(len(pixel)):
         y, x = pixel[n]
+        # What the whole ray has in common: its nearest and farthest hypothesis, and the share that nothing covers.
         front = back = disparity[n, 0]
         for a in range(number[n]):
             front, back = max(front, disparity[n, a]), min(back, disparity[n, a])
@@ -312,12 +330,13 @@ def _describe_hypotheses(  # type: ignore[no-untyped-def]
         for slot in range(np.int64(count[y, x])):
             uncovered -= weights[slot, y, x]
         for a in range(number[n]):
+            # Backward warp: where in its source the hypothesis looks.
             d, k = disparity[n, a], np.int64(source[n, a]) % np.int64(PLAIN)
             t, s = offsets[k, 0], offsets[k, 1]
             source_x = min(max(x + d * s, -0.5), width - 0.5)
             source_y = min(max(first_row + y + d * t, -0.5), height - 0.5)
 
-            # The source ray's own disparity, bilinear.
+            # The disparity that the source really has there, bilinear over its surfaces.
             column, row = floor(source_x), floor(source_y)
             fx, fy = source_x - column, source_y - row
             own = total = 0.0
@@ -329,28 +348,30 @@ def _describe_hypotheses(  # type: ignore[no-untyped-def]
                         own, total = own + w * surfaces[k, v, u], total + w
             own = own / total if total > 0 else d
 
+            # Its profile: how far its source lies from the hypothesis, along the parallax and across it.
             for i in range(len(PROFILE_PX)):
                 step_x, step_y = PROFILE_PX[i] * steps[k, 1], PROFILE_PX[i] * steps[k, 0]
                 for j in range(2):
                     v = np.uint64(min(max(nearest_pixel(source_y + (step_x if j else step_y)), 0), height - 1))
                     u = np.uint64(min(max(nearest_pixel(source_x + (-step_y if j else step_x)), 0), width - 1))
-                    features[n, a, PROFILE + 2 * i + j] = _signed_log((surfaces[k, v, u] - d) * parallax)
+                    features[n, a, PROFILE + 2 * i + j] = _softsign((surfaces[k, v, u] - d) * parallax)
 
+            # All differences in pixels of parallax in this view: T need not know the scene's scale.
             v, u = min(max(nearest_pixel(source_y), 0), height - 1), min(max(nearest_pixel(source_x), 0), width - 1)
             around_low, around_high = min(low[k, v, u], d), max(high[k, v, u], d)
             out = features[n, a]
-            out[0] = _signed_log((d - own) * parallax)
-            out[1] = _signed_log((around_high - d) * parallax)
-            out[2] = _signed_log((d - around_low) * parallax)
-            out[3] = (own - around_low) / max(around_high - around_low, 1e-6)
-            out[4] = _signed_log((front - d) * parallax)
-            out[5] = _signed_log((d - back) * parallax)
+            out[0] = _softsign((d - own) * parallax)  # does the source agree?
+            out[1] = _softsign((around_high - d) * parallax)  # what lies in front of it there
+            out[2] = _softsign((d - around_low) * parallax)  # ... and behind
+            out[3] = (own - around_low) / max(around_high - around_low, 1e-6)  # where between both its own lies
+            out[4] = _softsign((front - d) * parallax)  # against the nearest hypothesis
+            out[5] = _softsign((d - back) * parallax)  # ... and the farthest
             out[SHARE] = share[n, a]
-            out[7] = nearest[n, a] / (REACH_PX + 1.0)
-            out[8] = 1.0 if k >= photo_images else 0.0
+            out[7] = nearest[n, a] / (REACH_PX + 1.0)  # how far away the surface lands, 0..1
+            out[8] = 1.0 if k >= photo_images else 0.0  # inpainted
             out[9] = log_parallax
             out[10] = coverage[k, v, u]
             out[11] = softness
-            out[12] = max(uncovered, 0.0)
+            out[12] = max(uncovered, 0.0)  # share of the pixel that nothing covers
+            out[13] = _softsign(step[k, v, u] * parallax)  # the depth edge beside it
             out[14] = 1.0 if source[n, a] >= PLAIN else 0.0
-            out[13] = _signed_log(step[k, v, u] * parallax)

@@ -50,6 +50,7 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     At most `most` for each ray, the front-most kept.
     """
     first_row, last_row = rows
+    # Where one smooth surface shows, its rays are found backwards, cell by cell; elsewhere source rays are splatted.
     smooth, about = find_coherent_cells(rays, offset, rows)
     shape = (most, last_row - first_row, rays.size.width)
     found = Candidates(
@@ -81,6 +82,7 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
 @kernel
 def _half_extent(gap):  # type: ignore[no-untyped-def]
     """How far a footprint reaches towards a neighbour that lands 1 + gap pixels away."""
+    # Wider gaps are disocclusions and stay open; neighbours that land on each other are two surfaces.
     return 0.5 + 0.5 * gap if abs(gap) <= SEALED_GAP_PX else 0.5
 
 
@@ -96,6 +98,7 @@ def _land_rays(  # type: ignore[no-untyped-def]
     """
     slots, rows, width = coverage.shape
     height = len(ray_disparity)
+    # The same as a difference of disparities.
     tolerance = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     for y in range(height):
         if not needed_rows[y // CELL_PX]:
@@ -104,6 +107,7 @@ def _land_rays(  # type: ignore[no-untyped-def]
             if not needed[y // CELL_PX, cell]:
                 continue
             for x in range(cell * CELL_PX, min((cell + 1) * CELL_PX, width)):
+                # Forward warp: where the ray lands, and the footprint there that meets its neighbours' half-way.
                 filled = ray_coverage[y, x]
                 if not filled > 0:
                     continue
@@ -113,16 +117,19 @@ def _land_rays(  # type: ignore[no-untyped-def]
                 right = landed_x + _half_extent((d - ray_disparity[y, min(x + 1, width - 1)]) * s)
                 top = landed_y - _half_extent((ray_disparity[max(y - 1, 0), x] - d) * t)
                 bottom = landed_y + _half_extent((d - ray_disparity[min(y + 1, height - 1), x]) * t)
+                # Beside the target rows, or not finite.
                 if not (right > -0.5 and left < width and bottom > first_row - 0.5 and top < first_row + rows):
                     continue
                 first_y, last_y = max(nearest_pixel(top), first_row), min(ceil(bottom - 0.5), first_row + rows - 1)
+                # Splat: each target pixel under the footprint gets its overlap, in pixels of area.
                 for target_y in range(first_y, last_y + 1):
                     overlap_y = filled * (min(bottom, target_y + 0.5) - max(top, target_y - 0.5))
                     for target_x in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
                         overlap = np.float32(overlap_y * (min(right, target_x + 0.5) - max(left, target_x - 0.5)))
                         if not overlap > LEAST_OVERLAP:
                             continue
-                        row, column = np.uint64(target_y - first_row), np.uint64(target_x)  # never count from the end
+                        # Its surface's candidate, if any; `disparity` holds sums, so compare times coverage.
+                        row, column = np.uint64(target_y - first_row), np.uint64(target_x)  # never counted from the end
                         used = np.int64(count[row, column])
                         slot = 0
                         while slot < used:
@@ -137,11 +144,14 @@ def _land_rays(  # type: ignore[no-untyped-def]
                             coverage[slot, row, column] += overlap
                             disparity[slot, row, column] += overlap * d
                             continue
+                        # A new candidate: in a free slot, or instead of the rearmost one if that lies farther back (a
+                        # z-test).
                         if used < slots:
                             count[row, column] = used + 1
                         else:
                             slot = 0
                             for k in range(1, slots):
+                                # Means, compared crosswise to save the divisions.
                                 ahead = disparity[slot, row, column] * coverage[k, row, column]
                                 if disparity[k, row, column] * coverage[slot, row, column] < ahead:
                                     slot = k

@@ -1,7 +1,7 @@
 """Cells of target rays that one smooth surface of the photo fills: most of most views.
 
-Nobody has to wait for landings there: each ray is followed back to the point of the photo that it shows. This gives
-what landing gives, at a fraction of its cost.
+No source ray has to be splatted there: a backward warp follows each target ray to the point of the photo that it
+shows. This gives what splatting gives, at a fraction of its cost.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ IN_FRONT_PX = 0.5
 SETTLED_PX = 0.002
 """A ray is followed until it moves by less than this."""
 MOST_ROUNDS = 30
-"""On a smooth surface each round comes at least a fifth closer, mostly far more."""
+"""On a smooth surface each round comes at least a fifth closer, mostly far more (see `ray_set.SMOOTH_SHARE`)."""
 ONE = np.uint64(1)
 
 
@@ -51,6 +51,7 @@ def find_coherent_cells(
         near,
         smooth,
     )
+    # Something lands, and its parts stay together.
     smooth &= (near >= far) & ((near - far) * parallax <= ONE_SURFACE_PX)
     return smooth, np.where(smooth, far, np.float32(0.0))
 
@@ -67,6 +68,7 @@ def land_incoherent(
 @kernel
 def _target_cells(first, least, most):  # type: ignore[no-untyped-def]
     """The first and last cell that the pixels of cell `first` touch when moved by -least to -most pixels; fractions."""
+    # Cells are counted from the border of the picture, half a pixel before the first pixel centre.
     shrunk = 0.5 - REACH_PX
     return first + (shrunk - max(least, most)) / CELL_PX, first + 1 - (shrunk + min(least, most)) / CELL_PX
 
@@ -82,12 +84,15 @@ def _touches(least, most, t, row, rows):  # type: ignore[no-untyped-def]
 def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax, far, near, smooth):  # type: ignore[no-untyped-def]
     """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
     rows, columns = smooth.shape
+    # The photo comes first: inpainted rays are compared with what it shows.
     for k in range(len(offsets)):
         t, s = offsets[k]
         for v in range(low.shape[1]):
+            # Whole rows of cells that land elsewhere are passed over at once.
             if not _touches(row_ranges[k, v, 0], row_ranges[k, v, 1], t, v - first_cell, rows):
                 continue
             for u in range(low.shape[2]):
+                # All target cells that rays of this cell may touch.
                 least, most = np.float64(low[k, v, u]), np.float64(high[k, v, u])
                 top, bottom = _target_cells(v - first_cell, least * t, most * t)
                 left, right = _target_cells(u, least * s, most * s)
@@ -95,6 +100,7 @@ def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax
                     continue
                 for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
                     for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
+                        # Smooth cells widen the range of what lands; anything else there asks for splatting.
                         if k == 0 and not incoherent[v, u]:
                             far[row, column] = min(far[row, column], least)
                             near[row, column] = max(near[row, column], most)
@@ -116,6 +122,7 @@ def _land_incoherent(low, high, row_ranges, t, s, first_cell, smooth, needed):  
                 continue
             for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
                 for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
+                    # One target cell that needs splatting is enough.
                     needed[v, u] |= not smooth[row, column]
 
 
@@ -128,6 +135,7 @@ def backward_warp(  # type: ignore[no-untyped-def]
     Its disparity d is the fixed point of d = surface(x + d s, y + d t), bilinear.
     """
     rows, width = count.shape
+    # The bilinear taps of the last position, too, lie inside.
     last_u, last_v = surface.shape[1] - 1.001, surface.shape[0] - 1.001
     above = first_row % CELL_PX
     parallax = max(abs(s), abs(t))
@@ -139,8 +147,12 @@ def backward_warp(  # type: ignore[no-untyped-def]
                 continue
             left = cell * CELL_PX
             columns = min(CELL_PX, width - left)
+            # Rows above the band are followed too, so that the results do not depend on where it begins.
             guess[:] = about[cell_row, cell]
             for row in range(top, bottom):
+                # Fixed-point iteration, from what the row before came to. A slope of at most 0.4 px a pixel along each
+                # axis
+                # (SMOOTH_SHARE of the step that OWN_SURFACE_PX gives) makes it contract.
                 for _ in range(MOST_ROUNDS):
                     moved = 0.0
                     for i in range(columns):
@@ -155,6 +167,7 @@ def backward_warp(  # type: ignore[no-untyped-def]
                         moved = max(moved, abs(guess[i] - d))
                     if moved * parallax < SETTLED_PX:
                         break
+                # One candidate that covers its ray whole.
                 for i in range(columns if row >= 0 else 0):
                     count[row, left + i], coverage[0, row, left + i], source[0, row, left + i] = 1, 1.0, 0
                     disparity[0, row, left + i] = guess[i]

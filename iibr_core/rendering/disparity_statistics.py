@@ -86,9 +86,11 @@ def _row_edges(rows, least_edge, changes, lefts):  # type: ignore[no-untyped-def
     count = 0
     for y in range(rows.shape[0]):
         for x in range(rows.shape[1] - EDGE_WINDOW_PX):
+            # Is there an edge across the window? NaN fails the comparison.
             change = abs(rows[y, x + EDGE_WINDOW_PX] - rows[y, x])
             if not change >= least_edge:
                 continue
+            # A sharp edge is one step, which leaves nothing; a slope leaves most of it.
             largest = np.float32(0.0)
             is_known = True
             for i in range(EDGE_WINDOW_PX):

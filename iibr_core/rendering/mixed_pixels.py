@@ -55,6 +55,7 @@ def _towards_front(disparity, x, y, edge_step):  # type: ignore[no-untyped-def]
             step = disparity[y + j, x + i] - here
             if i != 0 and j != 0:
                 step *= DIAGONAL
+            # In front of something itself: no background that the foreground mixes into.
             if step < -edge_step:
                 return 0, 0
             if step > best:
@@ -69,23 +70,29 @@ def _split_rows(  # type: ignore[no-untyped-def]
     """Rows [first, last) of what `split_mixed_pixels` returns, which hold the photo where nothing is split."""
     height, width = disparity.shape
     front, back, here = np.empty(3), np.empty(3), np.empty(3)
+    # Colours are looked up two pixels away at most.
     for y in range(max(first, 2), min(last, height - 2)):
         for x in range(2, width - 2):
+            # A pixel just behind an edge: the foreground on one side, its own surface on the other.
             i, j = _towards_front(disparity, x, y, edge_step)
             if (i == 0 and j == 0) or abs(disparity[y - j, x - i] - disparity[y, x]) > edge_step:
                 continue
+            # The foreground's colour, from one pixel beyond where it is that wide: the neighbour may be mixed itself.
             front_disparity = disparity[y + j, x + i]
             reach = 2 if abs(disparity[y + 2 * j, x + 2 * i] - front_disparity) <= edge_step else 1
             contrast = along = 0.0
+            # Matting on the line between both colours: share = (here - back) (front - back) / |front - back|^2.
             for c in range(3):
                 front[c] = linear_scalar(colors[y + reach * j, x + reach * i, c])
                 back[c] = linear_scalar(colors[y - j, x - i, c])
                 here[c] = linear_scalar(colors[y, x, c])
                 along += (here[c] - back[c]) * (front[c] - back[c])
                 contrast += (front[c] - back[c]) ** 2
+            # Surfaces of one colour: the pixel tells nothing about shares.
             if not contrast >= LEAST_CONTRAST**2:
                 continue
             share = min(max(along / contrast, 0.0), 1.0)
+            # Off the line it is some third colour, and no mix.
             residual = 0.0
             for c in range(3):
                 residual += (here[c] - share * front[c] - (1.0 - share) * back[c]) ** 2
@@ -99,5 +106,6 @@ def _split_rows(  # type: ignore[no-untyped-def]
                     front[c] = max((here[c] - (1.0 - share) * back[c]) / share, 0.0)
                 own[y, x, c] = srgb_scalar(back[c])
                 fringe[y, x, c] = srgb_scalar(front[c])
+            # The fringe ray moves with the foreground and covers its share; the own ray stays and fills the pixel.
             fringe_disparity[y, x] = front_disparity
             coverage[y, x] = share

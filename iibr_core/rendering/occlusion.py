@@ -37,6 +37,7 @@ def occlusion_mask(weights: FloatImage) -> NDArray[np.bool_]:
 
 @kernel
 def _coverage(weights, row, x):  # type: ignore[no-untyped-def]
+    # Rounding may bring the sum above 1.
     covered = 0.0
     for k in range(weights.shape[0]):
         covered += weights[k, row, x]
@@ -48,9 +49,12 @@ def _entropy_at(weights, row, x, covered):  # type: ignore[no-untyped-def]
     slots = weights.shape[0]
     if slots == 1:
         return 1.0 - covered
+    # H(w) = -sum w log w (paper, section 3.3) over log K: 0..1 whatever K is.
     total = 0.0
     for k in range(slots):
+        # The share that nothing covers is spread evenly: it could be any of them.
         p = weights[k, row, x] + (1.0 - covered) / slots
+        # 0 log 0 = 0; 1 log 1, which rounding may exceed, adds nothing either.
         if 0.0 < p < 1.0:
             total -= p * np.log(p)
     return min(total / np.log(slots), 1.0)
@@ -72,6 +76,7 @@ def _mask(weights, limit):  # type: ignore[no-untyped-def]
     mask = np.zeros((rows, width), np.bool_)
     for row in range(rows):
         for x in range(width):
+            # Most rays: no sum, no logarithm.
             if weights[0, row, x] > MOSTLY_COVERED:
                 continue
             covered = _coverage(weights, row, x)

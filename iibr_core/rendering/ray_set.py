@@ -17,16 +17,16 @@ from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 CELL_PX = 4
-"""Side of the cells that rays are summed up by."""
+"""Side of the cells that rays are summarised by."""
 SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Rays of S images summed up by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
+    """Rays of S images, summarised by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
     disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. incoherent (M, N):
-    whether the photo is there anything but one smooth surface.
+    whether the photo shows anything but one smooth surface there.
     """
 
     low: FloatImage
@@ -113,7 +113,7 @@ class RaySet:
 
     @property
     def cells(self) -> Cells:
-        """The rays added so far, summed up."""
+        """The rays added so far, summarised."""
         low, high, row_ranges = (part[: self._count] for part in (self._low, self._high, self._row_ranges))
         return Cells(low, high, row_ranges, self._incoherent)
 
@@ -137,10 +137,12 @@ class RaySet:
 def _sum_up(disparity, coverage, first, last, low, high):  # type: ignore[no-untyped-def]
     """Of the cells that begin in rows [first, last)."""
     height, width = disparity.shape
+    # Rounded up at both ends: the rows of a cell across two bands belong to the band in which it begins.
     for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
         low[v], high[v] = np.inf, -np.inf
         for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
             for x in range(width):
+                # Range of the cell; NaN, which differs from itself, is no surface.
                 d, u = disparity[y, x], x // CELL_PX
                 if coverage[y, x] > 0 and d == d:
                     low[v, u], high[v, u] = min(low[v, u], d), max(high[v, u], d)
@@ -156,8 +158,10 @@ def _find_incoherent(disparity, smooth_step, first, last, incoherent):  # type: 
         incoherent[v] = False
         for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
             for x in range(width):
+                # The border counts as a step: nobody knows what lies beyond.
                 is_smooth = 0 < y < height - 1 and 0 < x < width - 1
                 if is_smooth:
+                    # Steps to the four neighbours. NaN, no surface, fails every comparison: it is not smooth.
                     here = disparity[y, x]
                     is_smooth &= abs(disparity[y, x - 1] - here) <= smooth_step
                     is_smooth &= abs(disparity[y, x + 1] - here) <= smooth_step
@@ -174,10 +178,12 @@ def _near_edge(disparity, surface_step, first, last, near_edge):  # type: ignore
     """
     height, width = disparity.shape
     near_edge[first:last] = False
+    # Steps in the rows around the band reach into it.
     for y in range(max(first - 2, 0), min(last + 2, height)):
         for x in range(width):
             here = disparity[y, x]
             right = disparity[y, min(x + 1, width - 1)]
             below = disparity[min(y + 1, height - 1), x]
+            # Mark whoever has this step, or NaN, among its 4x4 taps: it lies two pixels away at most.
             if not (abs(right - here) <= surface_step and abs(below - here) <= surface_step):
                 near_edge[max(y - 2, first) : min(y + 3, last), max(x - 2, 0) : x + 3] = True

@@ -1,9 +1,10 @@
-"""The colour of target rays: every candidate looks it up in its own source, continuously along its own slope.
+"""The colour of target rays, by backward warp: every candidate looks it up in its own source, continuously along its
+own slope.
 
 Looking up with the surface's exact disparity, instead of moving colours about, keeps sub-pixel accuracy: candidates
-of one surface agree, and the weights only have to pick the surface. Keys' cubic convolution, on encoded values (less
-ringing at highlights); surfaces that share a pixel are summed in linear light. Near depth edges only pixels of the
-candidate's own surface count.
+of one surface agree, and the weights only have to pick the surface. Keys' cubic convolution (1981), on encoded values
+(less ringing at highlights); surfaces that share a pixel are summed in linear light. Near depth edges only pixels of
+the candidate's own surface count.
 """
 
 from __future__ import annotations
@@ -64,6 +65,7 @@ def heaviest_candidate(candidates: Candidates, weights: FloatImage) -> tuple[Flo
 @kernel
 def _keys(f):  # type: ignore[no-untyped-def]
     """Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1)."""
+    # Keys 1981: (a + 2) |t|^3 - (a + 3) |t|^2 + 1 up to one pixel away, a (|t|^3 - 5 |t|^2 + 8 |t| - 4) up to two.
     g = 1.0 - f
     a = KEYS_A
     return (
@@ -93,9 +95,11 @@ def cubic(images, index, x, y):  # type: ignore[no-untyped-def]
     _, height, width, _ = images.shape
     column, row = floor(x), floor(y)
     (x0, x1, x2, x3), weight_y = _keys(x - column), _keys(y - row)
+    # Columns of the four taps; the border pixel is repeated.
     a, b = max(column - 1, 0), max(column, 0)
     c, d = min(column + 1, width - 1), min(column + 2, width - 1)
     red = green = blue = 0.0
+    # Rows: the products of both kernels; loops over taps and channels are written out for speed.
     for j in range(4):
         v, w = min(max(row - 1 + j, 0), height - 1), weight_y[j]
         red += w * (
@@ -120,6 +124,7 @@ def resample(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-unt
     tolerance = OWN_SURFACE_PX / parallax
     column, row = floor(x), floor(y)
     weight_x, weight_y = _keys(x - column), _keys(y - row)
+    # Sums over the taps of the own surface, their range, and the nearest of them.
     total = red = green = blue = 0.0
     low_r = low_g = low_b = nearest = np.inf
     high_r = high_g = high_b = -np.inf
@@ -129,6 +134,7 @@ def resample(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-unt
         v = min(max(row - 1 + j, 0), height - 1)
         for i in range(4):
             u = min(max(column - 1 + i, 0), width - 1)
+            # Another surface, or none: NaN fails the comparison.
             if not abs(surfaces[index, v, u] - d) <= tolerance:
                 continue
             w = weight_x[i] * weight_y[j]
@@ -140,16 +146,20 @@ def resample(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-unt
             distance = (u - x) ** 2 + (v - y) ** 2
             if distance < nearest:
                 nearest, near_x, near_y = distance, u, v
+    # The whole kernel: its weights sum to 1, and it may overshoot as everywhere.
     if taps == 16:
         return red, green, blue
+    # The surface is nowhere near: the photo as it is.
     if taps == 0:
         return cubic(images, index, x, y)
+    # Next to no weight, or a negative one, is left: dividing by it would blow up noise.
     if total < LEAST_TAP_WEIGHT:
         return (
             np.float64(images[index, near_y, near_x, 0]),
             np.float64(images[index, near_y, near_x, 1]),
             np.float64(images[index, near_y, near_x, 2]),
         )
+    # Normalised over what is left; without the other lobes it may overshoot far, hence the range.
     return (
         min(max(red / total, low_r), high_r),
         min(max(green / total, low_g), high_g),
@@ -171,8 +181,10 @@ def _gather_plain(  # type: ignore[no-untyped-def]
         for x in range(count.shape[1]):
             if count[row, x] != 1 or not remaining[row, x]:
                 continue
+            # Backward warp: the point of the source that this ray shows.
             d, k = candidate_disparity[row, x], np.uint64(candidate_source[row, x])
             source_x, source_y = x + d * offsets[k, 1], first_row + row + d * offsets[k, 0]
+            # All 16 taps inside the picture and on one surface.
             if not (1 <= source_x < width - 2 and 1 <= source_y < height - 2):
                 continue
             u, v = np.uint64(source_x), np.uint64(source_y)
@@ -180,6 +192,7 @@ def _gather_plain(  # type: ignore[no-untyped-def]
                 continue
             remaining[row, x] = False
             disparity[row, x], source[row, x] = d, k
+            # Separable: along the rows, then across them. Single precision is far finer than an 8-bit step.
             x0, x1, x2, x3 = _keys_single(np.float32(source_x - u))
             y0, y1, y2, y3 = _keys_single(np.float32(source_y - v))
             for c in range(3):
@@ -208,6 +221,7 @@ def _gather(  # type: ignore[no-untyped-def]
             used = np.int64(count[row, x])
             if used == 0 or not wanted[row, x]:
                 continue
+            # Weights of a ray sum to what is covered of it; the heaviest candidate gives its disparity and source.
             total, heavy = 0.0, 0
             for k in range(used):
                 total += weights[k, row, x]
@@ -217,20 +231,24 @@ def _gather(  # type: ignore[no-untyped-def]
             source[row, x] = candidate_source[heavy, row, x]
             sole = weights[heavy, row, x] >= SOLE * total
             sum_r = sum_g = sum_b = 0.0
+            # Colours: the sum of w_k c_k over w_k > 0 (the paper's equation 1).
             for k in range(used):
                 w = weights[k, row, x] / total
                 if not w > 1.0 - SOLE:
                     continue
+                # Backward warp along the candidate's own slope, held at the border.
                 d = candidate_disparity[k, row, x]
                 index = np.int64(candidate_source[k, row, x])
                 t, s = offsets[index, 0], offsets[index, 1]
                 source_x = min(max(x + d * s, -0.5), width - 0.5)
                 source_y = min(max(first_row + row + d * t, -0.5), height - 0.5)
+                # Where an edge is near, only pixels of its own surface; else the plain kernel, which needs no tests.
                 if near_edge[index, max(floor(source_y), 0), max(floor(source_x), 0)]:
                     parallax = max(abs(s), abs(t), 1e-9)
                     r, g, b = resample(images, surfaces, index, source_x, source_y, d, parallax)
                 else:
                     r, g, b = cubic(images, index, source_x, source_y)
+                # A sole surface stays encoded; several are averaged in linear light, as their light adds up.
                 if sole:
                     sum_r, sum_g, sum_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
                 else:
@@ -249,6 +267,7 @@ def _heaviest(count, candidate_disparity, candidate_source, weights, disparity, 
             used = np.int64(count[row, x])
             if used == 0:
                 continue
+            # The first of equals, as in `_gather`.
             heavy = 0
             for k in range(1, used):
                 if weights[k, row, x] > weights[heavy, row, x]:

@@ -1,7 +1,7 @@
 """How much each candidate contributes to its target ray: the closed form, the limit that a trained T approaches.
 
-Surfaces are taken front to back, each gets what those before it leave of the pixel's area. Weights of a ray sum to
-the covered share of its pixel, at most 1; what is missing is disoccluded.
+Alpha compositing front to back: each surface gets what those before it leave of the pixel's area. Weights of a ray sum
+to the covered share of its pixel, at most 1; what is missing is disoccluded.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ def _composite_front_to_back(count, coverage, disparity, weights):  # type: igno
     for row in range(rows):
         for x in range(width):
             used = np.int64(count[row, x])
+            # Most rays: one surface.
             if used == 1:
                 weights[0, row, x] = min(coverage[0, row, x], np.float32(1.0))
                 continue
@@ -33,14 +34,16 @@ def _composite_front_to_back(count, coverage, disparity, weights):  # type: igno
             ahead = np.float32(np.inf)
             ahead_slot = -1
             for _ in range(used):
-                # The frontmost surface behind the last one; equal disparities in slot order.
+                # The front-most surface behind the last one; equal disparities in slot order.
                 front = -1
                 for k in range(used):
                     d = disparity[k, row, x]
                     if (d < ahead or (d == ahead and k > ahead_slot)) and (front < 0 or d > disparity[front, row, x]):
                         front = k
+                # Nothing behind, or the pixel is full.
                 if front < 0 or left <= 0:
                     break
+                # "Over": this surface takes what is left, as far as it covers the pixel.
                 ahead, ahead_slot = disparity[front, row, x], front
                 weights[front, row, x] = min(coverage[front, row, x], left)
                 left -= weights[front, row, x]

@@ -36,7 +36,7 @@ KNOTS = 4096
 _AT = np.arange(KNOTS + 2) / KNOTS
 LINEAR_TABLE = (((_AT + 0.055) / 1.055) ** 2.4).astype(np.float32)
 SRGB_TABLE = (1.055 * _AT ** (2 / 2.4) - 0.055).astype(np.float32)
-"""Over the root of linear light: so even that the knots need not lie closer in the dark."""
+"""Over the square root of linear light: so evenly curved that the knots need not lie closer in the dark."""
 
 
 @kernel
@@ -45,11 +45,14 @@ def linear_scalar(encoded):  # type: ignore[no-untyped-def]
     surfaces share.
     """
     x = max(encoded, 0.0)
+    # IEC 61966-2-1: a straight line near black, exact; above it a power, linear between the knots of a table.
     if x <= 0.04045:
         return x / 12.92
+    # HDR: above white the curve goes on, and the table ends. Nothing but numbers below 1 may become an index.
     if not x < 1.0:
         return ((x + 0.055) / 1.055) ** 2.4
     at = x * KNOTS
+    # Unsigned indices need no test for counting from the end.
     k = np.uint64(at)
     return LINEAR_TABLE[k] + (at - k) * (LINEAR_TABLE[k + np.uint64(1)] - LINEAR_TABLE[k])
 
@@ -58,6 +61,7 @@ def linear_scalar(encoded):  # type: ignore[no-untyped-def]
 def srgb_scalar(linear):  # type: ignore[no-untyped-def]
     """`color.srgb_from_linear` of one value, up to white from a table."""
     x = max(linear, 0.0)
+    # The inverse; its table runs over the root, see SRGB_TABLE.
     if x <= 0.0031308:
         return x * 12.92
     if not x < 1.0:
@@ -70,4 +74,5 @@ def srgb_scalar(linear):  # type: ignore[no-untyped-def]
 @kernel
 def nearest_pixel(position):  # type: ignore[no-untyped-def]
     """Index of the pixel whose area holds a position."""
+    # Halves go up, also below 0: int() would round towards 0 there.
     return floor(position + 0.5)

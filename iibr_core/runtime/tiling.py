@@ -15,7 +15,7 @@ from iibr_core.types import ImageSize
 ShouldStop = Callable[[], bool]
 
 MOST_BAND_PIXELS = 1 << 17
-"""Of a band: within some 30 ms whoever asked to stop is heard."""
+"""Of a band: small enough that a cancelled job stops within some 30 ms."""
 THREADS = os.cpu_count() or 1
 
 Item = TypeVar("Item")
@@ -70,6 +70,7 @@ def in_bands(
     """
     height, width = size
     threads = threads or THREADS
+    # Short enough to stop soon, and at least one band for each thread.
     rows = max(min((most_pixels or MOST_BAND_PIXELS) // max(width, 1), -(-height // threads)), 1)
     firsts = range(0, height, rows)
     return in_pieces(lambda first: work(first, min(first + rows, height)), firsts, should_stop, threads)

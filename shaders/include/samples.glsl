@@ -51,10 +51,12 @@ vec3 reprojected_place(vec2 uv, vec2 offset, FallbackView fallback, float focus)
     }
     float sheared = clamp(disparity, focus - focus_range, focus + focus_range);
     vec2 at = uv - (offset * sheared + fallback.reprojection * disparity) * texel;
+    // Still moving: the steps found no surface that agrees.
     float missed_px = length(offset * (sheared - clamp(before, focus - focus_range, focus + focus_range))
         + fallback.reprojection * (disparity - before));
     return vec3(at, missed_px > 1.0 ? 1e-3 : 1.0);
 #else
+    // Fixed point d = disparity(at - d reprojection), from the focus on.
     vec2 at = uv - offset * focus * texel;
     float disparity = focus, before = focus;
     for (int k = 0; k < 3; k++) {

@@ -244,8 +244,8 @@ def _measure_from(photo: FloatImage, stroke: Stroke, index: int, distance: Float
     _seed(distance, x0, y0, x1, y1, radius)
     if distance[window].size:
         unlike = np.zeros(distance[window].shape, np.float32)
-        _tell_unlike(photo[window], stroke_colours(photo, stroke, index), unlike)
-        _without_specks(unlike)
+        _measure_unlikeness(photo[window], stroke_colours(photo, stroke, index), unlike)
+        _remove_specks(unlike)
         _measure(unlike, distance[window], radius, MOST_SWEEPS)
     return window
 
@@ -259,11 +259,13 @@ def _span(low: float, high: float, size: int) -> slice:
 def _seed(distance, x0, y0, x1, y1, radius):  # type: ignore[no-untyped-def]
     """Distances of the pixels about every place on the way from (x0, y0) to (x1, y1)."""
     height, width = distance.shape
+    # Two places a pixel, so that none is stepped over.
     steps = max(ceil(2 * hypot(x1 - x0, y1 - y0)), 1)
     for k in range(steps + 1):
         x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
         column, row = nearest_pixel(x), nearest_pixel(y)
         if 0 <= row < height and 0 <= column < width:
+            # Seeds of the ways: the exact distance from the path, in radii.
             distance[row, column] = min(distance[row, column], np.float32(hypot(column - x, row - y) / radius))
 
 
@@ -277,10 +279,11 @@ def _contour(photo, y, x, other_y, other_x, noise):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _tell_unlike(photo, colors, unlike):  # type: ignore[no-untyped-def]
+def _measure_unlikeness(photo, colors, unlike):  # type: ignore[no-untyped-def]
     """How far every pixel's colour is from the nearest of the colours (N, 3), 0 where it is like one."""
     for y in range(photo.shape[0]):
         for x in range(photo.shape[1]):
+            # The nearest of the touched colours; without any, all colours are alike.
             least = np.inf if len(colors) else 0.0
             for n in range(len(colors)):
                 total = 0.0
@@ -291,13 +294,14 @@ def _tell_unlike(photo, colors, unlike):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _without_specks(unlike):  # type: ignore[no-untyped-def]
+def _remove_specks(unlike):  # type: ignore[no-untyped-def]
     """What few of a pixel's neighbours share is no other surface."""
     height, width = unlike.shape
     for y in range(height):
         for x in range(width):
             if unlike[y, x] == 0.0:
                 continue
+            # Unlike pixels in the 3 x 3 square, this one included; what is cleared already counts no more.
             count = 0
             for j in range(max(y - 1, 0), min(y + 2, height)):
                 for i in range(max(x - 1, 0), min(x + 2, width)):
@@ -312,6 +316,7 @@ def _measure(unlike, distance, radius, most_sweeps):  # type: ignore[no-untyped-
 
     To a pixel of a more unlike colour the way is longer.
     """
+    # Geodesic distance by raster scans (Toivanen 1996): there and back instead of the queue of Dijkstra.
     height, width = distance.shape
     sweep = 0
     changed = True
@@ -331,6 +336,7 @@ def _measure(unlike, distance, radius, most_sweeps):  # type: ignore[no-untyped-
                         if not (0 <= other_y < height and 0 <= other_x < width):
                             continue
                         length = sqrt(2.0) if k == 1 or k == 3 else 1.0
+                        # A step, and the climb to a less alike colour; to come back to an alike one is free.
                         before = distance[other_y, other_x] + length / radius
                         before += max(unlike[y, x] - unlike[other_y, other_x], 0.0) / CONTOUR_CONTRAST
                         best = min(best, np.float32(before))
@@ -354,8 +360,10 @@ def _smooth_rows(values, steps, rate):  # type: ignore[no-untyped-def]
     height, width = values.shape
     kept = np.empty(width)
     for y in range(height):
+        # There: a decaying mean of what lies left; across a contour (a large step) next to nothing of it is kept.
         for x in range(1, width):
             kept[x] = exp(-rate * steps[y, x])
             values[y, x] = kept[x] * values[y, x - 1] + (1.0 - kept[x]) * values[y, x]
+        # And back with the same weights, so that the filter leans to no side.
         for x in range(width - 2, -1, -1):
             values[y, x] = kept[x + 1] * values[y, x + 1] + (1.0 - kept[x + 1]) * values[y, x]

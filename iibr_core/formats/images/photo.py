@@ -151,6 +151,7 @@ def _average_areas(band, band_top, row_step, result_top, result):  # type: ignor
     """
     column_step = band.shape[1] / result.shape[1]
     for y in range(result.shape[0]):
+        # Exact area averages: border rows and columns count by the share that lies inside.
         y0 = (result_top + y) * row_step - band_top
         y1 = min(y0 + row_step, float(band.shape[0]))
         for x in range(result.shape[1]):

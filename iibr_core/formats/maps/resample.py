@@ -33,13 +33,16 @@ def _resample(values, tolerance, result):  # type: ignore[no-untyped-def]
     """Fill result from values; both (H, W), their pixel areas aligned at the borders."""
     step_y = values.shape[0] / result.shape[0]
     step_x = values.shape[1] / result.shape[1]
+    # A tent as wide as the larger of both pixels: linear when enlarging, an average when reducing.
     radius_y, radius_x = max(1.0, step_y), max(1.0, step_x)
     for y in range(result.shape[0]):
+        # Pixel areas are aligned at the borders, hence the halves.
         centre_y = (y + 0.5) * step_y - 0.5
         top, bottom = max(0, math.ceil(centre_y - radius_y)), min(values.shape[0] - 1, int(centre_y + radius_y))
         for x in range(result.shape[1]):
             centre_x = (x + 0.5) * step_x - 0.5
             left, right = max(0, math.ceil(centre_x - radius_x)), min(values.shape[1] - 1, int(centre_x + radius_x))
+            # The range under the footprint: does it span a depth edge?
             low, high = np.inf, -np.inf
             for row in range(top, bottom + 1):
                 for column in range(left, right + 1):
@@ -49,7 +52,9 @@ def _resample(values, tolerance, result):  # type: ignore[no-untyped-def]
                             low = values[row, column]
                         if values[row, column] > high:
                             high = values[row, column]
+            # If so, the middle of the range parts near from far; else all counts as near.
             split = (low + high) / 2 if high - low > tolerance else -np.inf
+            # Weighted means of both surfaces, and how much is unknown.
             far, far_weight, near, near_weight, unknown_weight = 0.0, 0.0, 0.0, 0.0, 0.0
             for row in range(top, bottom + 1):
                 weight_y = 1 - abs(row - centre_y) / radius_y
@@ -64,6 +69,7 @@ def _resample(values, tolerance, result):  # type: ignore[no-untyped-def]
                     else:
                         far += weight * value
                         far_weight += weight
+            # The majority decides: unknown, near or far, never a mean of both.
             if unknown_weight > far_weight + near_weight or far_weight + near_weight == 0:
                 result[y, x] = np.nan
             elif near_weight >= far_weight:

@@ -30,7 +30,7 @@ PRIMITIVE = np.dtype(
         ("axes", "f8", (3, 3)),  # rows: the primitive's own axes in the world, orthonormal
         ("half", "f8", 3),  # half extents along them
         ("nearest_z", "f8"),
-        ("cut", "i8"),  # of planes: surfaces.WHOLE, ...
+        ("cut", "i8"),  # of planes: textures.WHOLE, ...
         ("cut_period", "f8"),
         ("cut_width", "f8"),
         ("pattern", "i8"),
@@ -192,9 +192,12 @@ def _bounds(scene: RaycastScene, camera: NDArray[np.float64]) -> NDArray[np.floa
 def _distance(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):  # type: ignore[no-untyped-def]
     """How far along a ray it meets a primitive, both in the primitive's own frame; infinite where it does not."""
     if shape == PLANE:
+        # The plane z = 0 of its own frame, within its rectangle.
         z = -oz / ez if ez != 0.0 else inf
         return z if abs(ox + z * ex) <= hx and abs(oy + z * ey) <= hy else inf
     if shape == BOX:
+        # Slab test: inside between the last of the near faces and the first of the far ones. Along a face the quotients
+        # are infinite, which compares as it should.
         ax, bx = (-hx - ox) / ex, (hx - ox) / ex
         ay, by = (-hy - oy) / ey, (hy - oy) / ey
         az, bz = (-hz - oz) / ez, (hz - oz) / ez
@@ -202,13 +205,17 @@ def _distance(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):  # type: ignore[no-unt
         leave = min(max(ax, bx), max(ay, by), max(az, bz))
         return enter if enter <= leave else inf
     if shape == BALL:
+        # Scaled to the unit ball: a t^2 + 2 b t + c = 0.
         ox, oy, oz, ex, ey, ez = ox / hx, oy / hy, oz / hz, ex / hx, ey / hy, ez / hz
         a, b, c = ex * ex + ey * ey + ez * ez, ox * ex + oy * ey + oz * ez, ox * ox + oy * oy + oz * oz - 1
     else:
+        # The cylinder about the third axis: the same without z.
         a, b, c = ex * ex + ey * ey, ox * ex + oy * ey, ox * ox + oy * oy - hx * hx
+    # Missed, or moving away from its middle.
     inside = b * b - a * c
     if not inside > 0.0 or b >= 0.0:
         return inf
+    # The nearer root, in the form that does not cancel digits.
     z = c / (sqrt(inside) - b)
     return z if shape == BALL or abs(oz + z * ez) <= hz else inf
 
@@ -219,10 +226,12 @@ def _normal(shape, x, y, z, hx, hy, hz):  # type: ignore[no-untyped-def]
     if shape == PLANE:
         return 0.0, 0.0, 1.0
     if shape == BOX:
+        # The face that the point lies on: its largest coordinate, relative to the box.
         ax, ay, az = abs(x) / hx, abs(y) / hy, abs(z) / hz
         if ax >= ay and ax >= az:
             return 1.0 if x > 0 else -1.0, 0.0, 0.0
         return (0.0, 1.0 if y > 0 else -1.0, 0.0) if ay >= az else (0.0, 0.0, 1.0 if z > 0 else -1.0)
+    # Along the gradient of (x / hx)^2 + (y / hy)^2 + (z / hz)^2; that of a cylinder has no z.
     nx, ny, nz = x / (hx * hx), y / (hy * hy), z / (hz * hz) if shape == BALL else 0.0
     length = max(sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
     return nx / length, ny / length, nz / length
@@ -230,8 +239,9 @@ def _normal(shape, x, y, z, hx, hy, hz):  # type: ignore[no-untyped-def]
 
 @kernel
 def _albedo(p, x, y, z, pixel):  # type: ignore[no-untyped-def]
-    """Colour of a primitive at a point of its own frame, linear light; see surfaces for `pixel`."""
+    """Colour of a primitive at a point of its own frame, linear light; see textures for `pixel`."""
     x, y, z = inside_pattern(x) + p.phase[0], inside_pattern(y) + p.phase[1], inside_pattern(z) + p.phase[2]
+    # Mix of pattern and rough noise between two colours of the palette; coarse noise tints it with the third.
     rough = rough_noise(x, y, z, p.wavelength, p.gain, pixel, p.seed)
     share = pattern(p.pattern, x, y, z, p.period, pixel, p.seed + 11)
     share += (rough - share) * p.roughness
@@ -256,6 +266,7 @@ def _cast(  # type: ignore[no-untyped-def]
     backdrop = len(primitives) - 1
     met = np.empty(len(primitives), np.int64)
     for n in range(len(xs)):
+        # Broad phase: the primitives whose bounds this pixel's rays may meet.
         count = 0
         for k in range(backdrop):
             if not (
@@ -267,29 +278,35 @@ def _cast(  # type: ignore[no-untyped-def]
                 met[count] = k
                 count += 1
         red, green, blue = 0.0, 0.0, 0.0
+        # A ray a sample. Its direction (wx, wy, 1): distance along it is depth z.
         for sample in range(len(places)):
             wx = (xs[n] + places[sample, 0] - lens[0] - infinity * camera[0]) / focal
             wy = (ys[n] + places[sample, 1] - lens[1] - infinity * camera[1]) / focal
+            # Nearest hit. Primitives come nearest first, so the search ends where none can be nearer.
             depth, hit = greatest_z, backdrop
             for m in range(count):
                 k = met[m]
                 p = primitives[k]
                 if p.nearest_z >= depth:
                     break
+                # The ray in the primitive's own frame; origins are there already.
                 ex = axes[k, 0, 0] * wx + axes[k, 0, 1] * wy + axes[k, 0, 2]
                 ey = axes[k, 1, 0] * wx + axes[k, 1, 1] * wy + axes[k, 1, 2]
                 ez = axes[k, 2, 0] * wx + axes[k, 2, 1] * wy + axes[k, 2, 2]
                 hx, hy, hz = p.half[0], p.half[1], p.half[2]
                 z = _distance(p.shape, origins[k, 0], origins[k, 1], origins[k, 2], ex, ey, ez, hx, hy, hz)
+                # In the range of depths, nearer than all before, and not through a hole cut into it.
                 if least_z <= z < depth:
                     u, v = origins[k, 0] + z * ex, origins[k, 1] + z * ey
                     if p.cut == 0 or not is_cut(p.cut, u, v, hx, hy, p.cut_period, p.cut_width, p.seed):
                         depth, hit = z, k
+            # The first sample is the pixel's centre: exact disparity, even where it adds no colour (weight 0).
             if sample == 0:
                 disparity[n] = focal / depth - infinity
             if weights[sample] == 0.0:
                 continue
 
+            # Shading: the point in its primitive's frame, the normal there, turned back into the world.
             p = primitives[hit]
             hx, hy, hz = p.half[0], p.half[1], p.half[2]
             ex = axes[hit, 0, 0] * wx + axes[hit, 0, 1] * wy + axes[hit, 0, 2]
@@ -301,7 +318,7 @@ def _cast(  # type: ignore[no-untyped-def]
             ny = axes[hit, 0, 1] * a + axes[hit, 1, 1] * b + axes[hit, 2, 1] * c
             nz = axes[hit, 0, 2] * a + axes[hit, 1, 2] * b + axes[hit, 2, 2] * c
 
-            # From the centre camera, so that all views see the same pattern.
+            # Size of a pixel on the surface, from the centre camera, so that all views see the same pattern.
             px, py = camera[0] + depth * wx, camera[1] + depth * wy
             towards = nx * px + ny * py + nz * depth
             cosine = abs(towards) / sqrt(px * px + py * py + depth * depth)
@@ -311,6 +328,7 @@ def _cast(  # type: ignore[no-untyped-def]
             # Planes have the same light on both sides, or a view from the other side would change their colour.
             facing = -1.0 if p.shape == PLANE and towards > 0 else 1.0
             lit = max(facing * (nx * light[0] + ny * light[1] + nz * light[2]), 0.0)
+            # Lambert's law and ambient light; samples are summed in linear light.
             lit = weights[sample] * (light[3] + (1 - light[3]) * lit)
             red, green, blue = red + lit * r, green + lit * g, blue + lit * b
         colors[n, 0], colors[n, 1], colors[n, 2] = srgb_scalar(red), srgb_scalar(green), srgb_scalar(blue)

@@ -18,7 +18,7 @@ from viewer.gpu.refocus.view_sampling import ApertureSample, clamp_to_grid, near
 from viewer.gpu.render_targets import RenderTargets
 
 MAX_PASSES = 16
-"""Times that a still picture is summed up over, each with its samples elsewhere, at most."""
+"""A still picture is the mean of at most so many passes, each with its samples elsewhere."""
 
 PASS_BLUR_PX = 1.5
 """So many passes are drawn that neighbouring samples are no farther apart than this."""
@@ -27,7 +27,7 @@ STILL_SAMPLES = 600
 """More passes than these samples need are not worth the wait."""
 
 EDGE_PASSES = 5
-"""Rounds that make the edges of a warped view smooth."""
+"""Passes that make the edges of a warped view smooth."""
 
 
 @dataclass
@@ -59,7 +59,7 @@ class ProgressiveAccumulation:
 
 
 def pass_count(lens: Lens, field: LightFieldTexture) -> int:
-    """How often to sum up, until neighbouring samples are close and edges smooth."""
+    """How many passes, until neighbouring samples are close and edges smooth."""
     count = 1
     if lens.aperture_share > 0 and lens.keeps_layers:
         affordable = STILL_SAMPLES // len(lens.samples(field.grid, field.present))
@@ -89,7 +89,7 @@ HIGHLIGHT_SPREAD = 2.0
 
 
 class Accumulator:
-    """Sums light of a field into targets. adaptive: whether tiles skip what they have no content for."""
+    """Sums light of a field into targets."""
 
     def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
         self._ctx = ctx

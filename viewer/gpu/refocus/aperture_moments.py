@@ -41,6 +41,7 @@ def scale_of(
     """
     # With a cat's-eye, what passes in the picture's middle counts: there the barrel's soft edge lies on the opening's.
     t, s = np.meshgrid(*(_lattice(start, min(diameter, widest), stride) for start in place), indexing="ij")
+    # Variances add: the box of the smoothing takes width^2 / 12 of the opening's own.
     width = min(float(stride), diameter)
     own = diameter**2 * _own_second_moment(shape, min(widest / diameter, 1.0))
     wanted = max(own - is_smoothed * width**2 / 12, 0.0) / min(max(diameter - 1.0, 1e-3), 1.0)
@@ -98,6 +99,7 @@ def _root(function: Callable[[float], float], low: float, high: float, tolerance
         if abs(value) <= tolerance:
             break
         if value > 0:
+            # The end that stays twice counts half: else regula falsi creeps.
             high, at_high, at_low = middle, value, at_low / (2 if side > 0 else 1)
             side = 1
         else:

@@ -32,6 +32,7 @@ def _inside_by(
 ) -> NDArray[np.float64]:
     """Distance to the opening's edge, positive inside."""
     if shape.kind == "polygon":
+        # Distance to the nearest of its sides.
         half = math.pi / shape.blades
         angles = math.radians(shape.rotation_deg) + (2 * np.arange(shape.blades) + 1) * half  # a corner is on top
         outward = np.multiply.outer(s, np.sin(angles)) - np.multiply.outer(t, np.cos(angles))
@@ -54,6 +55,7 @@ def _mean_of_mask(
     mask: ApertureMask, t: NDArray[np.float64], s: NDArray[np.float64], diameter: float, width: float
 ) -> NDArray[np.float64]:
     """Over each sample's square. The mask lies in the middle, its longer side as long as the diameter."""
+    # A summed-area table gives the mean over each square from four corners.
     pixel = diameter / max(mask.rows, mask.columns)
     top, left = (t - width / 2) / pixel + mask.rows / 2, (s - width / 2) / pixel + mask.columns / 2
     bottom, right = top + width / pixel, left + width / pixel

@@ -95,7 +95,7 @@ class Lens:
 
     @property
     def sparse_up_to_px(self) -> float:
-        """See FEW_UP_TO_PX, as blur from one sample to the next."""
+        """See SPARSE_UP_TO_PX, as blur from one sample to the next."""
         return SPARSE_UP_TO_PX / self.samples_across
 
     @property
@@ -121,7 +121,7 @@ class Lens:
         coarser: int = 1,
         is_smoothed: bool = True,
     ) -> list[ApertureSample]:
-        """Points of the lens and who answers; moved: the lattice; coarser: every so manieth of them.
+        """Points of the lens and who answers; moved: the lattice; coarser: every how many of them.
 
         is_smoothed: whether these are to leave room for the smoothing, if there is any.
         """
@@ -138,6 +138,7 @@ def lens_of(
     step = max(min(diameter, float(stride)), 1e-6)
     blur_px = step * width_px / field.width if diameter > 0 else 0.0
     samples_across = max(min(diameter, float(max(field.grid))) / step, 1.0)
+    # Layers pay where something is blurred: from one sample to the next, or in all by more than the sharp layer holds.
     beside = _most_beside_focus(optics, field.range_px)
     knows_depth = bool(field.has_disparity[field.present].all())
     keeps = prefilter and knows_depth and max(blur_px, blur_px * samples_across / FADE_FROM_PX) * beside > 1.0

@@ -111,7 +111,7 @@ class Passes:
     def _find_march_intervals(
         self, field: LightFieldTexture, lens: Lens, cell: PictureCell, targets: RenderTargets
     ) -> None:
-        """Fill the tiles of a cell with the steps between which its searches end."""
+        """Fill the tiles of a cell with the first and the last step of each march that can find a surface."""
         program, quad = self._programs.get("march_intervals.frag", _switches(lens, "", lens.has_dolly and "DOLLY"))
         self._set_field(program, field, lens)
         self._set_sources(program, field, lens, cell)
@@ -186,6 +186,7 @@ class Passes:
     ) -> None:
         """Fill the tiles with the widest blur in each, and around each."""
         self._ctx.disable(moderngl.BLEND)
+        # Stored views tell the blur without reprojection, if they are most of the samples.
         direct = [sample for sample in samples if field.grid.offset(sample.row, sample.column) == sample.wanted]
         samples = direct if 2 * len(direct) > len(samples) else samples
         samples = samples[:: math.ceil(len(samples) / MAX_SAMPLES)]
@@ -204,6 +205,7 @@ class Passes:
         targets.tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
 
+        # Light spreads over tile borders by half the widest blur.
         program, quad = self._programs.get("widen_tiles.frag")
         self._bind(targets.tiles.textures[0], "tiles")
         reach = min(math.ceil((lens.widest_blur_px / 2 + TILE_PX / 2) / TILE_PX), 4)
@@ -298,8 +300,8 @@ class Passes:
         for i, (wanted, row, column, weight) in enumerate(samples):
             stored = field.grid.offset(row, column)
             table[0, i] = wanted.s - lens.eye.s, wanted.t - lens.eye.t, field.layer(row, column), weight
-            detour = stored.s - wanted.s, stored.t - wanted.t
-            table[1, i] = (*detour, float(field.has_disparity[row, column]), sparse.get(wanted, 0.0))
+            reprojection = stored.s - wanted.s, stored.t - wanted.t
+            table[1, i] = (*reprojection, float(field.has_disparity[row, column]), sparse.get(wanted, 0.0))
         self._samples.write(table.tobytes())
         self._samples.bind_to_uniform_block(0)
         program.bind_block("Samples", 0)

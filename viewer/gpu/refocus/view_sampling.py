@@ -91,6 +91,7 @@ def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_
         return []
     distance = np.hypot(rows - grid.centre[0] - eye.t, columns - grid.centre[1] - eye.s)
     order = np.argsort(distance, kind="stable")[: MAX_SOURCES + 1]
+    # Less the closeness of the next view left out: a view comes and goes with weight 0, so nothing jumps.
     reach = 1 / distance[order[MAX_SOURCES]] if len(order) > MAX_SOURCES else 0.0
     closeness = np.maximum(1 / np.maximum(distance[order[:MAX_SOURCES]], 1e-6) - reach, 0)
     if closeness.sum() == 0:
@@ -115,13 +116,14 @@ def aperture_samples(
     each weighted by what the aperture leaves of its square. moved: where the lattice lies, (0, 0) = on the stored
     views, those of the centre view's row and column among them. What lies off the grid is answered by its border.
     is_smoothed: whether what is drawn will be spread over what lies between places. With or without, it blurs as wide
-    as the aperture asks for: see `aperture_width`.
+    as the aperture asks for: see `aperture_moments`.
     """
     width, widest = min(float(stride), diameter), float(max(grid))
     place = math.remainder(moved.t - eye.t, stride), math.remainder(moved.s - eye.s, stride)
     scale = scale_of(shape, place, diameter, widest, stride, is_smoothed)
     diameter, widest = scale * diameter, scale * widest
     reach = min(diameter, widest) / 2 + stride
+    # The lattice around the eye, one place beyond the opening: soft edges reach there.
     t, s = np.meshgrid(*(_lattice(middle, reach, stride, start) for middle, start in zip(eye, moved)), indexing="ij")
     weights = openness(shape, t - eye.t, s - eye.s, diameter, widest, width)
     if weights.sum() <= 0:  # a mask's hole, or one smaller than the samples
@@ -161,6 +163,7 @@ def _nearest_present_of(present: bytes, shape: tuple[int, int]) -> NDArray[np.in
     every = np.indices(shape).reshape(2, -1).T
     distances = ((every[:, None] - indices[None]) ** 2).sum(-1)
     is_nearest = distances == distances.min(1, keepdims=True)
+    # Ties: which of the equally near ones, by the place in the grid.
     turn = (every @ (1, 2)) % is_nearest.sum(1)
     chosen = (is_nearest & (np.cumsum(is_nearest, 1) == turn[:, None] + 1)).argmax(1)
     return indices[chosen].reshape(*shape, 2)
