@@ -94,7 +94,7 @@ def edge_blur_px(disparity: FloatImage, should_stop: ShouldStop = never) -> floa
     coarser = 0
     while True:
         sigmas, heights = _edges(disparity, MEASURED_EDGE * extent, should_stop)
-        sigma = _weighted_median(sigmas, heights) * 2**coarser
+        sigma = _weighted_median(sigmas, heights) * 2.0**coarser
         # A ramp as long as the reach of the search is measured on a smaller map.
         measured = len(sigmas) and sigma < MEASURING_REACH_PX / 5 * 2**coarser
         if measured or min(disparity.shape) < 4 * MEASURING_REACH_PX:

@@ -89,4 +89,4 @@ def _scale_to_viewing_range(inverse: DoubleImage, grid: GridShape) -> FloatImage
     steps = max(grid.rows - 1, grid.columns - 1, 1)
     scale = TOTAL_PARALLAX * inverse.shape[1] / steps / span
     moved_in = np.clip(inverse, low - OUTLIER_SPANS * span, high + OUTLIER_SPANS * span)
-    return ((moved_in - np.median(known)) * scale).astype(np.float32)
+    return np.asarray((moved_in - np.median(known)) * scale, np.float32)

@@ -65,7 +65,7 @@ def fit_to_views(
     start = min((np.array([far, near]) for far in END_SHARES for near in END_SHARES), key=error)
     around = start + np.array([[0, 0], [1, 0], [0, 1]]) * END_STEP
     far, near = minimize(error, start, method="Nelder-Mead", options={"initial_simplex": around, "maxiter": 60}).x
-    return ((far + (near - far) * share) * (unit * step)).astype(np.float32)
+    return np.asarray((far + (near - far) * share) * (unit * step), np.float32)
 
 
 def _smaller(image: FloatImage, step: int) -> FloatImage:

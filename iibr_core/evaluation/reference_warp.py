@@ -41,7 +41,7 @@ class WarpedView:
     @property
     def visible(self) -> NDArray[np.bool_]:
         """All but the holes and one pixel around them."""
-        return ~binary_dilation(self.hole, np.ones((3, 3), bool))
+        return np.asarray(~binary_dilation(self.hole, np.ones((3, 3), bool)))
 
 
 def reference_warp(photo: FloatImage, disparity: FloatImage, offset: ViewOffset) -> WarpedView:

@@ -141,7 +141,7 @@ def _margin(focus: Focus) -> int:
 
 def _is_worth_it(focus: Focus, image: FloatImage) -> bool:
     """Whether enough of the picture lies within all views."""
-    return min(image.shape[:2]) - 2 * _margin(focus) >= LEAST_PX
+    return bool(min(image.shape[:2]) - 2 * _margin(focus) >= LEAST_PX)
 
 
 def _shift(image: FloatImage, axis: int, start: float, length: int) -> FloatImage:

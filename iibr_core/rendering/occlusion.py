@@ -24,7 +24,7 @@ def entropy(weights: FloatImage) -> FloatImage:
 
     With K = 1 it is the missing share.
     """
-    return _entropy(weights)
+    return np.asarray(_entropy(weights))
 
 
 def occlusion_mask(weights: FloatImage) -> NDArray[np.bool_]:
@@ -32,7 +32,7 @@ def occlusion_mask(weights: FloatImage) -> NDArray[np.bool_]:
     slots = weights.shape[0]
     limit = np.zeros((slots, 1, 1), np.float32)
     limit[0] = LEAST_COVERED
-    return _mask(weights, _entropy(limit)[0, 0])
+    return np.asarray(_mask(weights, _entropy(limit)[0, 0]))
 
 
 @kernel

@@ -130,7 +130,7 @@ class RaySet:
     @property
     def photo_disparity(self) -> FloatImage:
         """(H, W) disparity of the first image."""
-        return self._disparity[0]
+        return np.asarray(self._disparity[0])
 
 
 @kernel

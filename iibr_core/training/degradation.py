@@ -46,7 +46,7 @@ def quantise(disparity: FloatImage, step: float) -> FloatImage:
     """Rounded to multiples of a step (px per view step). A step of 0 changes nothing."""
     if step <= 0:
         return disparity.copy()
-    return (np.rint(disparity / step) * step).astype(np.float32)
+    return np.asarray(np.rint(disparity / step) * step, np.float32)
 
 
 def coarsen(disparity: FloatImage, factor: int) -> FloatImage:
@@ -83,7 +83,7 @@ def _interpolate(values: NDArray[np.float64], places: NDArray[Any], count: int) 
     left = np.clip(np.searchsorted(places, wanted, side="right") - 1, 0, max(last - 1, 0))
     right = np.minimum(left + 1, last)
     share = (wanted - places[left]) / np.where(right > left, places[right] - places[left], 1.0)
-    return values[..., left] * (1 - share) + values[..., right] * share
+    return np.asarray(values[..., left] * (1 - share) + values[..., right] * share)
 
 
 def degrade(disparity: FloatImage, rng: np.random.Generator, views: float = 1.0) -> FloatImage:

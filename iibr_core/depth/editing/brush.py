@@ -159,12 +159,12 @@ class _OpenStroke:
 
 def falloff(distance: FloatImage) -> FloatImage:
     """How much a brush does at a distance (1 = its radius): 1 in its middle, smoothly to 0."""
-    return np.square(1 - np.square(np.minimum(distance, np.float32(1))))
+    return np.asarray(np.square(1 - np.square(np.minimum(distance, np.float32(1)))))
 
 
 def radius_px(stroke: Stroke, disparity: FloatImage) -> float:
     """The brush's radius in pixels of a map, at least one."""
-    return max(stroke.radius * disparity.shape[1], 1.0)
+    return max(stroke.radius * int(disparity.shape[1]), 1.0)
 
 
 def texture_contrast(photo: FloatImage) -> float:

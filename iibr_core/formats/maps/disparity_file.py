@@ -75,7 +75,7 @@ def _disparity_from_depth(depth: FloatImage, width: int, scale: float) -> Double
     far, near = np.percentile(inverse[known], [1, 99])
     span = near - far
     factor = DEPTH_SPAN_WIDTHS * width * scale / span if span > FLAT_DEPTH_SHARE * near else 0.0
-    return (inverse - far) * factor
+    return np.asarray((inverse - far) * factor)
 
 
 def _depth_notes(path: Path) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ def _inside_by(
         half = math.pi / shape.blades
         angles = math.radians(shape.rotation_deg) + (2 * np.arange(shape.blades) + 1) * half  # a corner is on top
         outward = np.multiply.outer(s, np.sin(angles)) - np.multiply.outer(t, np.cos(angles))
-        return radius * math.cos(half) - outward.max(-1)
+        return np.asarray(radius * math.cos(half) - outward.max(-1))
     inside_by = radius - np.hypot(t, s)
     if shape.kind == "ring":
         return np.minimum(inside_by, np.hypot(t, s) - radius * shape.ring_inner)
@@ -78,4 +78,4 @@ def _between(table: NDArray[np.float64], y: NDArray[np.float64], x: NDArray[np.f
     y, x = y - row, x - column
     upper = table[row, column] * (1 - x) + table[row, column + 1] * x
     lower = table[row + 1, column] * (1 - x) + table[row + 1, column + 1] * x
-    return upper * (1 - y) + lower * y
+    return np.asarray(upper * (1 - y) + lower * y)

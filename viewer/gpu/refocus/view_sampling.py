@@ -166,4 +166,4 @@ def _nearest_present_of(present: bytes, shape: tuple[int, int]) -> NDArray[np.in
     # Ties: which of the equally near ones, by the place in the grid.
     turn = (every @ (1, 2)) % is_nearest.sum(1)
     chosen = (is_nearest & (np.cumsum(is_nearest, 1) == turn[:, None] + 1)).argmax(1)
-    return indices[chosen].reshape(*shape, 2)
+    return np.asarray(indices[chosen]).reshape(*shape, 2)
