@@ -9,8 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder
+
+from defusedxml.common import DTDForbidden
+from defusedxml.ElementTree import DefusedXMLParser
 
 from iibr_core.types import InputError
 
@@ -159,36 +161,30 @@ def _join_parts(parts: list[tuple[int, int, bytes]]) -> bytes:
     return bytes(packet)
 
 
-def parse_packet(packet: bytes) -> Element:
-    """The XML tree of a packet. Raises InputError where it is no XML, declares a document type, or is too large."""
-    builder = TreeBuilder()
-    parser = expat.ParserCreate(namespace_separator="}")
-    parser.buffer_text = True
+class _LimitedTree(TreeBuilder):
+    """A tree of at most MAX_ELEMENTS elements."""
+
     count = 0
 
-    def qualified(name: str) -> str:
-        return "{" + name if "}" in name else name
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal count
-        count += 1
-        if count > MAX_ELEMENTS:
+    def start(self, tag: str, attrs: dict[str, str]) -> Element:
+        self.count += 1
+        if self.count > MAX_ELEMENTS:
             raise InputError(f"XMP holds more than {MAX_ELEMENTS:,} elements")
-        builder.start(qualified(name), {qualified(key): value for key, value in attributes.items()})
+        return super().start(tag, attrs)
 
-    def refuse(*_: object) -> None:
-        raise InputError("XMP declares a document type; entities are not expanded")
 
-    parser.StartElementHandler = start
-    parser.EndElementHandler = lambda name: builder.end(qualified(name))
-    parser.CharacterDataHandler = builder.data
-    parser.StartDoctypeDeclHandler = refuse
+def parse_packet(packet: bytes) -> Element:
+    """The XML tree of a packet. Raises InputError where it is no XML, declares a document type, or is too large."""
     if len(packet) > MAX_PACKET_BYTES:
         raise InputError(f"XMP of {len(packet):,} bytes exceeds {MAX_PACKET_BYTES:,}")
+    parser = DefusedXMLParser(target=_LimitedTree(), forbid_dtd=True)
     try:
-        parser.Parse(packet.strip(b"\0 \t\r\n"), True)
-        return builder.close()
-    except (expat.ExpatError, AssertionError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
+        parser.feed(packet.strip(b"\0 \t\r\n"))
+        tree: Element = parser.close()
+        return tree
+    except InputError:
+        raise
+    except DTDForbidden as error:
+        raise InputError("XMP declares a document type; entities are not expanded") from error
+    except (ParseError, AssertionError, ValueError, LookupError) as error:  # the last: of an encoding
         raise InputError(f"XMP is damaged ({error})") from error

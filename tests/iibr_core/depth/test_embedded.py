@@ -317,7 +317,12 @@ def test_entities_are_never_expanded(prolog: str) -> None:
         embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [xmp]))
 
 
-@pytest.mark.parametrize("packet", [b"", b"<", b"<a><b></a>", b"\xff\xfe\x00", b"<a/><b/>", b"plain text"])
+UNKNOWN_ENCODING = b'<?xml version="1.0" encoding="none"?><a/>'
+
+
+@pytest.mark.parametrize(
+    "packet", [b"", b"<", b"<a><b></a>", b"\xff\xfe\x00", b"<a/><b/>", b"plain text", UNKNOWN_ENCODING]
+)
 def test_damaged_xml(packet: bytes) -> None:
     with pytest.raises(InputError):
         parse_packet(packet)
