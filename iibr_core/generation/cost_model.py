@@ -13,6 +13,7 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
+from iibr_core.rendering.ambiguity import AMBIGUOUS_AROUND_PX, AMBIGUOUS_PX, EVERY_COST, SOFT
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
 from iibr_core.types import FloatImage, GridShape, Quality
 
@@ -105,20 +106,14 @@ class ParallaxStatistics:
     @property
     def is_soft(self) -> bool:
         """Whether depth edges are slopes: then surfaces that make a ray ambiguous are looked for farther around."""
-        from iibr_core.rendering.ambiguous_rays import SOFT
-
         return self.softness > SOFT
 
     def meeting_share(self, parallax: float) -> float:
         """Share of the pixels where surfaces meet in a view with this share of the outermost one's parallax."""
-        from iibr_core.rendering.ambiguous_rays import AMBIGUOUS_PX
-
         return float((self.step * np.float32(parallax) > AMBIGUOUS_PX).mean())
 
     def ambiguous_share(self, parallax: float) -> float:
         """Share of the rays that are ambiguous there: more where edges are soft."""
-        from iibr_core.rendering.ambiguous_rays import AMBIGUOUS_AROUND_PX
-
         if not self.is_soft:
             return self.meeting_share(parallax)
         # What changes by that much within the reach of the search changes by half of it within this shorter one.
@@ -127,6 +122,7 @@ class ParallaxStatistics:
 
 def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatistics:
     """Of field disparity (H, W), px per view step; NaN counts as 0. outermost: the largest view offset."""
+    # Kernels: numba must not load before the first plan is made, and the window's state imports this file at start.
     from iibr_core.rendering.disparity_statistics import measure_disparity
 
     moved = np.nan_to_num(disparity * np.float32(outermost))
@@ -185,8 +181,6 @@ def _inpainted_views(statistics: ParallaxStatistics, grid: GridShape) -> int:
 
 def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> int:
     """Memory for the ray set (the photo, its fringe, inpainted views) and the views in flight, one a thread."""
-    from iibr_core.rendering.view_synthesis import EVERY_COST
-
     pixels = statistics.step.size
     band = min(pixels, MOST_BAND_PIXELS // (EVERY_COST if quality == "exact" else 1))
     asked = {"fast": 0.0, "balanced": statistics.ambiguous_share(1.0), "exact": 1.0}[quality]

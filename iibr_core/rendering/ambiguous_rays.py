@@ -14,6 +14,7 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.rendering.ambiguity import AMBIGUOUS_AROUND_PX, AMBIGUOUS_PX, SOFT
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
 from iibr_core.rendering.resampling import cubic, resample
@@ -35,14 +36,9 @@ AROUND = np.array(
 """Where, in pixels down and right, the nearest first: this is enough to meet every surface that is not a sliver."""
 AROUND_DISTANCE = np.hypot(*AROUND.T)
 AROUND_SHARP = 12
-SOFT = 0.5
-"""Where depth edges are softer than this, all of AROUND is looked at, else the first AROUND_SHARP."""
-AMBIGUOUS_PX = 1.5
-"""A step of disparity that moves its sides apart by less than this makes no ray ambiguous."""
+"""Where depth edges are not SOFT, only the first so many of AROUND are looked at."""
 OWN_LANDING_PX = 0.75
 """What lands near by and differs from a hypothesis by less parallax than this is of its surface."""
-AMBIGUOUS_AROUND_PX = 1.5
-"""Soft edges have no steps: there a surface within REACH_PX whose parallax differs by this makes a ray ambiguous."""
 DISTINCT_PX = 0.5
 """Hypotheses closer than this are one; where all of a ray's are, nothing is to be decided."""
 LEAST_WEIGHT = 0.02

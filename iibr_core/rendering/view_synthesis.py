@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import fill_background
+from iibr_core.rendering.ambiguity import EVERY_COST
 from iibr_core.rendering.ambiguous_rays import (
     HYPOTHESES,
     REACH_PX,
@@ -33,8 +34,6 @@ from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 EDGE_PX = 2.0
 """A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
-EVERY_COST = 8
-"""How many times as long a band takes where the transformer is asked for every ray."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
