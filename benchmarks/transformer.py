@@ -23,6 +23,7 @@ from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.generation.light_field import transformer_for
+from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.ray_transformer.model import RayTransformer
 from iibr_core.rendering.ambiguous_rays import PLAIN, SHARE, AmbiguousRays
 from iibr_core.rendering.candidates import find_candidates
@@ -206,10 +207,8 @@ def scene_psnr(truth: BenchScene, weigh: Weigh | None, choice: RayChoice) -> flo
     """Mean PSNR of the views of a scene, rendered as `generate` does, with these weights and rays."""
     offsets = [ViewOffset(float(t * truth.reach), float(s * truth.reach)) for t in (-1, 1) for s in (-1, 1)]
     rays = rays_of_photo(truth.photo, truth.disparity, truth.reach, len(offsets))
-    with ViewSynthesis() as synthesis:
-        for offset in offsets if choice.inpainted else []:
-            view = synthesis.render(rays, offset)
-            rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
+    if choice.inpainted:
+        complete_ray_set(rays, offsets)
     described = None if weigh is None else lambda ambiguous: weigh(choice.described(rays, ambiguous))
     with ViewSynthesis(transformer=described, hypotheses=choice.hypotheses) as synthesis:
         views = ((synthesis.render(rays, at).colors, image) for at, image in truth.truth.items())

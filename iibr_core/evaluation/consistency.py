@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter, minimum_filter
 
-from iibr_core.generation.view_maker import outer_views
+from iibr_core.generation.outer_views import outer_views
 from iibr_core.rendering.view_synthesis import RenderedView
 from iibr_core.types import FloatImage, ViewOffset
 

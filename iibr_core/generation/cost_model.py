@@ -13,13 +13,12 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
+from iibr_core.generation.outer_views import outer_views_of_grid
 from iibr_core.rendering.ambiguity import AMBIGUOUS_AROUND_PX, AMBIGUOUS_PX, EVERY_COST, SOFT
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
 from iibr_core.types import FloatImage, GridShape, Quality
 
 CORES = THREADS
-FARTHEST_VIEWS = 8
-"""Views that complete the ray set: the corners and the middles of the sides."""
 STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
 GAP_PX = 1.0
@@ -27,7 +26,7 @@ GAP_PX = 1.0
 MOST_PARALLAX_PX = 1e6
 
 RAY_BYTES, STATISTICS_BYTES = 21, 12
-"""Of one pixel of one source image: colours, disparity, coverage, flag (ray_set.RaySet); its statistics."""
+"""Of one pixel of one source image: colours, disparity, coverage, flag (`RaySet`); its statistics."""
 WORKING_BYTES = 18
 """Of one pixel of a view in the making: float colours, disparity, flags."""
 CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
@@ -176,7 +175,7 @@ def _sum_over_views(share: Callable[[float], float], grid: GridShape) -> float:
 
 
 def _inpainted_views(statistics: ParallaxStatistics, grid: GridShape) -> int:
-    return min(FARTHEST_VIEWS, grid.rows * grid.columns - 1) if statistics.has_disocclusion else 0
+    return len(outer_views_of_grid(grid)) if statistics.has_disocclusion else 0
 
 
 def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> int:

@@ -6,23 +6,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 
-import numpy as np
-
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.generation.light_field import transformer_for
+from iibr_core.generation.outer_views import farthest_views, outer_views
+from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
 from iibr_core.types import FloatImage, Quality, ViewOffset
-
-
-def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
-    """Corners and side middles of the box around all viewpoints and the photo's own, in the order `generate` takes."""
-    every = [ViewOffset(0.0, 0.0), *offsets]
-    top, bottom = min(at.t for at in every), max(at.t for at in every)
-    left, right = min(at.s for at in every), max(at.s for at in every)
-    corners = [(top, left), (bottom, right), (top, right), (bottom, left)]
-    sides = [(0.0, left), (0.0, right), (top, 0.0), (bottom, 0.0)]
-    return [ViewOffset(*at) for at in dict.fromkeys(corners + sides) if at != (0.0, 0.0)]
 
 
 class ViewMaker:
@@ -47,8 +37,7 @@ class ViewMaker:
         """
         self._should_stop, self._slots = should_stop, slots
         self.outer = outer_views(offsets)
-        farthest = max([1.0, *(abs(part) for at in self.outer for part in at)])
-        self._rays = rays_of_photo(photo, disparity, farthest, len(self.outer))
+        self._rays = rays_of_photo(photo, disparity, farthest_views(self.outer), len(self.outer))
         self._first: dict[ViewOffset, tuple[RenderedView, float]] = {}
         self._syntheses = {
             quality: ViewSynthesis(
@@ -60,13 +49,10 @@ class ViewMaker:
     def __enter__(self) -> ViewMaker:
         """Complete the ray set by what the outer views disocclude."""
         try:
-            with ViewSynthesis(self._should_stop, slots=self._slots) as synthesis:
-                for offset in self.outer:
-                    start = time.perf_counter()
-                    view = synthesis.render(self._rays, offset)
-                    if view.occluded.any():
-                        self._rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
-                    self._first[offset] = view, 1e3 * (time.perf_counter() - start)
+            start = time.perf_counter()
+            for offset, view in render_outer_views(self._rays, self.outer, self._should_stop, slots=self._slots):
+                self._first[offset] = view, 1e3 * (time.perf_counter() - start)
+                start = time.perf_counter()
         except BaseException:
             self.__exit__(None, None, None)
             raise

@@ -7,12 +7,15 @@ frame's border it picks the surface that really leaves the frame, without any th
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, never, raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, ViewOffset
+from iibr_core.types import FloatImage, ViewOffset, image_size
 
 DIRECTIONS = np.array(
     [
@@ -42,30 +45,34 @@ def fill_background(
     that are possible there, weighted by 1 / distance, then smoothed within its surface. A view that is all hole stays
     as it is. Raises Cancelled once should_stop is true.
     """
-    height, width = hole.shape
-    found = in_bands(
-        lambda first, last: first * width + np.flatnonzero(hole[first:last]),
-        ImageSize(height, width),
-        should_stop,
-        threads,
-    )
-    pixels = np.concatenate(found)
+    pixels = _hole_pixels(hole, should_stop, threads)
     known = _nearest_known(hole, pixels, should_stop, threads)
     smoothed = np.empty((len(pixels), 3), np.float32)
     tolerance = HIDDEN_PX / max(abs(offset.s), abs(offset.t))
+    steps: tuple[Callable[[slice], None], ...] = (
+        lambda part: _fill(colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t),
+        lambda part: _smooth(colors, disparity, hole, pixels[part], tolerance, smoothed[part]),
+        # Written back only now: a pixel's neighbours are smoothed from what was filled, not from what was smoothed.
+        lambda part: _write_colors(smoothed[part], pixels[part], colors),
+    )
     parts = [slice(first, first + MOST_PIECE_PIXELS) for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
-
-    def fill(part: slice) -> None:
-        _fill(colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t)
-
-    def smooth(part: slice) -> None:
-        _smooth(colors, disparity, hole, pixels[part], tolerance, smoothed[part])
-
-    def put(part: slice) -> None:
-        _write_colors(smoothed[part], pixels[part], colors)
-
-    for step in (fill, smooth, put):
+    for step in steps:
         in_pieces(step, parts, should_stop, threads)
+
+
+def background_inpainter() -> Inpainter:
+    """For the registry: nothing to load."""
+    return fill_background
+
+
+def _hole_pixels(hole: NDArray[np.bool_], should_stop: ShouldStop, threads: int) -> NDArray[np.int64]:
+    """Flat indices (N,) of the hole pixels, ascending."""
+    size = image_size(hole)
+
+    def band(first: int, last: int) -> NDArray[np.int64]:
+        return first * size.width + np.flatnonzero(hole[first:last])
+
+    return np.concatenate(in_bands(band, size, should_stop, threads))
 
 
 def _nearest_known(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ambiguity import EVERY_COST
 from iibr_core.rendering.ambiguous_rays import (
     HYPOTHESES,
@@ -83,15 +84,17 @@ class ViewSynthesis:
         slots: int = 5,
         keeps_entropy: bool = False,
         hypotheses: int = HYPOTHESES,
+        inpainter: Inpainter = fill_background,
     ) -> None:
         """transformer: gives the weights (N, K) of ambiguous rays; None: closed form. every: of all rays.
 
         slots: candidates kept a ray. keeps_entropy: whether views bring the entropy of their weights. hypotheses: the
-        transformer's K.
+        transformer's K. inpainter: fills what no source shows.
         """
         self._asked_to_stop, self._is_over = should_stop, False
         self._transformer, self._every = transformer, every
         self._slots, self._hypotheses, self._keeps_entropy = slots, hypotheses, keeps_entropy
+        self._inpainter = inpainter
         self._threads = ThreadPoolExecutor(tiling.THREADS, thread_name_prefix="iibr-views")
 
     def __enter__(self) -> ViewSynthesis:
@@ -140,7 +143,7 @@ class ViewSynthesis:
             rays.size, self._should_stop, threads, most_pixels,
         )  # fmt: skip
         if view.occluded.any():
-            fill_background(
+            self._inpainter(
                 view.colors, view.disparity, view.occluded, rays.photo_disparity, offset, self._should_stop, threads
             )
         return view

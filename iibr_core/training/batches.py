@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from iibr_core.color import linear_from_srgb
+from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.rendering.ambiguous_rays import (
     HYPOTHESES,
     REACH_PX,
@@ -26,7 +27,7 @@ from iibr_core.rendering.ambiguous_rays import (
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import heaviest_candidate
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training.degradation import degrade
 from iibr_core.training.losses import EpiShape, color_loss, to_perceptual
@@ -92,13 +93,8 @@ def _ray_set(colors: FloatImage, disparity: FloatImage, radius: int, inpainted: 
     """The photo's rays and, if inpainted, those that the corner views add, as `generate` makes them."""
     corners = [ViewOffset(float(t), float(s)) for t, s in ((-radius, -radius), (radius, radius))]
     rays = rays_of_photo(colors, disparity, radius, len(corners))
-    if not inpainted:
-        return rays
-    with ViewSynthesis() as synthesis:
-        for offset in corners:
-            view = synthesis.render(rays, offset)
-            if view.occluded.any():
-                rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32))
+    if inpainted:
+        complete_ray_set(rays, corners)
     return rays
 
 

@@ -25,7 +25,7 @@ from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input,
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.generation.light_field import generate
-from iibr_core.generation.view_maker import ViewMaker, outer_views, quantise_as_stored
+from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid, write_numbered
@@ -63,13 +63,6 @@ def test_views_are_those_that_generate_makes(quality: Quality) -> None:
         for index, offset in offsets.items():
             shown = np.rint(255 * quantise_as_stored(maker.view(quality, offset).colors)).astype(np.uint8)
             np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
-
-
-def test_outer_views_are_corners_and_side_middles_of_what_is_asked_for() -> None:
-    square = [ViewOffset(t, s) for t in (-2.0, 1.0) for s in (-1.0, 3.0)]
-    assert set(outer_views(square)) == {(-2, -1), (1, 3), (-2, 3), (1, -1), (0, -1), (0, 3), (-2, 0), (1, 0)}
-    assert outer_views([ViewOffset(0.0, 1.0)]) == [(0, 1)]
-    assert outer_views([ViewOffset(0.0, 0.0)]) == []
 
 
 def test_both_trials_show_every_row(judgements: list[EvaluationResult]) -> None:

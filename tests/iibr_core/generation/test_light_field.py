@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from iibr_core.generation.light_field import generate
+from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime import tiling
-from iibr_core.types import GridShape, ViewOffset, ViewUpdate
+from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture, square_before_wall
 
 
@@ -87,6 +88,32 @@ def test_views_arrive_photo_first_then_farthest_then_nearest_to_the_eye():
     assert set(order[1:5]) == {(0, 0), (0, 4), (4, 0), (4, 4)}
     assert order[9] == (2, 3)
     assert len(set(order)) == 25
+
+
+def paint_red(colors, disparity, hole, photo_disparity, offset, should_stop, threads):
+    """An inpainter that cannot be overlooked."""
+    colors[hole], disparity[hole] = (1.0, 0.0, 0.0), -9.0
+
+
+def red_inpainter():
+    return paint_red
+
+
+@pytest.mark.parametrize("quality", ["fast", "balanced"])
+def test_the_inpainter_of_that_name_fills_all_that_is_inpainted(monkeypatch, quality):
+    monkeypatch.setitem(INPAINTERS, "red", f"{__name__}:red_inpainter")
+    photo, disparity = square_before_wall(60, 80, 3.0)
+    red = views_of(photo, disparity, 5, quality=quality, inpaint="red")
+    for view in red.values():
+        inner = view.colors[view.inpainted & ~beside(~view.inpainted)]  # what lies beside is mixed in at edges
+        assert (inner[:, :1] > 2.0 * inner[:, 1:]).all(), "the wall behind is blue"
+    assert sum(view.inpainted.sum() for view in red.values()) > 0
+
+
+def test_an_unknown_inpainter_is_refused():
+    photo, disparity = square_before_wall()
+    with pytest.raises(InputError, match="--inpaint magic"):
+        views_of(photo, disparity, 3, inpaint="magic")
 
 
 def beside(mask):

@@ -1,7 +1,10 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
-from iibr_core.generation.cost_model import largest_offset, measure_parallax
+from iibr_core.generation.cost_model import estimate_workload, largest_offset, measure_parallax
 from iibr_core.generation.light_field import ray_set
 from iibr_core.generation.plan import MOST_VIEWS_A_SIDE, STEP_PX, PlanOverrides, plan_for_viewing, plan_literal
 from iibr_core.training.batches import ambiguous_rays_of_view
@@ -86,6 +89,20 @@ def test_the_rays_foretold_are_those_really_ambiguous(blur_px):
             predicted.append(statistics.ambiguous_share(reach / 4) * disparity.values.size)
             found.append(len(ambiguous_rays_of_view(rays, ViewOffset(reach, -reach), (0, size[0]), False).pixel))
     assert sum(predicted) == pytest.approx(sum(found), rel=0.3), (predicted, found)
+
+
+@pytest.mark.parametrize("grid", [GridShape(1, 7), GridShape(2, 9), GridShape(2, 2), GridShape(5, 5)], ids=str)
+def test_as_many_views_are_counted_twice_as_complete_the_ray_set(grid):
+    photo, disparity = square_before_wall(60, 80, 3.0)
+    twice = len(list(ray_set(photo, disparity, plan_literal(photo, disparity, grid))[1]))
+    statistics = measure_parallax(disparity.values, largest_offset(grid))
+    fast, balanced = (estimate_workload(statistics, grid, quality) for quality in ("fast", "balanced"))
+    assert balanced.view_pixels - fast.view_pixels == twice * disparity.values.size
+
+
+def test_plans_load_no_kernels_until_one_is_made():
+    code = "import sys, iibr_core.generation.plan; print('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 
 def test_one_wild_value_does_not_set_the_baseline():

@@ -1,0 +1,31 @@
+"""The views that complete a ray set, and that cost is estimated by: one list. Imports nothing heavy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from iibr_core.types import GridShape, ViewOffset
+
+
+def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
+    """Corners, then side middles, of the box around all viewpoints and the photo's own; each once, without that one.
+
+    Together they see all but slivers of what any view in the box disoccludes.
+    """
+    every = [ViewOffset(0.0, 0.0), *offsets]
+    top, bottom = min(at.t for at in every), max(at.t for at in every)
+    left, right = min(at.s for at in every), max(at.s for at in every)
+    # Opposite corners first: between them they disocclude nearly all there is, so those after them find little left.
+    corners = [(top, left), (bottom, right), (top, right), (bottom, left)]
+    sides = [(0.0, left), (0.0, right), (top, 0.0), (bottom, 0.0)]
+    return [ViewOffset(*at) for at in dict.fromkeys(corners + sides) if at != (0.0, 0.0)]
+
+
+def outer_views_of_grid(grid: GridShape) -> list[ViewOffset]:
+    """`outer_views` of all views of a grid."""
+    return outer_views([grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)])
+
+
+def farthest_views(outer: Iterable[ViewOffset]) -> float:
+    """The largest view offset among these, 1 at least: what a ray set is made for."""
+    return max([1.0, *(abs(part) for at in outer for part in at)])

@@ -1,0 +1,49 @@
+"""The paper's update loop (section 3), the only one: what the outer views disocclude is inpainted once and joins the
+ray set.
+
+After that the ray set is final: all views made of it show the same content in a hole, in whatever order they come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.protocol import Inpainter
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import ViewOffset
+
+
+def render_outer_views(
+    rays: RaySet,
+    outer: Iterable[ViewOffset],
+    should_stop: ShouldStop = never,
+    inpainter: Inpainter = fill_background,
+    slots: int = 5,
+) -> Iterator[tuple[ViewOffset, RenderedView]]:
+    """Each of these views with its offset, in order; when it is yielded, what it disoccluded has joined the ray set.
+
+    Weights are the closed form's in every quality: its disparity is smoother, and so is what is inpainted.
+    inpainter, slots: see `ViewSynthesis`. Taking a view raises Cancelled once should_stop is true.
+    """
+    with ViewSynthesis(should_stop, slots=slots, inpainter=inpainter) as synthesis:
+        for offset in outer:
+            view = synthesis.render(rays, offset)
+            if view.occluded.any():
+                rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32), should_stop)
+            yield offset, view
+
+
+def complete_ray_set(
+    rays: RaySet,
+    outer: Iterable[ViewOffset],
+    should_stop: ShouldStop = never,
+    inpainter: Inpainter = fill_background,
+) -> None:
+    """`render_outer_views` for those who want the rays only. Raises Cancelled once should_stop is true."""
+    for _ in render_outer_views(rays, outer, should_stop, inpainter):
+        pass

@@ -1,0 +1,92 @@
+"""The views that complete a ray set, and the loop that does it."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from iibr_core.generation.outer_views import farthest_views, outer_views, outer_views_of_grid
+from iibr_core.generation.update_loop import complete_ray_set, render_outer_views
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import GridShape, ViewOffset
+from tests.iibr_core.scenes import square_before_wall
+
+LEFT, RIGHT = ViewOffset(0.0, -2.0), ViewOffset(0.0, 2.0)
+
+
+def rays():
+    photo, disparity = square_before_wall(30, 40, 3.0)
+    return rays_of_photo(photo.pixels, disparity.values, 2.0, 2)
+
+
+def test_outer_views_are_corners_and_side_middles_of_what_is_asked_for():
+    square = [ViewOffset(float(t), float(s)) for t in (-2, 0, 1) for s in (-1, 3)]
+    assert set(outer_views(square)) == {(-2, -1), (1, 3), (-2, 3), (1, -1), (0, -1), (0, 3), (-2, 0), (1, 0)}
+    assert outer_views([ViewOffset(0.0, 1.0)]) == [(0, 1)]
+    assert outer_views([ViewOffset(0.0, 0.0)]) == []
+
+
+@pytest.mark.parametrize("grid", [GridShape(*shape) for shape in itertools.product((1, 2, 3, 4, 9), repeat=2)], ids=str)
+def test_those_of_a_grid_are_views_of_it_in_the_order_of_its_indices(grid):
+    bottom, right, (v, u) = grid.rows - 1, grid.columns - 1, grid.centre
+    indices = [(0, 0), (bottom, right), (0, right), (bottom, 0), (v, 0), (v, right), (0, u), (bottom, u)]
+    expected = [grid.offset(*index) for index in dict.fromkeys(indices) if index != grid.centre]
+    every = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns)]
+    assert outer_views_of_grid(grid) == outer_views(every) == expected
+    assert farthest_views(expected) == max(1.0, *(abs(part) for offset in every for part in offset))
+
+
+def test_what_a_view_disocclused_has_joined_the_rays_when_it_is_yielded():
+    seen = rays()
+    photo_images = len(seen)
+    with ViewSynthesis() as synthesis:
+        expected = synthesis.render(rays(), LEFT)
+    for count, (offset, view) in enumerate(render_outer_views(seen, [LEFT, RIGHT]), 1):
+        assert len(seen) == photo_images + count
+        if offset == LEFT:
+            np.testing.assert_array_equal(view.colors, expected.colors)
+            _, colors, disparity, coverage, _ = seen.arrays
+            np.testing.assert_array_equal(colors[-1], view.colors)
+            np.testing.assert_array_equal(disparity[-1], view.disparity)
+            np.testing.assert_array_equal(coverage[-1] > 0, view.occluded)
+    with ViewSynthesis() as synthesis:
+        again = synthesis.render(seen, LEFT)
+    assert expected.occluded.any()
+    assert not again.occluded.any(), "a hole that was inpainted is none any more"
+    assert again.inpainted[expected.occluded].all()
+
+
+def test_views_that_disocclude_nothing_add_nothing():
+    seen = rays()
+    before = len(seen)
+    (view,) = (view for _, view in render_outer_views(seen, [ViewOffset(0.0, 0.0)]))
+    assert not view.occluded.any()
+    assert len(seen) == before
+
+
+def test_completing_is_taking_all_views():
+    completed, taken = rays(), rays()
+    complete_ray_set(completed, [LEFT, RIGHT])
+    assert len(list(render_outer_views(taken, [LEFT, RIGHT]))) == 2
+    for one, other in zip(completed.arrays, taken.arrays):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_the_inpainter_decides_what_joins():
+    def paint(colors, disparity, hole, photo_disparity, offset, should_stop, threads):
+        colors[hole], disparity[hole] = (0.0, 1.0, 0.0), -5.0
+
+    seen = rays()
+    for _, view in render_outer_views(seen, [LEFT], inpainter=paint):
+        assert (view.colors[view.occluded] == (0, 1, 0)).all()
+        assert (view.disparity[view.occluded] == -5).all()
+    np.testing.assert_array_equal(seen.arrays[2][-1] == -5, view.occluded)
+
+
+def test_a_stop_is_heard_and_adds_nothing():
+    seen = rays()
+    before = len(seen)
+    with pytest.raises(Cancelled):
+        complete_ray_set(seen, [LEFT], should_stop=lambda: True)
+    assert len(seen) == before

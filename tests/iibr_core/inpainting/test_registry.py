@@ -1,0 +1,72 @@
+"""What every way of inpainting must do, and where they are found by name."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_inpainter
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import InputError, ViewOffset
+from tests.iibr_core.scenes import square_before_wall
+
+OFFSET = ViewOffset(-1.0, 2.0)
+FORE_PX = 3.0
+
+
+def view_with_holes():
+    """(colors, disparity, hole, photo_disparity): what the renderer gives an inpainter, nonsense in the holes."""
+    photo, disparity = square_before_wall(60, 80, FORE_PX)
+    with ViewSynthesis() as synthesis:
+        view = synthesis.render(rays_of_photo(photo.pixels, disparity.values, 2.0, 0), OFFSET)
+    view.colors[view.occluded], view.disparity[view.occluded] = np.nan, np.nan
+    return view.colors, view.disparity, view.occluded, disparity.values
+
+
+def test_the_default_is_one_of_them():
+    assert DEFAULT_INPAINTER in INPAINTERS
+
+
+def test_an_unknown_name_is_one_line_that_names_those_there_are():
+    with pytest.raises(InputError, match=f"--inpaint magic: .*{DEFAULT_INPAINTER}"):
+        load_inpainter("magic")
+
+
+def test_names_are_known_before_anything_heavy_loads():
+    code = "import sys, iibr_core.inpainting.registry; print([m for m in ('numba', 'torch') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+@pytest.mark.parametrize("name", INPAINTERS)
+def test_holes_are_filled_and_nothing_else_changes(name):
+    colors, disparity, hole, photo_disparity = view_with_holes()
+    assert 0 < hole.sum() < hole.size / 2
+    known = colors[~hole], disparity[~hole]
+    load_inpainter(name)(colors, disparity, hole, photo_disparity, OFFSET)
+    np.testing.assert_array_equal(colors[~hole], known[0])
+    np.testing.assert_array_equal(disparity[~hole], known[1])
+    assert np.isfinite(colors).all()
+    assert (colors >= 0).all()
+    assert np.isfinite(disparity).all()
+    # The square hid what was disoccluded beside it; beyond the frame anything may go on.
+    inside = np.s_[15:45, 20:60]
+    assert (disparity[inside][hole[inside]] < FORE_PX / 2).all()
+
+
+@pytest.mark.parametrize("name", INPAINTERS)
+def test_threads_change_nothing(name):
+    filled = []
+    for threads in (1, 3):
+        colors, disparity, hole, photo_disparity = view_with_holes()
+        load_inpainter(name)(colors, disparity, hole, photo_disparity, OFFSET, threads=threads)
+        filled.append((colors, disparity))
+    for one, other in zip(*filled):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", INPAINTERS)
+def test_a_stop_is_heard(name):
+    with pytest.raises(Cancelled):
+        load_inpainter(name)(*view_with_holes(), OFFSET, should_stop=lambda: True)
