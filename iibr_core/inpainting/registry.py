@@ -11,7 +11,10 @@ from iibr_core.types import InputError
 INPAINTERS = {
     "background": "iibr_core.inpainting.background:background_inpainter",
 }
-"""Name -> "module:function" of a factory without arguments, which raises InputError where it lacks what it needs."""
+"""Name -> "module:function" of a factory without arguments, which raises InputError where it lacks what it needs.
+
+A factory is asked for every light field and every comparison: one that reads weights keeps them.
+"""
 
 DEFAULT_INPAINTER = "background"
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.generation.plan import ScenePlan, plan_literal
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import message_of
@@ -35,13 +36,14 @@ EQUAL_PSNR_DB = float("inf")
 class ComparisonInputs:
     """What requests are made from: the photo and its plan, or the stored view (H, W, 3) of a light field from disk.
 
-    quality: of the scene's own views.
+    quality, inpaint: of the scene's own views.
     """
 
     quality: Quality
     loaded: LoadedPhoto | None = None
     plan: ScenePlan | None = None
     stored: StoredColors | None = None
+    inpaint: str = DEFAULT_INPAINTER
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,14 +159,18 @@ class ComparisonJob:
             nothing = np.zeros(loaded.photo.size, np.float32)
             nowhere = nothing.astype(np.bool_)
             return RenderedView(loaded.photo.pixels, nothing, nowhere, nowhere, nothing)
+        inpainter = load_inpainter(inputs.inpaint)
         if self._rays is None or self._rays_of != (request.generation, grid):
             self._rays = None  # two sets would be large
-            rays, farthest_views = ray_set(loaded.photo, plan.field_disparity(loaded.disparity), plan, should_stop)
-            for _ in farthest_views:
+            disparity = plan.field_disparity(loaded.disparity)
+            rays, outer_views = ray_set(loaded.photo, disparity, plan, should_stop, inpainter)
+            for _ in outer_views:
                 pass
             self._rays, self._rays_of = rays, (request.generation, grid)
-        transformer, every = transformer_for(quality), quality == "exact"
-        with ViewSynthesis(should_stop, transformer, every, keeps_entropy=request.kind == "entropy") as synthesis:
+        transformer, every, keeps_entropy = transformer_for(quality), quality == "exact", request.kind == "entropy"
+        with ViewSynthesis(
+            should_stop, transformer, every, keeps_entropy=keeps_entropy, inpainter=inpainter
+        ) as synthesis:
             return synthesis.render(self._rays, plan.grid.offset(*request.view))
 
 

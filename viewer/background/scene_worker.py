@@ -276,7 +276,7 @@ def _results_of_photo(
 
     from iibr_core.generation.light_field import generate
 
-    views = generate(loaded.photo, disparity, plan, should_stop, nearest_to, source.quality)
+    views = generate(loaded.photo, disparity, plan, should_stop, nearest_to, source.quality, source.inpaint)
     yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
     if not should_stop():
         prepare_brush()

@@ -14,6 +14,7 @@ import typer
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import DEFAULT_QUALITY, GridShape, InputError, Quality, ViewOffset
 from viewer.cli.evaluate import evaluate
 from viewer.cli.models import models
@@ -25,6 +26,7 @@ from viewer.cli.options import (
     DisparityScale,
     FocusDisparity,
     Grid,
+    Inpaint,
     MaxPixels,
     Memory,
     PhotoPath,
@@ -128,6 +130,7 @@ def view(
     max_pixels: MaxPixels = None,
     memory: Memory = None,
     quality: QualityChoice = DEFAULT_QUALITY,
+    inpaint: Inpaint = DEFAULT_INPAINTER,
     ground_truth: Annotated[
         Path | None,
         typer.Option("--ground-truth", metavar="FOLDER", help="A light field to compare with.", show_default=False),
@@ -139,7 +142,7 @@ def view(
     """
     path = path.absolute() if path else _demo_photo()
     ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
-    source = _source(path, ways, grid, focus_disparity, max_pixels, quality)
+    source = _source(path, ways, grid, focus_disparity, max_pixels, quality, inpaint)
     _require_existing(source)
     if ground_truth is not None and not ground_truth.is_dir():
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
@@ -166,6 +169,7 @@ def generate(
     max_pixels: MaxPixels = None,
     memory: Memory = None,
     quality: QualityChoice = DEFAULT_QUALITY,
+    inpaint: Inpaint = DEFAULT_INPAINTER,
 ) -> None:
     """Write the light field of a photo; its disparity counts literally, in pixels per view.
 
@@ -184,10 +188,11 @@ def generate(
     print_notes(loaded.photo.notes + loaded.disparity.notes)
     plan = plan_literal(loaded.photo, loaded.disparity, grid, memory)
     total = grid.rows * grid.columns
+    views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality, inpaint=inpaint)
     with (
         HciWriter(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         show_progress("making views") as show,
-        closing(generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality)) as views,
+        closing(views),
     ):
         seconds = 0.0
         for done in range(1, total + 1):
@@ -241,13 +246,14 @@ def screenshot(
     max_pixels: MaxPixels = None,
     memory: Memory = None,
     quality: QualityChoice = DEFAULT_QUALITY,
+    inpaint: Inpaint = DEFAULT_INPAINTER,
 ) -> None:
     """Render one picture without a display; its settings are saved in it.
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
     ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
-    source = _source(path, ways, grid, focus_disparity, max_pixels, quality)
+    source = _source(path, ways, grid, focus_disparity, max_pixels, quality, inpaint)
     _require_existing(source)
     from iibr_core.formats.images.photo import write_image
     from viewer.app.headless import HeadlessViewer
@@ -390,6 +396,7 @@ def _source(
     focus_disparity: float | None,
     max_pixels: int | None,
     quality: Quality = DEFAULT_QUALITY,
+    inpaint: str = DEFAULT_INPAINTER,
 ) -> Source:
     from viewer.model.state.app_state import Source
 
@@ -405,6 +412,7 @@ def _source(
         ways.start,
         ways.model,
         ways.refine,
+        inpaint,
     )
 
 

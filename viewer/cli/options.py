@@ -10,6 +10,7 @@ from typing import Annotated, Any, NamedTuple, get_args
 import typer
 
 from iibr_core.depth.choice import DepthStart
+from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import GridShape, Quality, ViewOffset
 
 MAX_GRID = 99
@@ -58,6 +59,13 @@ def quality_from_text(text: str) -> Quality:
         if text == quality:
             return quality
     raise typer.BadParameter(f"{text!r} is no quality: give {', '.join(qualities[:-1])} or {qualities[-1]}")
+
+
+def inpainter_from_text(text: str) -> str:
+    """A way of inpainting, by name. Raises BadParameter."""
+    if text not in INPAINTERS:
+        raise typer.BadParameter(f"{text!r} is no way of inpainting: give {' or '.join(INPAINTERS)}")
+    return text
 
 
 def finite_from_text(text: str) -> float:
@@ -165,5 +173,12 @@ QualityChoice = Annotated[
         parser=quality_from_text,
         metavar="fast|balanced|exact",
         help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere.",
+    ),
+]
+
+Inpaint = Annotated[
+    str,
+    typer.Option(
+        parser=inpainter_from_text, metavar="|".join(INPAINTERS), help="What fills the places that the photo never saw."
     ),
 ]

@@ -123,7 +123,7 @@ class InspectionView:
         ):
             return None
         if scene_view.loaded is not None and scene.plan is not None:
-            return ComparisonInputs(scene.source.quality, scene_view.loaded, scene.plan)
+            return ComparisonInputs(scene.source.quality, scene_view.loaded, scene.plan, inpaint=scene.source.inpaint)
         if scene_view.renderer.field.grid != scene.grid:
             return None
         stored = self._passes.read_view(scene_view.renderer.field, *request.view)

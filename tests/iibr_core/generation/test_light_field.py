@@ -10,6 +10,7 @@ from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime import tiling
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture, square_before_wall
 
 
@@ -90,18 +91,9 @@ def test_views_arrive_photo_first_then_farthest_then_nearest_to_the_eye():
     assert len(set(order)) == 25
 
 
-def paint_red(colors, disparity, hole, photo_disparity, offset, should_stop, threads):
-    """An inpainter that cannot be overlooked."""
-    colors[hole], disparity[hole] = (1.0, 0.0, 0.0), -9.0
-
-
-def red_inpainter():
-    return paint_red
-
-
 @pytest.mark.parametrize("quality", ["fast", "balanced"])
 def test_the_inpainter_of_that_name_fills_all_that_is_inpainted(monkeypatch, quality):
-    monkeypatch.setitem(INPAINTERS, "red", f"{__name__}:red_inpainter")
+    monkeypatch.setitem(INPAINTERS, "red", red_inpainter.ENTRY)
     photo, disparity = square_before_wall(60, 80, 3.0)
     red = views_of(photo, disparity, 5, quality=quality, inpaint="red")
     for view in red.values():

@@ -10,6 +10,7 @@ from iibr_core.generation.update_loop import complete_ray_set, render_outer_view
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, ViewOffset
+from tests.iibr_core.red_inpainter import paint_red
 from tests.iibr_core.scenes import square_before_wall
 
 LEFT, RIGHT = ViewOffset(0.0, -2.0), ViewOffset(0.0, 2.0)
@@ -74,14 +75,11 @@ def test_completing_is_taking_all_views():
 
 
 def test_the_inpainter_decides_what_joins():
-    def paint(colors, disparity, hole, photo_disparity, offset, should_stop, threads):
-        colors[hole], disparity[hole] = (0.0, 1.0, 0.0), -5.0
-
     seen = rays()
-    for _, view in render_outer_views(seen, [LEFT], inpainter=paint):
-        assert (view.colors[view.occluded] == (0, 1, 0)).all()
-        assert (view.disparity[view.occluded] == -5).all()
-    np.testing.assert_array_equal(seen.arrays[2][-1] == -5, view.occluded)
+    for _, view in render_outer_views(seen, [LEFT], inpainter=paint_red):
+        assert (view.colors[view.occluded] == (1, 0, 0)).all()
+        assert (view.disparity[view.occluded] == -9).all()
+    np.testing.assert_array_equal(seen.arrays[2][-1] == -9, view.occluded)
 
 
 def test_a_stop_is_heard_and_adds_nothing():

@@ -68,5 +68,6 @@ def test_threads_change_nothing(name):
 
 @pytest.mark.parametrize("name", INPAINTERS)
 def test_a_stop_is_heard(name):
+    colors, disparity, hole, photo_disparity = view_with_holes()
     with pytest.raises(Cancelled):
-        load_inpainter(name)(*view_with_holes(), OFFSET, should_stop=lambda: True)
+        load_inpainter(name)(colors, disparity, hole, photo_disparity, OFFSET, should_stop=lambda: True)

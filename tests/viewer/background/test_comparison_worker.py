@@ -15,9 +15,11 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.hci import HciWriter, read_light_field, read_view
 from iibr_core.generation.light_field import generate, ray_set
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
+from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError
+from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import write_scene
 from viewer.background.comparison_worker import (
     ComparisonFailed,
@@ -120,6 +122,24 @@ def test_fast_and_exact_are_the_views_generate_makes(inputs: ComparisonInputs) -
     assert isinstance(scored, PairScored)
     assert scored.psnr_db == psnr_db(pair.left, pair.right)
     assert scored.flip == mean_flip(pair.right, pair.left)
+
+
+def test_holes_are_filled_as_in_the_scene_s_own_views(
+    monkeypatch: pytest.MonkeyPatch, inputs: ComparisonInputs
+) -> None:
+    monkeypatch.setitem(INPAINTERS, "red", red_inpainter.ENTRY)
+    loaded, plan, view = inputs.loaded, inputs.plan, (0, 1)
+    assert loaded is not None
+    assert plan is not None
+    request = InspectionRequest(1, "quality", view)
+    (pair,) = ComparisonJob().seen(request, replace(inputs, inpaint="red"), never)
+    (usual,) = ComparisonJob().seen(request, inputs, never)
+    assert isinstance(pair, PairReady)
+    assert isinstance(usual, PairReady)
+    views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality="fast", inpaint="red")
+    expected = next(update.colors for update in views if (update.row, update.column) == view)
+    np.testing.assert_array_equal(pair.left, expected)
+    assert (pair.left != usual.left).any()
 
 
 def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(

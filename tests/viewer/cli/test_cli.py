@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.inpainting.registry import INPAINTERS
+from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.cli.main import main
 
@@ -96,6 +98,26 @@ def test_quality_says_where_the_transformer_runs(
     for pictures in (made, shown):
         balanced, exact = ((pictures[name] != pictures["fast"]).any(axis=2).mean() for name in ("balanced", "exact"))
         assert 0 < balanced < exact
+
+
+def test_inpaint_says_what_fills_the_holes(monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path) -> None:
+    """Made with generate and seen in a screenshot alike; background is what fills them unasked."""
+    from iibr_core.formats.images.photo import read_photo
+
+    monkeypatch.setitem(INPAINTERS, "red", red_inpainter.ENTRY)
+    made, shown = {}, {}
+    for name, words in {"unasked": (), "background": ("--inpaint", "background"), "red": ("--inpaint", "red")}.items():
+        out, image = tmp_path / name, tmp_path / f"{name}.png"
+        assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", out, *words) == 0
+        made[name] = read_photo(out / "input_Cam000.png").pixels
+        assert run(monkeypatch, "screenshot", photo_path, "--grid", 3, "--view", "-1,-1", "-o", image, *words) == 0
+        shown[name] = read_photo(image).pixels
+    for pictures in (made, shown):
+        assert (pictures["unasked"] == pictures["background"]).all()
+        changed = (pictures["red"] != pictures["background"]).any(axis=2)
+        assert 0 < changed.mean() < 0.5
+        red, green, blue = np.moveaxis(pictures["red"][changed], -1, 0)
+        assert (red > np.maximum(green, blue)).mean() > 0.5
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-9])])

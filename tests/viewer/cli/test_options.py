@@ -12,6 +12,7 @@ from viewer.cli.options import (
     MAX_GRID,
     finite_from_text,
     grid_from_text,
+    inpainter_from_text,
     memory_from_text,
     quality_from_text,
     size_from_text,
@@ -32,6 +33,7 @@ from viewer.cli.options import (
         (memory_from_text, "20mib", 20 * 2**20),
         (finite_from_text, "-1e-3", -0.001),
         (quality_from_text, "balanced", "balanced"),
+        (inpainter_from_text, "background", "background"),
     ],
 )
 def test_values(parse: Callable[[str], object], text: str, value: object) -> None:
@@ -47,6 +49,7 @@ def test_values(parse: Callable[[str], object], text: str, value: object) -> Non
         (memory_from_text, ["", "0", "-1G", "lots", "1X"]),
         (finite_from_text, ["", "nan", "inf", "1,5"]),
         (quality_from_text, ["", "best", "Fast"]),
+        (inpainter_from_text, ["", "magic", "Background"]),
     ],
 )
 def test_nonsense_is_named(parse: Callable[[str], object], texts: list[str]) -> None:

@@ -11,6 +11,7 @@ from typing import Literal
 from iibr_core.depth.choice import DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.inspection import Inspection
@@ -79,7 +80,7 @@ class Source:
 
     path: a photo or a light-field folder. disparity_path, disparity_scale, depth_start, depth_model, refine: see
     `iibr_core.depth.choice.DepthChoice`. focus_disparity: in the units of the given disparity. quality: where the ray
-    transformer runs.
+    transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`.
     """
 
     path: str
@@ -93,6 +94,7 @@ class Source:
     depth_start: DepthStart = "auto"
     depth_model: str | None = None
     refine: float = 1.0
+    inpaint: str = DEFAULT_INPAINTER
 
 
 def source_beside(source: Source | None, path: str) -> Source:
