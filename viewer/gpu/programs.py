@@ -122,7 +122,7 @@ def load_program(
         program = ctx.program(vertex_shader=stages["vertex"].text, fragment_shader=stages["fragment"].text)
     except moderngl.Error as error:
         raise ShaderError(_explain(str(error), stages, fragment)) from error
-    declared = frozenset(name for scene_view in stages.values() for name in declared_uniforms(scene_view.text))
+    declared = frozenset(name for stage in stages.values() for name in declared_uniforms(stage.text))
     return Program(program, declared, fragment)
 
 
@@ -135,23 +135,21 @@ def declared_uniforms(source: str) -> set[str]:
 
 def _explain(message: str, stages: Mapping[str, FlatSource], fragment: str) -> str:
     """The driver's message with its line numbers turned into file:line; drivers write 0:12(3), 0(12) or ERROR: 0:12."""
-    scene_view = stages["vertex" if "vertex_shader" in message else "fragment"]
-    found = [(match, scene_view.locate(int(match[1]))) for match in _MESSAGE_LINE.finditer(message)]
+    stage = stages["vertex" if "vertex_shader" in message else "fragment"]
+    found = [(match, stage.locate(int(match[1]))) for match in _MESSAGE_LINE.finditer(message)]
     if not found:
         return f"{fragment}: {message.strip()}"
     first = found[0][1]
-    body = _MESSAGE_LINE.sub(lambda match: f"{scene_view.locate(int(match[1]))}:", message[found[0][0].start() :])
+    body = _MESSAGE_LINE.sub(lambda match: f"{stage.locate(int(match[1]))}:", message[found[0][0].start() :])
     return f"{first}: the shader does not compile\n{body.strip()}"
 
 
 class ProgramCache:
-    """The programs in use, compiled when first asked for. folder: where the shaders are, if not the program's own."""
+    """The programs in use, compiled when first asked for."""
 
-    def __init__(self, ctx: moderngl.Context, folder: Path | None = None) -> None:
+    def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
-        self._folder = folder or resource_folder("shaders")
         self._programs: dict[tuple[str, tuple[str, ...]], tuple[Program, moderngl.VertexArray]] = {}
-        self._read_at = self._newest_change()
 
     def __len__(self) -> int:
         """How many programs have been compiled."""
@@ -164,26 +162,6 @@ class ProgramCache:
             self._programs[key] = self._compiled(fragment, switches)
         return self._programs[key]
 
-    def reload(self) -> list[str]:
-        """Compile anew what is in use, if a file changed since; what no longer compiles stays as it was.
-
-        Returns what is wrong, one message a program.
-        """
-        newest = self._newest_change()
-        if newest == self._read_at:
-            return []
-        self._read_at = newest
-        problems = []
-        for key, (old, quad) in self._programs.items():
-            try:
-                self._programs[key] = self._compiled(*key)
-            except ShaderError as error:
-                problems.append(str(error))
-                continue
-            quad.release()
-            old.release()
-        return problems
-
     def release(self) -> None:
         """Free every program."""
         for program, quad in self._programs.values():
@@ -192,9 +170,5 @@ class ProgramCache:
         self._programs.clear()
 
     def _compiled(self, fragment: str, switches: tuple[str, ...]) -> tuple[Program, moderngl.VertexArray]:
-        program = load_program(self._ctx, "fullscreen.vert", fragment, dict.fromkeys(switches, 1), self._folder)
+        program = load_program(self._ctx, "fullscreen.vert", fragment, dict.fromkeys(switches, 1))
         return program, self._ctx.vertex_array(program.program, [])
-
-    def _newest_change(self) -> tuple[tuple[str, int], ...]:
-        files = sorted(path for path in self._folder.rglob("*") if path.is_file())
-        return tuple((str(path), path.stat().st_mtime_ns) for path in files)

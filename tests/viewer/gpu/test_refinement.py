@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import gc
 import math
-import shutil
-from pathlib import Path
 
 import moderngl
 import numpy as np
 import pytest
 
-from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.context import GLContext
-from viewer.gpu.programs import ProgramCache, ShaderError
 from viewer.gpu.refocus.accumulation import EDGE_PASSES, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import QualityLevel
@@ -180,27 +176,3 @@ def test_views_too_large_for_the_driver_leave_the_old_field(renderer: Renderer, 
     with pytest.raises(InputError, match=r"px exceed"):
         renderer.open_field(GRID, gl.max_texture_size + 1, 4, hdr=False, with_disparity=False)
     assert np.array_equal(converged(renderer, WIDE), before)
-
-
-def test_a_broken_shader_keeps_the_last_good_program_until_it_is_mended(gl: GLContext, tmp_path: Path) -> None:
-    folder = tmp_path / "shaders"
-    shutil.copytree(resource_folder("shaders"), folder)
-    programs = ProgramCache(gl.ctx, folder)
-    good = programs.get("present.frag")
-    assert programs.reload() == [], "nothing changed"
-    assert programs.get("present.frag") is good
-    text = (folder / "present.frag").read_text()
-    (folder / "present.frag").write_text(text.replace("void main() {", "void main() { nonsense;"))
-    problems = programs.reload()
-    assert len(problems) == 1
-    assert problems[0].startswith("present.frag:")
-    assert "nonsense" in problems[0]
-    assert programs.get("present.frag") is good
-    (folder / "present.frag").write_text(text + "// mended\n")
-    assert programs.reload() == []
-    mended = programs.get("present.frag")
-    assert mended is not good
-    (folder / "smooth.frag").write_text("#version 330 core\n")
-    with pytest.raises(ShaderError, match=r"smooth\.frag"):
-        programs.get("smooth.frag")  # never compiled before: there is no good one
-    programs.release()
