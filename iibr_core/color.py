@@ -26,6 +26,11 @@ def stored_from_encoded(encoded: FloatImage, is_hdr: bool) -> StoredColors:
     """Encoded float colours as they are stored in a light field: rounded uint8, or float16 for HDR."""
     if is_hdr:
         return np.clip(encoded, 0, float(np.finfo(np.float16).max)).astype(np.float16)
+    return bytes_from_encoded(encoded)
+
+
+def bytes_from_encoded(encoded: FloatImage) -> NDArray[np.uint8]:
+    """Values of 0..1 in 8 bits, rounded; what lies beyond is moved in. Any shape."""
     return (np.clip(encoded, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 

@@ -89,7 +89,10 @@ def _way_from_top(image: FloatImage) -> FloatImage:
 
 
 def _box_filter(image: FloatImage, radius: int) -> FloatImage:
-    """Means over squares, (H, W, ...); at the frame over what of them lies inside."""
+    """Means over squares, (H, W, ...); at the frame over what of them lies inside.
+
+    scipy's would save 7 of 12 ms, and cost the window 140 MB of installation.
+    """
     for axis in (0, 1):
         count = image.shape[axis]
         # A difference of running sums: the cost does not depend on the radius. float64, as the sums grow large.

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
@@ -224,7 +225,7 @@ class _Evaluator:
             self.figures.setdefault(method, {})[view.name] = figures
         pictures = {TRUTH: truth, **{method: image for method, (image, _) in made.items()}}
         if index == self.farthest:
-            self.shown = view.name, {method: _bytes(image) for method, image in pictures.items()}
+            self.shown = view.name, {method: bytes_from_encoded(image) for method, image in pictures.items()}
         self._keep_row(offset, pictures, judge)
         list(pool.map(lambda method: self.stacks[method].add(offset, pictures[method]), self.stacks))
 
@@ -285,7 +286,7 @@ class _Evaluator:
         for method, lines in self.epis.items():
             every = sorted([*lines, (0.0, self.given.photo[self.epi_row])], key=lambda line: line[0])
             if len(every) >= LEAST_EPI_VIEWS and method != IDENTITY:
-                epis[method] = _bytes(np.stack([line for _, line in every]))
+                epis[method] = bytes_from_encoded(np.stack([line for _, line in every]))
         return epis
 
     def _consistency(self, maker: ViewMaker, offsets: Sequence[ViewOffset]) -> dict[str, Consistency]:
@@ -298,10 +299,6 @@ class _Evaluator:
             rms, off_px = line_straightness(self.given.photo, self.given.judge.values, self.lines)
             found[TRUTH] = Consistency(math.nan, math.nan, rms, off_px, 0)
         return found
-
-
-def _bytes(image: FloatImage) -> Bytes:
-    return (np.clip(image, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
 def _row(method: str, of_views: Mapping[str, Figures]) -> Row:

@@ -6,12 +6,13 @@ Every function takes and gives (H, W) float32 in px per view step and leaves its
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil, exp, log
+from math import ceil, exp
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.training.distributions import log_uniform
 from iibr_core.types import FloatImage
 
 KERNEL_SIGMAS = 3.5
@@ -21,7 +22,10 @@ UNTOUCHED = 0.4
 
 
 def blur(disparity: FloatImage, sigma_px: float) -> FloatImage:
-    """Convolved with a Gaussian; the frame's pixels continue beyond it. sigma_px 0 changes nothing."""
+    """Convolved with a Gaussian; the frame's pixels continue beyond it. sigma_px 0 changes nothing.
+
+    scipy's gives the same bits, and training does without it.
+    """
     if sigma_px <= 0:
         return disparity.copy()
     reach = max(ceil(KERNEL_SIGMAS * sigma_px), 1)
@@ -97,17 +101,13 @@ def degrade(disparity: FloatImage, rng: np.random.Generator, views: float = 1.0)
     step = 1 / max(views, 1.0)
     faults: list[Callable[[FloatImage], FloatImage]] = [
         lambda d: coarsen(d, int(rng.integers(2, 5))),
-        lambda d: blur(d, _log_uniform(rng, 0.5, 4.0)),
+        lambda d: blur(d, log_uniform(rng, 0.5, 4.0)),
         lambda d: misalign(d, *rng.normal(0, 0.6, 2)),
-        lambda d: add_noise(d, rng, step * _log_uniform(rng, 0.02, 1.0), _log_uniform(rng, 0.3, 6.0)),
+        lambda d: add_noise(d, rng, step * log_uniform(rng, 0.02, 1.0), log_uniform(rng, 0.3, 6.0)),
         lambda d: rescale(d, exp(rng.normal(0, 0.05)), step * rng.normal(0, 0.3)),
-        lambda d: quantise(d, step * _log_uniform(rng, 0.05, 1.0)),
+        lambda d: quantise(d, step * log_uniform(rng, 0.05, 1.0)),
     ]
     # In the order in which they happen to a map: lost detail first, rounding for storage last.
     for index in sorted(rng.choice(len(faults), rng.integers(1, MOST_FAULTS + 1), replace=False)):
         disparity = faults[index](disparity)
     return disparity
-
-
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return exp(rng.uniform(log(low), log(high)))

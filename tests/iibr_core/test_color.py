@@ -20,6 +20,7 @@ def test_kernels_agree_with_arrays():
 def test_storing_keeps_eight_bits_and_hdr():
     eight_bits = np.arange(256, dtype=np.uint8)
     assert (color.stored_from_encoded(color.encoded_from_stored(eight_bits), is_hdr=False) == eight_bits).all()
+    assert list(color.bytes_from_encoded(np.float32([-1, 0.4 / 255, 0.6 / 255, 1, 7]))) == [0, 0, 1, 255, 255]
     bright = np.float32([0, 1, 12.5, 1e9])
     stored = color.stored_from_encoded(bright, is_hdr=True)
     assert stored.dtype == np.float16

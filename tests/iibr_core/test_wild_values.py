@@ -254,6 +254,7 @@ ELEMENTWISE = {
 """One wild element changes no other."""
 
 FINITE_BY_CONTRACT = {
+    "color.bytes_from_encoded": "of photos and of views, as for `stored_from_encoded`",
     "color.stored_from_encoded": "made for every view; Photo and the synthesis see to it",
     "geometry.distance_between": "of lines that `line_of` made",
     "geometry.offset_of_line": "lines along the plane give infinity or NaN, as it says",
@@ -288,7 +289,7 @@ READS_OR_TELLS = {
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar flat_disparity",
-    "depth.embedded.xmp": "is_jpeg jpeg_layout value_in xmp_of parse_packet",
+    "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
     "formats.files": "temporary_sibling atomic_write require_file open_binary refuse_bomb",
     "formats.light_fields.numbered_grid": "read_numbered_grid",
     "formats.light_fields.hci": "is_light_field_folder read_view HciWriter",
@@ -310,6 +311,7 @@ READS_OR_TELLS = {
     "inpainting.background": "background_inpainter",
     "inpainting.protocol": "Inpainter",
     "inpainting.registry": "load_inpainter",
+    "runtime.kernel_cache": "KernelCache sources_hash",
     "runtime.resources": "resource_folder",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from iibr_core.depth.embedded.images import decode_map
-from iibr_core.depth.embedded.xmp import jpeg_layout, xmp_of
+from iibr_core.depth.embedded.xmp import jpeg_layout, number_in, xmp_of
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.types import FloatImage, InputError
 
@@ -55,7 +55,7 @@ def appended_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
             kind = (xmp.value(PIXEL_DATA, "AuxiliaryImageType") or "").strip()
             if kind in ("disparity", "depth"):
                 stored = decode_map(data[start : layout.end], "the depth map behind the photo")
-                low, high = (_number(xmp.value(PIXEL_DATA, f"Float{side}Value")) for side in ("Min", "Max"))
+                low, high = (number_in(xmp.value(PIXEL_DATA, f"Float{side}Value")) for side in ("Min", "Max"))
                 return (_linear_in_inverse if kind == "disparity" else _linear_in_distance)(stored, low, high)
         end = max(layout.end, start + 2)
     return None
@@ -83,10 +83,3 @@ def _inverse(distances: tuple[float, float] | None) -> tuple[float, float] | Non
     if distances is None or 0 in distances:
         return None
     return 1 / distances[0], 1 / distances[1]
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "")
-    except ValueError:
-        return math.nan

@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from iibr_core.depth.embedded.images import JPEG_START, PNG_START, decode_map
-from iibr_core.depth.embedded.xmp import JpegLayout, Xmp, value_in
+from iibr_core.depth.embedded.xmp import JpegLayout, Xmp, number_in, value_in
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.types import FloatImage, InputError
 
@@ -146,7 +146,7 @@ def _depth_range(properties: dict[str, str | None]) -> DepthRange:
     kind = (properties["Format"] or "").strip()
     if kind not in ("RangeInverse", "RangeLinear"):
         raise InputError(f"depth format {kind[:40]!r} is neither RangeInverse nor RangeLinear")
-    near, far = _number(properties["Near"]), _number(properties["Far"])
+    near, far = number_in(properties["Near"]), number_in(properties["Far"])
     is_inverse = kind == "RangeInverse"
     # An inverse range may reach to infinity and a linear one may begin at the lens.
     if not (near > 0 if is_inverse else near >= 0) or not far > near or (not is_inverse and math.isinf(far)):
@@ -154,13 +154,6 @@ def _depth_range(properties: dict[str, str | None]) -> DepthRange:
     units = (properties["Units"] or "").strip().lower()
     metres = 1.0 if units in METRES else 0.001 if units in MILLIMETRES else None
     return DepthRange(near, far, is_inverse, metres)
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "")
-    except ValueError:
-        return math.nan
 
 
 def _estimate(stored: FloatImage, confidence: FloatImage | None, depth_range: DepthRange) -> Estimate:

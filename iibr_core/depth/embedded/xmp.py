@@ -6,6 +6,7 @@ parts, XMP specification part 3, section 1.1.3.1.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -127,6 +128,14 @@ def value_in(tree: Element, namespace: str, name: str) -> str | None:
         if element.tag == key:
             return "".join(element.itertext())
     return None
+
+
+def number_in(text: str | None) -> float:
+    """The number that a value states; NaN where there is none."""
+    try:
+        return float(text or "")
+    except ValueError:
+        return math.nan
 
 
 def xmp_of(layout: JpegLayout) -> Xmp:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models.catalog import LocalModel
 from iibr_core.types import FloatImage, InputError, Photo
@@ -36,7 +37,7 @@ def run_package(model: LocalModel, photo: Photo) -> Estimate:
 
 def _depth_anything_3(model: LocalModel, photo: Photo) -> RelativeInverseDepth:
     network = importlib.import_module("depth_anything_3.api").DepthAnything3.from_pretrained(str(model.folder))
-    said = network.inference([_bytes(photo)])
+    said = network.inference([bytes_from_encoded(photo.pixels)])
     # Its distances have no scale of their own.
     return RelativeInverseDepth(np.reciprocal(_positive(_array(said.depth)[0])))
 
@@ -46,7 +47,7 @@ def _unidepth(model: LocalModel, photo: Photo) -> MetricDepth:
 
     network = importlib.import_module("unidepth.models").UniDepthV2.from_pretrained(str(model.folder)).eval()
     with torch.inference_mode():
-        said = network.infer(torch.from_numpy(_bytes(photo)).permute(2, 0, 1))
+        said = network.infer(torch.from_numpy(bytes_from_encoded(photo.pixels)).permute(2, 0, 1))
     return MetricDepth(
         _positive(_array(said["depth"]).squeeze()), float(_array(said["intrinsics"]).reshape(3, 3)[0, 0])
     )
@@ -60,10 +61,6 @@ def _moge(model: LocalModel, photo: Photo) -> MetricDepth:
         said = network.infer(torch.from_numpy(np.clip(photo.pixels, 0, 1)).permute(2, 0, 1))
     # MoGe's intrinsics count in widths of the picture.
     return MetricDepth(_positive(_array(said["depth"])), float(_array(said["intrinsics"])[0, 0]) * photo.size.width)
-
-
-def _bytes(photo: Photo) -> Any:
-    return (np.clip(photo.pixels, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
 def _array(said: Any) -> FloatImage:

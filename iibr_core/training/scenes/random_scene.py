@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import exp, log, pi
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
+from iibr_core.training.distributions import log_uniform
 from iibr_core.training.scenes.raycast import (
     BALL,
     BOX,
@@ -53,7 +54,7 @@ def random_scene(rng: np.random.Generator, size: ImageSize, largest_disparity: f
     bounds = _random_bounds(rng, size, largest_disparity)
     primitives = _backdrop_planes(bounds)
     if largest_disparity > 0:
-        makers = rng.choice(len(MAKERS), int(_log_uniform(rng, *OBJECTS)), p=MAKER_SHARES)
+        makers = rng.choice(len(MAKERS), int(log_uniform(rng, *OBJECTS)), p=MAKER_SHARES)
         for maker in makers:
             primitives += MAKERS[maker](bounds)
     kept = sorted(primitives, key=lambda p: float(p["nearest_z"]))
@@ -117,13 +118,9 @@ def _random_bounds(rng: np.random.Generator, size: ImageSize, largest: float) ->
     other = largest * min(float(rng.uniform(-0.1, 1.0)), 1.0)
     least, greatest = (-max(other, 0.0), largest) if rng.random() < 0.75 else (-largest, max(other, 0.0))
     span = max(greatest - least, 1e-3)
-    infinity = span / (_log_uniform(rng, *DEPTH_RATIO) - 1) - least
+    infinity = span / (log_uniform(rng, *DEPTH_RATIO) - 1) - least
     focal = max(size) * float(rng.uniform(*FOCAL_WIDTHS))
     return _SceneBounds(rng, size, focal, infinity, least, greatest, rng.random(5))
-
-
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return exp(rng.uniform(log(low), log(high)))
 
 
 def _turn(rng: np.random.Generator, slant: float | None = None) -> NDArray[np.float64]:
@@ -154,9 +151,9 @@ def _paint(bounds: _SceneBounds, shape: int, centre: Vector, axes: NDArray[np.fl
     reach = np.abs(p["axes"][:, 2]) @ p["half"]
     p["nearest_z"] = max(centre[2] - reach, bounds.least_z)
     p["pattern"] = rng.choice(PATTERNS, p=(0.5, 0.15, 0.12, 0.1, 0.13))
-    p["period"] = pixel * _log_uniform(rng, 3.0, max(bounds.side_px / 6, 12.0))
+    p["period"] = pixel * log_uniform(rng, 3.0, max(bounds.side_px / 6, 12.0))
     p["roughness"] = rng.beta(1.2, 1.2)
-    p["wavelength"] = pixel * _log_uniform(rng, 12.0, max(bounds.side_px / 2, 48.0))
+    p["wavelength"] = pixel * log_uniform(rng, 12.0, max(bounds.side_px / 2, 48.0))
     p["gain"] = rng.uniform(0.5, 0.9)
     p["tint"] = rng.beta(1.0, 2.0)
     p["phase"] = rng.uniform(-1e3, 1e3, 3) * pixel
@@ -169,7 +166,7 @@ def _palette(bounds: _SceneBounds) -> NDArray[np.float32]:
     """(3, 3): a dark and a light colour of one hue, and a third, linear light."""
     rng = bounds.rng
     hues = rng.choice(bounds.hues, 2) + rng.normal(0, 0.04, 2)
-    middle, contrast = rng.uniform(0.2, 0.85), _log_uniform(rng, 0.2, 1.4)
+    middle, contrast = rng.uniform(0.2, 0.85), log_uniform(rng, 0.2, 1.4)
     values = np.clip([middle - contrast / 2, middle + contrast / 2, rng.uniform(0.1, 0.9)], 0.03, 0.97)
     saturations = rng.beta(1.0, 3.0, 3)
     phases = (np.array([hues[0], hues[0] + rng.normal(0, 0.05), hues[1]])[:, None] + np.array([0, 2, 1]) / 3) % 1.0
@@ -231,8 +228,8 @@ def _plane(bounds: _SceneBounds, cut: int = WHOLE, smallest_px: float = 6.0) -> 
     rng = bounds.rng
     centre = bounds.somewhere()
     slant = 0.0 if rng.random() < 0.35 else np.arccos(rng.uniform(0.1, 1.0))
-    size = _log_uniform(rng, smallest_px, max(bounds.side_px * 0.8, smallest_px + 1)) * centre[2] / bounds.focal_px
-    half = np.array([size / 2, size / 2 * _log_uniform(rng, 0.25, 1.0), 0.0])
+    size = log_uniform(rng, smallest_px, max(bounds.side_px * 0.8, smallest_px + 1)) * centre[2] / bounds.focal_px
+    half = np.array([size / 2, size / 2 * log_uniform(rng, 0.25, 1.0), 0.0])
     plane = _fit_into_depths(bounds, PLANE, centre, _turn(rng, slant), half)
     plane["cut"] = cut
     return [plane]
@@ -243,8 +240,8 @@ def _cut_plane(bounds: _SceneBounds) -> list[Primitive]:
     rng = bounds.rng
     [plane] = _plane(bounds, int(rng.choice([DISC, FRAME, LACE])), 12.0)
     pixel = plane["centre"][2] / bounds.focal_px
-    plane["cut_period"] = _log_uniform(rng, 5, 40) * pixel
-    plane["cut_width"] = _log_uniform(rng, 1, 12) * pixel
+    plane["cut_period"] = log_uniform(rng, 5, 40) * pixel
+    plane["cut_width"] = log_uniform(rng, 1, 12) * pixel
     return [plane]
 
 
@@ -253,8 +250,8 @@ def _mesh(bounds: _SceneBounds) -> list[Primitive]:
     rng = bounds.rng
     [plane] = _plane(bounds, MESH, 30.0)
     pixel = plane["centre"][2] / bounds.focal_px
-    plane["cut_width"] = _log_uniform(rng, 0.7, 2.0) * pixel
-    plane["cut_period"] = _log_uniform(rng, 5, 24) * pixel
+    plane["cut_width"] = log_uniform(rng, 0.7, 2.0) * pixel
+    plane["cut_period"] = log_uniform(rng, 5, 24) * pixel
     return [plane]
 
 
@@ -263,7 +260,7 @@ def _leaves(bounds: _SceneBounds) -> list[Primitive]:
     rng = bounds.rng
     [first] = _plane(bounds, LEAVES, 40.0)
     pixel = first["centre"][2] / bounds.focal_px
-    first["cut_period"] = _log_uniform(rng, 10, 50) * pixel
+    first["cut_period"] = log_uniform(rng, 10, 50) * pixel
     layers = [first]
     for _ in range(rng.integers(1, 4)):
         layer = _fit_into_depths(bounds, PLANE, first["centre"] * rng.uniform(0.9, 1.1), first["axes"], first["half"])
@@ -277,14 +274,14 @@ def _leaves(bounds: _SceneBounds) -> list[Primitive]:
 def _box(bounds: _SceneBounds) -> list[Primitive]:
     rng = bounds.rng
     centre = bounds.somewhere()
-    size = _log_uniform(rng, 5.0, max(bounds.side_px * 0.4, 6.0)) * centre[2] / bounds.focal_px
+    size = log_uniform(rng, 5.0, max(bounds.side_px * 0.4, 6.0)) * centre[2] / bounds.focal_px
     return [_fit_into_depths(bounds, BOX, centre, _turn(rng), size / 2 * rng.uniform(0.3, 1.0, 3))]
 
 
 def _ball(bounds: _SceneBounds) -> list[Primitive]:
     rng = bounds.rng
     centre = bounds.somewhere()
-    size = _log_uniform(rng, 4.0, max(bounds.side_px * 0.4, 5.0)) * centre[2] / bounds.focal_px
+    size = log_uniform(rng, 4.0, max(bounds.side_px * 0.4, 5.0)) * centre[2] / bounds.focal_px
     half = np.full(3, size / 2) if rng.random() < 0.5 else size / 2 * rng.uniform(0.3, 1.0, 3)
     return [_fit_into_depths(bounds, BALL, centre, _turn(rng), half)]
 
@@ -295,9 +292,9 @@ def _wires(bounds: _SceneBounds) -> list[Primitive]:
     centre = bounds.somewhere()
     pixel = centre[2] / bounds.focal_px
     axes = _turn(rng, pi / 2 + float(rng.normal(0, 0.25)))
-    radius = _log_uniform(rng, 0.35, 1.2) * pixel
-    length = _log_uniform(rng, 10.0, max(bounds.side_px * 1.5, 11.0)) * pixel
-    apart = axes[0] * _log_uniform(rng, 4, 20) * pixel
+    radius = log_uniform(rng, 0.35, 1.2) * pixel
+    length = log_uniform(rng, 10.0, max(bounds.side_px * 1.5, 11.0)) * pixel
+    apart = axes[0] * log_uniform(rng, 4, 20) * pixel
     half = np.array([radius, radius, length / 2])
     return [_fit_into_depths(bounds, WIRE, centre + k * apart, axes, half) for k in range(rng.integers(1, 6))]
 

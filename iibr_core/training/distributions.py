@@ -1,0 +1,12 @@
+"""Distributions that numpy's generators do not have."""
+
+from __future__ import annotations
+
+from math import exp, log
+
+import numpy as np
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Between two positive numbers, each factor as likely as any other."""
+    return exp(rng.uniform(log(low), log(high)))
