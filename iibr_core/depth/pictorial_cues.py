@@ -134,7 +134,7 @@ def _guided_upsample(
 
 
 @kernel
-def _grow_way(image, way):  # type: ignore[no-untyped-def]
+def _grow_way(image, way):
     """Shortest ways from the pixels where `way` (H, W) is 0, over 8 neighbours, sweeping to and fro."""
     height, width, channels = image.shape
     # Geodesic distance by raster scans (Toivanen 1996): there and back instead of the queue of Dijkstra.

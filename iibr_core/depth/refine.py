@@ -144,7 +144,7 @@ def _downsample(values: FloatImage) -> FloatImage:
 
 
 @kernel
-def _at(values, x, y):  # type: ignore[no-untyped-def]
+def _at(values, x, y):
     """The map at a real position, bilinear; its border pixels continue outside."""
     height, width = values.shape
     # The last cell of pixels is used up to its far end: both taps exist even there.
@@ -157,7 +157,7 @@ def _at(values, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _steepest_direction(values, x, y):  # type: ignore[no-untyped-def]
+def _steepest_direction(values, x, y):
     """Gradient (x, y) of the map about a pixel, over 5 x 5."""
     height, width = values.shape
     across = down = 0.0
@@ -176,7 +176,7 @@ def _steepest_direction(values, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _walk(values, x, y, across, down, sign, reach, pace, beyond):  # type: ignore[no-untyped-def]
+def _walk(values, x, y, across, down, sign, reach, pace, beyond):
     """From (x, y) up (sign 1) or down (-1) the ramp: (length, value at its end, slope there, steepest slope, where).
 
     reach: at most so many steps; pace: of so many pixels; beyond: no farther than that past the steepest place, px.
@@ -199,7 +199,7 @@ def _walk(values, x, y, across, down, sign, reach, pace, beyond):  # type: ignor
 
 
 @kernel
-def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights):  # type: ignore[no-untyped-def]
+def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights):
     """At the steepest places of edges: their blur (sigma, px) and height; returns how many.
 
     Looks at every step-th row, from the first-th to before the last-th of those.
@@ -230,7 +230,7 @@ def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights
 
 
 @kernel
-def _foreground_colour(photo, x, y, across, down, front, behind):  # type: ignore[no-untyped-def]
+def _foreground_colour(photo, x, y, across, down, front, behind):
     """Matting: a colour between those so far away; -0.5 background .. 0.5 foreground, nearer 0 the less sure."""
     height, width = photo.shape[:2]
     # Pixels of both surfaces, beyond the ramp.
@@ -252,7 +252,7 @@ def _foreground_colour(photo, x, y, across, down, front, behind):  # type: ignor
 
 
 @kernel
-def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, refined):  # type: ignore[no-untyped-def]
+def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, refined):
     """Rows [first_row, last_row) of the refined map. softness: 0 = steps, 1 = as given."""
     width = values.shape[1]
     # Wide ramps are walked in longer steps: all of them take about as many.

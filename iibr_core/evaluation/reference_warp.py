@@ -58,7 +58,7 @@ def reference_warp(photo: FloatImage, disparity: FloatImage, offset: ViewOffset)
 
 
 @kernel
-def _splat(disparity, t, s):  # type: ignore[no-untyped-def]
+def _splat(disparity, t, s):
     """The nearest (largest) disparity that lands on each pixel, NOWHERE where none does."""
     height, width = disparity.shape
     nearest = np.full((height, width), NOWHERE, np.float32)
@@ -77,7 +77,7 @@ def _splat(disparity, t, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _surface_at(disparity, x, y, point_x, point_y):  # type: ignore[no-untyped-def]
+def _surface_at(disparity, x, y, point_x, point_y):
     """Disparity at a point of pixel (x, y): between the four around it if they are one surface, else the pixel's."""
     left, top = math.floor(point_x), math.floor(point_y)
     if left < 0 or top < 0 or left + 1 >= disparity.shape[1] or top + 1 >= disparity.shape[0]:
@@ -92,7 +92,7 @@ def _surface_at(disparity, x, y, point_x, point_y):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _lanczos_weight(distance):  # type: ignore[no-untyped-def]
+def _lanczos_weight(distance):
     if distance == 0:
         return 1.0
     if abs(distance) >= LOBES:
@@ -103,7 +103,7 @@ def _lanczos_weight(distance):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _lanczos(photo, from_x, from_y):  # type: ignore[no-untyped-def]
+def _lanczos(photo, from_x, from_y):
     """The photo (H, W, 3) at the positions (H, W); its border is repeated."""
     height, width = photo.shape[:2]
     result = np.empty((*from_x.shape, 3), np.float32)
@@ -134,7 +134,7 @@ def _lanczos(photo, from_x, from_y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _fill_holes(colors, hole, disparity):  # type: ignore[no-untyped-def]
+def _fill_holes(colors, hole, disparity):
     """Colours with holes filled: of what is met first in eight directions, the farthest surface, nearer ones more."""
     height, width = hole.shape
     filled = colors.copy()

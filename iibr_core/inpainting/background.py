@@ -95,7 +95,7 @@ def _nearest_known(
 
 
 @kernel
-def _number(pixels, number):  # type: ignore[no-untyped-def]
+def _number(pixels, number):
     """Tell each hole pixel which one it is."""
     width = number.shape[1]
     for i in range(len(pixels)):
@@ -103,7 +103,7 @@ def _number(pixels, number):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):  # type: ignore[no-untyped-def]
+def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):
     """What `_nearest_known` returns, for one direction.
 
     pixels: flat indices of the hole pixels, ascending. Holes pass on what the next pixel in that direction found, so
@@ -131,7 +131,7 @@ def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):  # type
 
 
 @kernel
-def _fill(colors, disparity, pixels, known, photo_disparity, s, t):  # type: ignore[no-untyped-def]
+def _fill(colors, disparity, pixels, known, photo_disparity, s, t):
     height, width = disparity.shape
     directions = known.shape[1]
     possible = np.empty(directions, np.bool_)
@@ -174,7 +174,7 @@ def _fill(colors, disparity, pixels, known, photo_disparity, s, t):  # type: ign
 
 
 @kernel
-def _smooth(colors, disparity, hole, pixels, tolerance, smoothed):  # type: ignore[no-untyped-def]
+def _smooth(colors, disparity, hole, pixels, tolerance, smoothed):
     """Average what was filled over SMOOTH_PX each way on the same surface: neighbours took their colours from afar."""
     height, width = disparity.shape
     for i in range(len(pixels)):
@@ -192,7 +192,7 @@ def _smooth(colors, disparity, hole, pixels, tolerance, smoothed):  # type: igno
 
 
 @kernel
-def _write_colors(smoothed, pixels, colors):  # type: ignore[no-untyped-def]
+def _write_colors(smoothed, pixels, colors):
     width = colors.shape[1]
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width

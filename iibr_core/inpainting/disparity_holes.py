@@ -46,7 +46,7 @@ def fill_disparity_holes(values: FloatImage, should_stop: ShouldStop = never) ->
 
 
 @kernel
-def _nearest_before(values, near, steps):  # type: ignore[no-untyped-def]
+def _nearest_before(values, near, steps):
     """For the n-th NaN of values (H, W) in reading order: near[n, k], the nearest known value that precedes it on line
     k, NaN if there is none, and steps[n, k], how many pixels away it is.
     """
@@ -85,7 +85,7 @@ def _nearest_before(values, near, steps):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _farther_side(near, steps, step_lengths):  # type: ignore[no-untyped-def]
+def _farther_side(near, steps, step_lengths):
     """Fill values (N,) from the known ends (2, N, 4) of the lines; NaN where no line has a known end."""
     filled = np.empty(near.shape[1], np.float32)
     spans = np.empty(4)

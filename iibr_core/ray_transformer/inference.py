@@ -48,7 +48,7 @@ class TrainedWeights:
 
 
 @kernel
-def _add_product(inputs, w, outputs, lanes):  # type: ignore[no-untyped-def]
+def _add_product(inputs, w, outputs, lanes):
     """Add to outputs (J, L) w (I, J) transposed times inputs (I, L), four at a time; I is a multiple of 4."""
     for j in range(w.shape[1]):
         out = outputs[j]
@@ -61,7 +61,7 @@ def _add_product(inputs, w, outputs, lanes):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weights):  # type: ignore[no-untyped-def]
+def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weights):
     """Arrays are (unit, lane). The hypotheses of a block's rays lie one after the other in lanes [start, end)."""
     rays, most = mask.shape
     inputs = np.empty((features.shape[2], most * RAYS_A_BLOCK), np.float32)

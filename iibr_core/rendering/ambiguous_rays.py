@@ -149,7 +149,7 @@ def blend_hypotheses(
 
 
 @kernel
-def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors):  # type: ignore[no-untyped-def]
+def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors):
     _, height, width = surfaces.shape
     for n in range(len(weights)):
         total = red = green = blue = apart = 0.0
@@ -185,7 +185,7 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
 
 
 @kernel
-def _collect_hypotheses(  # type: ignore[no-untyped-def]
+def _collect_hypotheses(
     certain, count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
     photo_images, parallax, is_soft, looks, first_row, first, last, every,
     pixel, number, disparity, source, share, nearest,
@@ -296,7 +296,7 @@ def _collect_hypotheses(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _softsign(px):  # type: ignore[no-untyped-def]
+def _softsign(px):
     """Pixels on a scale of -4..4 where small differences count most; 0 where there is no difference to tell."""
     if px != px:
         return 0.0
@@ -306,7 +306,7 @@ def _softsign(px):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _describe_hypotheses(  # type: ignore[no-untyped-def]
+def _describe_hypotheses(
     surfaces, coverage, low, high, step, softness, offsets, photo_images,
     count, weights, first_row, parallax, pixel, number, disparity, source, share, nearest, features,
 ):  # fmt: skip

@@ -80,14 +80,14 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
 
 
 @kernel
-def _half_extent(gap):  # type: ignore[no-untyped-def]
+def _half_extent(gap):
     """How far a footprint reaches towards a neighbour that lands 1 + gap pixels away."""
     # Wider gaps are disocclusions and stay open; neighbours that land on each other are two surfaces.
     return 0.5 + 0.5 * gap if abs(gap) <= SEALED_GAP_PX else 0.5
 
 
 @kernel
-def _land_rays(  # type: ignore[no-untyped-def]
+def _land_rays(
     ray_disparity, ray_coverage, needed, needed_rows, index, s, t, first_row, count, coverage, disparity, source
 ):  # fmt: skip
     """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, `disparity`
@@ -163,7 +163,7 @@ def _land_rays(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _mean_disparity(count, coverage, disparity):  # type: ignore[no-untyped-def]
+def _mean_disparity(count, coverage, disparity):
     """Turn the weighted sums of disparity into means."""
     rows, width = count.shape
     for row in range(rows):

@@ -66,7 +66,7 @@ def land_incoherent(
 
 
 @kernel
-def _target_cells(first, least, most):  # type: ignore[no-untyped-def]
+def _target_cells(first, least, most):
     """The first and last cell that the pixels of cell `first` touch when moved by -least to -most pixels; fractions."""
     # Cells are counted from the border of the picture, half a pixel before the first pixel centre.
     shrunk = 0.5 - REACH_PX
@@ -74,14 +74,14 @@ def _target_cells(first, least, most):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _touches(least, most, t, row, rows):  # type: ignore[no-untyped-def]
+def _touches(least, most, t, row, rows):
     """Whether a row of cells with these disparities can land on cells [0, rows)."""
     top, bottom = _target_cells(row, np.float64(least) * t, np.float64(most) * t)
     return least <= most and bottom >= 0 and top < rows
 
 
 @kernel
-def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax, far, near, smooth):  # type: ignore[no-untyped-def]
+def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax, far, near, smooth):
     """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
     rows, columns = smooth.shape
     # The photo comes first: inpainted rays are compared with what it shows.
@@ -109,7 +109,7 @@ def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax
 
 
 @kernel
-def _land_incoherent(low, high, row_ranges, t, s, first_cell, smooth, needed):  # type: ignore[no-untyped-def]
+def _land_incoherent(low, high, row_ranges, t, s, first_cell, smooth, needed):
     rows, columns = smooth.shape
     for v in range(low.shape[0]):
         if not _touches(row_ranges[v, 0], row_ranges[v, 1], t, v - first_cell, rows):
@@ -127,7 +127,7 @@ def _land_incoherent(low, high, row_ranges, t, s, first_cell, smooth, needed):  
 
 
 @kernel
-def backward_warp(  # type: ignore[no-untyped-def]
+def backward_warp(
     surface, t, s, first_row, smooth, about, count, coverage, disparity, source
 ):  # fmt: skip
     """Give every ray of the smooth cells one candidate that covers it: the photo's ray, of disparity (H, W) `surface`.

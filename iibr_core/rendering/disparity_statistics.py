@@ -81,7 +81,7 @@ def _edges(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> ND
 
 
 @kernel
-def _row_edges(rows, least_edge, changes, lefts):  # type: ignore[no-untyped-def]
+def _row_edges(rows, least_edge, changes, lefts):
     """Writes what `_edges` returns; returns how many edges there are."""
     count = 0
     for y in range(rows.shape[0]):
@@ -105,7 +105,7 @@ def _row_edges(rows, least_edge, changes, lefts):  # type: ignore[no-untyped-def
 
 
 @kernel
-def _window_extremes(disparity, first, last, low, high, step):  # type: ignore[no-untyped-def]
+def _window_extremes(disparity, first, last, low, high, step):
     """Rows [first, last) of the range, and of the largest step, within a square: along rows first, then columns.
 
     NaN lies around the frame, as where nothing is: it is neither less nor greater than anything.

@@ -46,7 +46,7 @@ def split_mixed_pixels(
 
 
 @kernel
-def _towards_front(disparity, x, y, edge_step):  # type: ignore[no-untyped-def]
+def _towards_front(disparity, x, y, edge_step):
     """Direction to the neighbour most in front by more than edge_step; (0, 0) if none, or if one is as far behind."""
     here = disparity[y, x]
     best, step_x, step_y = edge_step, 0, 0
@@ -64,7 +64,7 @@ def _towards_front(disparity, x, y, edge_step):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _split_rows(  # type: ignore[no-untyped-def]
+def _split_rows(
     colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage,
 ):  # fmt: skip
     """Rows [first, last) of what `split_mixed_pixels` returns, which hold the photo where nothing is split."""

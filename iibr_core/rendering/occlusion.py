@@ -36,7 +36,7 @@ def occlusion_mask(weights: FloatImage) -> NDArray[np.bool_]:
 
 
 @kernel
-def _coverage(weights, row, x):  # type: ignore[no-untyped-def]
+def _coverage(weights, row, x):
     # Rounding may bring the sum above 1.
     covered = 0.0
     for k in range(weights.shape[0]):
@@ -45,7 +45,7 @@ def _coverage(weights, row, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _entropy_at(weights, row, x, covered):  # type: ignore[no-untyped-def]
+def _entropy_at(weights, row, x, covered):
     slots = weights.shape[0]
     if slots == 1:
         return 1.0 - covered
@@ -61,7 +61,7 @@ def _entropy_at(weights, row, x, covered):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _entropy(weights):  # type: ignore[no-untyped-def]
+def _entropy(weights):
     _, rows, width = weights.shape
     result = np.empty((rows, width), np.float32)
     for row in range(rows):
@@ -71,7 +71,7 @@ def _entropy(weights):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _mask(weights, limit):  # type: ignore[no-untyped-def]
+def _mask(weights, limit):
     _, rows, width = weights.shape
     mask = np.zeros((rows, width), np.bool_)
     for row in range(rows):

@@ -134,7 +134,7 @@ class RaySet:
 
 
 @kernel
-def _sum_up(disparity, coverage, first, last, low, high):  # type: ignore[no-untyped-def]
+def _sum_up(disparity, coverage, first, last, low, high):
     """Of the cells that begin in rows [first, last)."""
     height, width = disparity.shape
     # Rounded up at both ends: the rows of a cell across two bands belong to the band in which it begins.
@@ -149,7 +149,7 @@ def _sum_up(disparity, coverage, first, last, low, high):  # type: ignore[no-unt
 
 
 @kernel
-def _find_incoherent(disparity, smooth_step, first, last, incoherent):  # type: ignore[no-untyped-def]
+def _find_incoherent(disparity, smooth_step, first, last, incoherent):
     """Of the cells that begin in rows [first, last): True on either side of a step larger than smooth_step, of a pixel
     without surface, of the border.
     """
@@ -172,7 +172,7 @@ def _find_incoherent(disparity, smooth_step, first, last, incoherent):  # type: 
 
 
 @kernel
-def _near_edge(disparity, surface_step, first, last, near_edge):  # type: ignore[no-untyped-def]
+def _near_edge(disparity, surface_step, first, last, near_edge):
     """Of rows [first, last): True where the 4x4 pixels from (x - 1, y - 1) to (x + 2, y + 2) hold a larger step, or no
     surface.
     """

@@ -63,7 +63,7 @@ def heaviest_candidate(candidates: Candidates, weights: FloatImage) -> tuple[Flo
 
 
 @kernel
-def _keys(f):  # type: ignore[no-untyped-def]
+def _keys(f):
     """Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1)."""
     # Keys 1981: (a + 2) |t|^3 - (a + 3) |t|^2 + 1 up to one pixel away, a (|t|^3 - 5 |t|^2 + 8 |t| - 4) up to two.
     g = 1.0 - f
@@ -77,7 +77,7 @@ def _keys(f):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _keys_single(f):  # type: ignore[no-untyped-def]
+def _keys_single(f):
     """The same in single precision."""
     one, a = np.float32(1.0), np.float32(KEYS_A)
     g = one - f
@@ -90,7 +90,7 @@ def _keys_single(f):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cubic(images, index, x, y):  # type: ignore[no-untyped-def]
+def cubic(images, index, x, y):
     """Colour at a position of one image; its border is repeated beyond it."""
     _, height, width, _ = images.shape
     column, row = floor(x), floor(y)
@@ -118,7 +118,7 @@ def cubic(images, index, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def resample(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-untyped-def]
+def resample(images, surfaces, index, x, y, d, parallax):
     """Colour at a position from the pixels of disparity d, kept within their range where some are missing."""
     _, height, width, _ = images.shape
     tolerance = OWN_SURFACE_PX / parallax
@@ -168,7 +168,7 @@ def resample(images, surfaces, index, x, y, d, parallax):  # type: ignore[no-unt
 
 
 @kernel
-def _gather_plain(  # type: ignore[no-untyped-def]
+def _gather_plain(
     images, near_edge, offsets, first_row, count, candidate_disparity, candidate_source, remaining,
     colors, disparity, source,
 ):  # fmt: skip
@@ -210,7 +210,7 @@ def _gather_plain(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _gather(  # type: ignore[no-untyped-def]
+def _gather(
     images, surfaces, near_edge, offsets, first_row,
     count, candidate_disparity, candidate_source, weights, wanted, colors, disparity, source,
 ):  # fmt: skip
@@ -261,7 +261,7 @@ def _gather(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _heaviest(count, candidate_disparity, candidate_source, weights, disparity, source):  # type: ignore[no-untyped-def]
+def _heaviest(count, candidate_disparity, candidate_source, weights, disparity, source):
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
             used = np.int64(count[row, x])

@@ -21,7 +21,7 @@ def visibility_weights(candidates: Candidates) -> FloatImage:
 
 
 @kernel
-def _composite_front_to_back(count, coverage, disparity, weights):  # type: ignore[no-untyped-def]
+def _composite_front_to_back(count, coverage, disparity, weights):
     rows, width = count.shape
     for row in range(rows):
         for x in range(width):

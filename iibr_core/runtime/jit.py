@@ -40,7 +40,7 @@ SRGB_TABLE = (1.055 * _AT ** (2 / 2.4) - 0.055).astype(np.float32)
 
 
 @kernel
-def linear_scalar(encoded):  # type: ignore[no-untyped-def]
+def linear_scalar(encoded):
     """`color.linear_from_srgb` of one value, up to white from a table: powers took a fifth of the time of rays that
     surfaces share.
     """
@@ -58,7 +58,7 @@ def linear_scalar(encoded):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def srgb_scalar(linear):  # type: ignore[no-untyped-def]
+def srgb_scalar(linear):
     """`color.srgb_from_linear` of one value, up to white from a table."""
     x = max(linear, 0.0)
     # The inverse; its table runs over the root, see SRGB_TABLE.
@@ -72,7 +72,7 @@ def srgb_scalar(linear):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def nearest_pixel(position):  # type: ignore[no-untyped-def]
+def nearest_pixel(position):
     """Index of the pixel whose area holds a position."""
     # Halves go up, also below 0: int() would round towards 0 there.
     return floor(position + 0.5)

@@ -256,7 +256,7 @@ def _span(low: float, high: float, size: int) -> slice:
 
 
 @kernel
-def _seed(distance, x0, y0, x1, y1, radius):  # type: ignore[no-untyped-def]
+def _seed(distance, x0, y0, x1, y1, radius):
     """Distances of the pixels about every place on the way from (x0, y0) to (x1, y1)."""
     height, width = distance.shape
     # Two places a pixel, so that none is stepped over.
@@ -270,7 +270,7 @@ def _seed(distance, x0, y0, x1, y1, radius):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _contour(photo, y, x, other_y, other_x, noise):  # type: ignore[no-untyped-def]
+def _contour(photo, y, x, other_y, other_x, noise):
     """Difference in colour between two pixels beyond texture."""
     total = 0.0
     for c in range(3):
@@ -279,7 +279,7 @@ def _contour(photo, y, x, other_y, other_x, noise):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _measure_unlikeness(photo, colors, unlike):  # type: ignore[no-untyped-def]
+def _measure_unlikeness(photo, colors, unlike):
     """How far every pixel's colour is from the nearest of the colours (N, 3), 0 where it is like one."""
     for y in range(photo.shape[0]):
         for x in range(photo.shape[1]):
@@ -294,7 +294,7 @@ def _measure_unlikeness(photo, colors, unlike):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _remove_specks(unlike):  # type: ignore[no-untyped-def]
+def _remove_specks(unlike):
     """What few of a pixel's neighbours share is no other surface."""
     height, width = unlike.shape
     for y in range(height):
@@ -311,7 +311,7 @@ def _remove_specks(unlike):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _measure(unlike, distance, radius, most_sweeps):  # type: ignore[no-untyped-def]
+def _measure(unlike, distance, radius, most_sweeps):
     """Shortest ways from pixel to pixel (8 neighbours), by sweeps there and back until nothing changes.
 
     To a pixel of a more unlike colour the way is longer.
@@ -347,7 +347,7 @@ def _measure(unlike, distance, radius, most_sweeps):  # type: ignore[no-untyped-
 
 
 @kernel
-def _measure_steps(photo, parting, noise, steps):  # type: ignore[no-untyped-def]
+def _measure_steps(photo, parting, noise, steps):
     """How far every pixel counts as being from the one at its left; steps: (H, W)."""
     for y in range(photo.shape[0]):
         for x in range(1, photo.shape[1]):
@@ -355,7 +355,7 @@ def _measure_steps(photo, parting, noise, steps):  # type: ignore[no-untyped-def
 
 
 @kernel
-def _smooth_rows(values, steps, rate):  # type: ignore[no-untyped-def]
+def _smooth_rows(values, steps, rate):
     """Every row of values, smoothed there and back. rate: by how much a pixel's step lets go of what was before."""
     height, width = values.shape
     kept = np.empty(width)

@@ -143,7 +143,7 @@ def _downsampled_linear(raster: Raster, size: ImageSize) -> FloatImage:
 
 
 @kernel
-def _average_areas(band, band_top, row_step, result_top, result):  # type: ignore[no-untyped-def]
+def _average_areas(band, band_top, row_step, result_top, result):
     """Average band (rows, W, 3) over the area of each pixel of result (rows, w, 3).
 
     Pixel i of the result covers rows i * row_step .. (i + 1) * row_step of the whole source; band_top and result_top

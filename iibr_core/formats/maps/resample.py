@@ -29,7 +29,7 @@ def resample_surfaces(values: FloatImage, size: ImageSize) -> FloatImage:
 
 
 @kernel
-def _resample(values, tolerance, result):  # type: ignore[no-untyped-def]
+def _resample(values, tolerance, result):
     """Fill result from values; both (H, W), their pixel areas aligned at the borders."""
     step_y = values.shape[0] / result.shape[0]
     step_x = values.shape[1] / result.shape[1]

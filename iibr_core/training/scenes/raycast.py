@@ -189,7 +189,7 @@ def _bounds(scene: RaycastScene, camera: NDArray[np.float64]) -> NDArray[np.floa
 
 
 @kernel
-def _distance(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):  # type: ignore[no-untyped-def]
+def _distance(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):
     """How far along a ray it meets a primitive, both in the primitive's own frame; infinite where it does not."""
     if shape == PLANE:
         # The plane z = 0 of its own frame, within its rectangle.
@@ -221,7 +221,7 @@ def _distance(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):  # type: ignore[no-unt
 
 
 @kernel
-def _normal(shape, x, y, z, hx, hy, hz):  # type: ignore[no-untyped-def]
+def _normal(shape, x, y, z, hx, hy, hz):
     """The unit normal at a point of a primitive, in its own frame."""
     if shape == PLANE:
         return 0.0, 0.0, 1.0
@@ -238,7 +238,7 @@ def _normal(shape, x, y, z, hx, hy, hz):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _albedo(p, x, y, z, pixel):  # type: ignore[no-untyped-def]
+def _albedo(p, x, y, z, pixel):
     """Colour of a primitive at a point of its own frame, linear light; see textures for `pixel`."""
     x, y, z = inside_pattern(x) + p.phase[0], inside_pattern(y) + p.phase[1], inside_pattern(z) + p.phase[2]
     # Mix of pattern and rough noise between two colours of the palette; coarse noise tints it with the third.
@@ -258,9 +258,7 @@ def _albedo(p, x, y, z, pixel):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _cast(  # type: ignore[no-untyped-def]
-    xs, ys, places, weights, margin, primitives, axes, origins, bounds, camera, lens, light, colors, disparity
-):
+def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, camera, lens, light, colors, disparity):
     """See `cast`. places, weights: `sample_places`; lens: centre x, y, focal, infinity, least and greatest z."""
     focal, infinity, least_z, greatest_z = lens[2], lens[3], lens[4], lens[5]
     backdrop = len(primitives) - 1

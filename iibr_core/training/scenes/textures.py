@@ -27,7 +27,7 @@ FARTHEST = 1e7
 
 
 @kernel
-def hash_lattice(x, y, z, seed):  # type: ignore[no-untyped-def]
+def hash_lattice(x, y, z, seed):
     """A number in [0, 1) that depends on four integers and looks random."""
     # Odd constants spread the four numbers over all bits; shifts and products mix high bits into low ones. Overflow
     # wraps.
@@ -40,12 +40,12 @@ def hash_lattice(x, y, z, seed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _mix(a, b, share):  # type: ignore[no-untyped-def]
+def _mix(a, b, share):
     return a + (b - a) * share
 
 
 @kernel
-def _ramp(value, low, high):  # type: ignore[no-untyped-def]
+def _ramp(value, low, high):
     """0 up to low, 1 from high, a smooth step between."""
     # Smoothstep: 3 t^2 - 2 t^3.
     t = min(max((value - low) / (high - low), 0.0), 1.0)
@@ -53,7 +53,7 @@ def _ramp(value, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def noise(x, y, z, seed):  # type: ignore[no-untyped-def]
+def noise(x, y, z, seed):
     """Value noise in [0, 1): random at integer points, smooth between."""
     # Lattice cell and smoothstep weights within it, then trilinear between its corners.
     i, j, k = floor(x), floor(y), floor(z)
@@ -73,7 +73,7 @@ def noise(x, y, z, seed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def rough_noise(x, y, z, wavelength, gain, pixel, seed):  # type: ignore[no-untyped-def]
+def rough_noise(x, y, z, wavelength, gain, pixel, seed):
     """Octaves of noise from `wavelength` down to the pixel, each `gain` times as strong as the coarser; in 0 .. 1."""
     total, power, strength = 0.0, 0.0, 1.0
     # Fractal noise. Octaves near the pixel fade out but count in the power, lest the others grow stronger.
@@ -89,7 +89,7 @@ def rough_noise(x, y, z, wavelength, gain, pixel, seed):  # type: ignore[no-unty
 
 
 @kernel
-def _square_wave(position, period, soft):  # type: ignore[no-untyped-def]
+def _square_wave(position, period, soft):
     """0 and 1 in turn along a line, with ramps `soft` wide between."""
     # A sine, amplified until its flanks are `soft` wide, and clipped.
     sharpness = max(period / (pi * soft), 1.0)
@@ -97,7 +97,7 @@ def _square_wave(position, period, soft):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _spots(x, y, z, period, soft, seed):  # type: ignore[no-untyped-def]
+def _spots(x, y, z, period, soft, seed):
     """1 within a ball in each cell of a grid, 0 outside."""
     # One ball a cell, its radius and place random, so that it stays inside.
     i, j, k = floor(x / period), floor(y / period), floor(z / period)
@@ -112,7 +112,7 @@ def _spots(x, y, z, period, soft, seed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pattern(kind, x, y, z, period, pixel, seed):  # type: ignore[no-untyped-def]
+def pattern(kind, x, y, z, period, pixel, seed):
     """The named pattern at a point, in 0 .. 1; half where its period is too fine to be seen."""
     soft = 1.2 * pixel
     if kind == WAVES:
@@ -134,13 +134,13 @@ def pattern(kind, x, y, z, period, pixel, seed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inside_pattern(x):  # type: ignore[no-untyped-def]
+def inside_pattern(x):
     """A coordinate that patterns can work with: itself, or 0 where it is not finite or too large."""
     return x if abs(x) < FARTHEST else 0.0
 
 
 @kernel
-def _leaf(x, y, angle, seed):  # type: ignore[no-untyped-def]
+def _leaf(x, y, angle, seed):
     """Whether a point lies on the one leaf of its cell of a turned unit grid."""
     # The turned grid; then place, direction and length of the leaf in its cell.
     u, v = cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y
@@ -156,7 +156,7 @@ def _leaf(x, y, angle, seed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def is_cut(kind, x, y, half_x, half_y, period, width, seed):  # type: ignore[no-untyped-def]
+def is_cut(kind, x, y, half_x, half_y, period, width, seed):
     """Whether a plane has a hole at (x, y) of its own frame. period and width are those of the holes, world units."""
     if kind == DISC:
         return (x / half_x) ** 2 + (y / half_y) ** 2 > 1
