@@ -22,14 +22,19 @@ def temporary_sibling(path: Path) -> Path:
     return path.with_name(f".{path.stem}.{uuid4().hex[:12]}{path.suffix}")
 
 
+def require_folder_of(path: Path) -> None:
+    """Raise InputError unless there is a folder for `path` to be written into."""
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; create it or choose another")
+
+
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
     """Yield the temporary name to write to; it takes the place of `path` when the block ends well, else it is removed.
 
     Raises InputError where the folder is missing, is no folder, or may not be written to.
     """
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; create it or choose another")
+    require_folder_of(path)
     temporary = temporary_sibling(path)
     try:
         yield temporary

@@ -10,6 +10,6 @@ SOFT = 0.5
 AMBIGUOUS_PX = 1.5
 """A step of disparity that moves its sides apart by less than this makes no ray ambiguous."""
 AMBIGUOUS_AROUND_PX = 1.5
-"""Soft edges have no steps: there a surface that lands near by makes a ray ambiguous if its parallax differs by this."""
+"""Soft edges have no steps: there a surface landing near by makes a ray ambiguous if its parallax differs by this."""
 EVERY_COST = 8
 """How many times as long a band takes where the transformer is asked for every ray."""

@@ -24,12 +24,13 @@ from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.app.image_export import save_picture
+from viewer.app.image_export import export_image, is_float, settings_of
 from viewer.app.preferences_store import load_preferences, store_preferences
-from viewer.background.scene_worker import Failed, SceneReady, SceneRequest, ViewReady, results_of
+from viewer.background.jobs import Failed
+from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.model.actions import MoveEye, SetAperture
 from viewer.model.saved_settings import read_settings, settings_text_in
-from viewer.model.state.app_state import CENTRE, AppState, SaveTask, Source
+from viewer.model.state.app_state import CENTRE, AppState, Source
 
 GRID = GridShape(3, 3)
 
@@ -173,13 +174,13 @@ def test_a_full_disk_while_a_picture_is_saved(viewer: HeadlessViewer, tmp_path: 
     """One line, nothing half-written, what was there stays; with room again the same picture is saved."""
     path = tmp_path / name
     path.write_bytes(b"mine")
-    task = SaveTask(str(path), (96, 64), may_replace=True)
+    pixels, settings = viewer.picture((96, 64), is_float(path)), settings_of(viewer.state, (96, 64))
     others = set(tmp_path.iterdir())
     with full_disk(900), pytest.raises(InputError, match=f"{name}: cannot be written"):
-        save_picture(viewer._scene_view, viewer.state, task)
+        export_image(path, pixels, settings)
     assert path.read_bytes() == b"mine"
     assert set(tmp_path.iterdir()) == others
-    save_picture(viewer._scene_view, viewer.state, task)
+    export_image(path, pixels, settings)
     assert read_settings(path).size_px == (96, 64)
 
 

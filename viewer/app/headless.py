@@ -150,7 +150,7 @@ class HeadlessViewer:
         request = make_inspection_request(self.state, is_moving=False, before=None)
         inputs = self._inspection_view.inputs(request, self.state)
         if request is not None and inputs is not None:
-            for seen in self._comparison_job.seen(request, inputs, lambda: False):
-                self.do(*self._inspection_view.take(seen))
+            for result in self._comparison_job.results_of(request, inputs, lambda: False):
+                self.do(*self._inspection_view.take(result))
         self.do(Probed(self._inspection_view.probe(self.state)))
         return self._inspection_view.draw(self.state, layout)

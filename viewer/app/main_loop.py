@@ -23,7 +23,8 @@ from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.background.comparison_worker import ComparisonWorker
-from viewer.background.scene_worker import ProgressReport, SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
+from viewer.background.jobs import Failed, ProgressReport
+from viewer.background.scene_worker import SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
@@ -59,6 +60,9 @@ from viewer.ui.screen import build_screen
 from viewer.ui.style import Look
 
 UPLOAD_BUDGET_S = 0.006
+SAVE_BUDGET_S = 0.025
+"""A turn, for a picture that is being saved: about as long as a frame, so that whoever drags gets every other turn."""
+
 IDLE_WAIT_S = 1.0
 """Nothing is expected to happen unannounced; this only bounds the harm of a lost wake-up."""
 
@@ -108,7 +112,7 @@ class App:
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._worker = SceneWorker(wake)
-        self._side_effects = SideEffects(self.scene_view)
+        self._side_effects = SideEffects(self.scene_view, wake)
         self._kept_in = kept_in
         self._kept_recent = self.state.recent
         self._submitted = 0
@@ -127,9 +131,9 @@ class App:
     def step(self) -> None:
         """One turn of the loop; sleeps first where nothing was going on in the last ones."""
         self.window.poll(self.wait_s)
-        heard = self._drained() + self._dropped() + self._happened()
-        self.do(*heard)
-        self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(heard)
+        news = self._drain() + self._take_dropped() + self._take_events()
+        self.do(*news)
+        self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
         self._preview_depth()
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
@@ -143,8 +147,9 @@ class App:
         actions += self._input(pointer, layout)
         self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages))
         self.do(*actions)
+        self.do(*self._side_effects.draw(SAVE_BUDGET_S))
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
-        self._is_busy |= bool(actions)
+        self._is_busy |= bool(actions) or self._side_effects.is_drawing
         self._direct_worker()
         self._keep_recent()
 
@@ -172,10 +177,12 @@ class App:
         return Look(self.window.ui_scale * preferences.font_scale, preferences.theme)
 
     def close(self) -> None:
-        """Stop the worker, keep what is kept, and free everything."""
+        """Stop the worker, keep what is kept, and free everything. A file that is being written is finished first."""
+        self.window.hide()
         self._worker.close()
         self._comparisons.close()
         self._keep()
+        self._side_effects.close()
         self._ui.release()
         self.inspection_view.release()
         self.scene_view.release()
@@ -190,12 +197,12 @@ class App:
             self.state = reduce(self.state, action)
         self._worker.eye = self.state.optics.eye
 
-    def _happened(self) -> list[Action]:
+    def _take_events(self) -> list[Action]:
         """What neither user nor worker says: the clock, side effects done, the window moved, the worker lost."""
         self._stepped_at = time.perf_counter()
         actions = self._side_effects.run(self.state)
-        for seen in self._comparisons.found():
-            actions += self.inspection_view.take(seen)
+        while (result := self._comparisons.next_result()) is not None:
+            actions += self.inspection_view.take(result)
         if self.state.motion.is_running:
             actions.append(Tick(self._stepped_at))
         place = self.window.place
@@ -205,33 +212,36 @@ class App:
             actions.append(WorkerLost())
         return actions
 
-    def _drained(self) -> list[Action]:
+    def _drain(self) -> list[Action]:
         """The worker's results, as actions; the one place where they arrive."""
         actions: list[Action] = []
         while self.scene_view.has_room and (result := self._worker.next_result()) is not None:
-            actions += self._taken(result)
+            actions += self._take(result)
         return actions
 
-    def _taken(self, result: SceneResult) -> list[Action]:
+    def _take(self, result: SceneResult) -> list[Action]:
+        match result:
+            case ProgressReport():
+                return [ProgressMade(result.id, result.progress)]
+            case Failed():
+                return [OpenFailed(result.id, result.message)]
         try:
-            if isinstance(result, SceneReady):
-                self.scene_view.open(result)
-                self.inspection_view.open()
-                self.window.set_title(f"{result.scene.name} - iibr")
-                return [SceneOpened(result.generation, result.scene)]
-            if isinstance(result, ViewReady):
-                self.scene_view.add(result.view)
-                self.inspection_view.add(result.view)
-                view = result.view.row, result.view.column
-                return [ProgressMade(result.generation, result.progress, view)]
-            if isinstance(result, ProgressReport):
-                return [ProgressMade(result.generation, result.progress)]
+            return self._take_views(result)
         except InputError as error:  # no room on the graphics card: there is no use in more views
             self._worker.cancel()
             return [OpenFailed(result.generation, str(error))]
-        return [OpenFailed(result.generation, result.message)]
 
-    def _dropped(self) -> list[Action]:
+    def _take_views(self, result: SceneReady | ViewReady) -> list[Action]:
+        if isinstance(result, SceneReady):
+            self.scene_view.open(result)
+            self.inspection_view.open()
+            self.window.set_title(f"{result.scene.name} - iibr")
+            return [SceneOpened(result.generation, result.scene)]
+        self.scene_view.add(result.view)
+        self.inspection_view.add(result.view)
+        return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column))]
+
+    def _take_dropped(self) -> list[Action]:
         paths = self.window.take_dropped()
         is_inspecting = "inspect" in self.state.preferences.open_sections
         on_panel = self.layout().panel.contains(*self.window.pointer)

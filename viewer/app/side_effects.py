@@ -1,17 +1,25 @@
-"""What the state asks of the outside world, done: files chosen, masks read, pictures written. Actions come back."""
+"""What the state asks of the outside world, done: files chosen, read and written. Actions come back."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 from iibr_core.types import InputError
 from viewer.app.dialogs import Dialog, has_dialogs
-from viewer.app.image_export import MAX_PIXELS, AlreadyThereError, save_map, save_picture
+from viewer.app.image_export import AlreadyThereError, export_map, map_path
+from viewer.app.picture_saver import PictureSaver
+from viewer.background.file_worker import FileRequest, FileResult, FileWorker
+from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, AskForPath, DismissNotice, Notify, SetApertureShape, ShowPrompt, TaskTaken
+from viewer.model.actions import Action, AskForPath, Notify, SetApertureShape, ShowPrompt, TaskTaken
 from viewer.model.opening import action_for_path
 from viewer.model.state.app_state import (
+    ApertureMask,
     AppState,
     ChooseTask,
     Notice,
@@ -22,82 +30,100 @@ from viewer.model.state.app_state import (
     Task,
 )
 from viewer.model.state.inspection import GroundTruth, TruthRead
-
-LARGE_PIXELS = 4_000_000
-"""Of a picture: saving it then takes seconds."""
-
-TURNS_ANNOUNCED = 4
-"""ImGui lays out in two frames; so many turns later a notice is on the screen for certain."""
+from viewer.model.state.saving import CancelSaveTask
 
 
 class SideEffects:
-    """Carries out tasks in the window's thread; the one that takes long, a file dialog, is asked again each turn.
+    """Takes tasks up in the window's thread and has them carried out beside it; a file dialog is asked each turn."""
 
-    A large picture is announced first: while it is drawn and written the window stands still.
-    """
-
-    def __init__(self, scene_view: SceneView) -> None:
+    def __init__(self, scene_view: SceneView, wake: Callable[[], None]) -> None:
+        """wake: called, in another thread, when something came of a task."""
         self._scene_view = scene_view
+        self._saver = PictureSaver(scene_view, wake)
+        self._files = FileWorker("iibr-files", wake)
+        self._ids = count(1)
+        self._under_way: set[int] = set()
         self._dialog: Dialog | None = None
-        self._announced: tuple[SaveTask, int] | None = None
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a dialog is open, or a notice must be seen first."""
-        return self._dialog is not None or self._announced is not None
+        """Whether a dialog is open."""
+        return self._dialog is not None
+
+    @property
+    def is_drawing(self) -> bool:
+        """Whether a picture is being drawn to be saved."""
+        return self._saver.is_drawing
 
     def run(self, state: AppState) -> list[Action]:
-        """Take up the state's tasks and say what came of them, and of a dialog that was closed."""
-        actions = self._answered(state)
+        """Take up the state's tasks and say what came of earlier ones, and of a dialog that was closed."""
+        actions = self._take_results(state) + self._take_answer(state)
         for task in state.tasks:
             if isinstance(task, ReadTruthTask) and not is_scene_open(state):
                 continue  # what it must fit is not known yet
-            if isinstance(task, SaveTask) and self._must_announce(task):
-                actions.append(Notify(saving_notice(task)))
-                continue
-            actions += [TaskTaken(task), *self._done(task, state)]
+            actions += [TaskTaken(task), *self._begin(task, state)]
         return actions
 
-    def _done(self, task: Task, state: AppState) -> list[Action]:
+    def draw(self, budget_s: float) -> list[Action]:
+        """Go on with the picture that is being saved, for about that long."""
+        return self._saver.advance(budget_s)
+
+    def close(self) -> None:
+        """Finish the files that are being written; give up everything else."""
+        self._saver.close()
+        self._files.close(cancels=False)
+
+    def _begin(self, task: Task, state: AppState) -> list[Action]:
         match task:
             case ChooseTask(what):
                 if not has_dialogs():
                     return [AskForPath(what)]
                 self._dialog = self._dialog or Dialog(what)
-                return []
             case ReadMaskTask(path):
-                return _load_mask(path, state)
+                self._submit(partial(_read_mask, path))
             case ReadTruthTask(path):
-                return _read_truth(path)
+                self._submit(partial(_read_truth, path))
+            case SaveTask(what="map"):
+                return self._save_map(task, state)
             case SaveTask():
-                self._announced = None
-                return [DismissNotice(saving_notice(task)), *self._saved(task, state)]
+                return self._saver.add(task, state)
+            case CancelSaveTask():
+                self._saver.cancel()
+        return []
 
-    def _must_announce(self, task: SaveTask) -> bool:
-        """Whether the notice about it has not been on the screen for some turns."""
-        pixels = task.size_px[0] * task.size_px[1]
-        if task.what == "map" or not LARGE_PIXELS <= pixels <= MAX_PIXELS:
-            return False  # what is too large is refused at once
-        turns = self._announced[1] + 1 if self._announced is not None and self._announced[0] == task else 0
-        self._announced = task, turns
-        return turns < TURNS_ANNOUNCED
+    def _submit(self, work: Callable[[], Any]) -> None:
+        id_ = next(self._ids)
+        self._under_way.add(id_)
+        self._files.submit(FileRequest(id_, work))
 
-    def _saved(self, task: SaveTask, state: AppState) -> list[Action]:
+    def _save_map(self, task: SaveTask, state: AppState) -> list[Action]:
+        """The disparity map of the scene on the screen, edits included, in px per view step as given."""
         if state.scene is None:
             return []
+        if self._scene_view.generation != state.generation:
+            return [Notify(Notice("The map is still being made; save it again in a moment."))]
         try:
-            if task.what == "map":
-                if self._scene_view.generation != state.generation:
-                    return [Notify(Notice("The map is still being made; save it again in a moment."))]
-                return [Notify(Notice(save_map(self._scene_view, task)))]
-            path = save_picture(self._scene_view, state, task)
+            path = map_path(task)
+            if self._scene_view.loaded is None:
+                raise InputError(f"{path}: this scene has no disparity map of its own")
         except AlreadyThereError:
-            return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, what=task.what))]
+            return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, what="map"))]
         except InputError as error:
             return [Notify(Notice(str(error), is_error=True))]
-        return [Notify(Notice(f"Saved {path}"))]
+        self._submit(partial(export_map, path, self._scene_view.loaded.disparity.values))
+        return []
 
-    def _answered(self, state: AppState) -> list[Action]:
+    def _take_results(self, state: AppState) -> list[Action]:
+        actions: list[Action] = []
+        while (result := self._files.next_result()) is not None:
+            self._under_way.discard(result.id)
+            actions.append(_action_from(result, state))
+        if self._files.is_lost and self._under_way:
+            self._under_way.clear()
+            actions.append(Notify(Notice("Reading or writing a file stopped unexpectedly.", is_error=True)))
+        return actions
+
+    def _take_answer(self, state: AppState) -> list[Action]:
         answer = self._dialog.answer() if self._dialog is not None else None
         if self._dialog is None or answer is None:
             return []
@@ -107,32 +133,32 @@ class SideEffects:
         return [action_for_path(what, answer, state)]
 
 
-def saving_notice(task: SaveTask) -> Notice:
-    """Shown while a large picture is saved."""
-    width, height = task.size_px
-    return Notice(f"Drawing and writing {width} × {height} px; the window stands still for a while.")
-
-
 def is_scene_open(state: AppState) -> bool:
     """Whether what was asked for last is open."""
     return state.scene is not None and state.scene.source is state.source
 
 
-def _read_truth(path: str) -> list[Action]:
+def _action_from(result: FileResult, state: AppState) -> Action:
+    if isinstance(result, Failed):
+        return Notify(Notice(result.message, is_error=True))
+    match result.value:
+        case ApertureMask() as mask:
+            return SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))
+        case GroundTruth() as truth:
+            return TruthRead(truth)
+    return Notify(Notice(str(result.value)))
+
+
+def _read_truth(path: str) -> GroundTruth:
+    """Raises InputError where there is no light field."""
     from iibr_core.formats.light_fields.hci import read_light_field
 
-    try:
-        header, _ = read_light_field(Path(path).expanduser())
-    except InputError as error:
-        return [Notify(Notice(str(error), is_error=True))]
-    return [TruthRead(GroundTruth(path, header.name, header.grid, header.width, header.height))]
+    header, _ = read_light_field(Path(path).expanduser())
+    return GroundTruth(path, header.name, header.grid, header.width, header.height)
 
 
-def _load_mask(path: str, state: AppState) -> list[Action]:
+def _read_mask(path: str) -> ApertureMask:
+    """Raises InputError where it is no mask."""
     from viewer.model.lens.aperture_mask import read_mask
 
-    try:
-        mask = read_mask(Path(path).expanduser())
-    except InputError as error:
-        return [Notify(Notice(str(error), is_error=True))]
-    return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
+    return read_mask(Path(path).expanduser())

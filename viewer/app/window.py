@@ -116,6 +116,10 @@ class Window:
         """Put what was drawn on the screen."""
         glfw.swap_buffers(self.handle)
 
+    def hide(self) -> None:
+        """Take it off the screen."""
+        glfw.hide_window(self.handle)
+
     def close(self) -> None:
         """Close the window and GLFW with it."""
         glfw.destroy_window(self.handle)

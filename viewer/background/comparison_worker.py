@@ -1,14 +1,11 @@
-"""Work beside the worker's: single views for comparisons, their scores, the entropy of weights. One thread.
+"""Work beside the scene worker's: single views for comparisons, their scores, the entropy of weights.
 
-The newest request wins. Rays and images are kept only as long as something is looked at. The core's heavy imports
-happen in the thread.
+The newest request wins. Rays and images are kept only as long as something is looked at.
 """
 
 from __future__ import annotations
 
-import queue
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,8 +17,8 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
+from viewer.background.jobs import Failed, Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto
-from viewer.background.scene_worker import message_of
 from viewer.model.inspection_request import InspectionRequest
 
 if TYPE_CHECKING:
@@ -44,6 +41,14 @@ class ComparisonInputs:
     plan: ScenePlan | None = None
     stored: StoredColors | None = None
     inpaint: str = DEFAULT_INPAINTER
+
+
+@dataclass(frozen=True, eq=False)
+class ComparisonRequest:
+    """What to find out, and from what; both None: nothing, and what is kept may go."""
+
+    id: InspectionRequest | None = None
+    inputs: ComparisonInputs | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +77,8 @@ class EntropyReady:
     entropy: Bytes
 
 
-@dataclass(frozen=True)
-class ComparisonFailed:
-    """Nothing came of it; the message is one line for people."""
-
-    request: InspectionRequest
-    message: str
-
-
-ComparisonResult = PairReady | PairScored | EntropyReady | ComparisonFailed
+ComparisonFinding = PairReady | PairScored | EntropyReady
+ComparisonResult = ComparisonFinding | Failed[InspectionRequest | None]
 
 
 def psnr_db(left: Bytes, right: Bytes) -> float:
@@ -109,24 +107,27 @@ class ComparisonJob:
         """Free what is kept."""
         self._rays = self._rays_of = self._pair = None
 
-    def seen(
+    def results_of(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
-    ) -> Iterator[ComparisonResult]:
-        """What comes of a request, in order. Raises InputError, or Cancelled once should_stop is true."""
+    ) -> Iterator[ComparisonFinding]:
+        """What comes of a request, in order. Raises InputError, or Cancelled once should_stop is true.
+
+        A pair that is kept comes again: who asked for it first may not have waited.
+        """
         if request.kind == "entropy":
-            view = self._made(request, inputs, "fast", should_stop)
+            view = self._make_view(request, inputs, "fast", should_stop)
             assert view.entropy is not None
             yield EntropyReady(request, np.rint(np.clip(view.entropy, 0, 1) * 255).astype(np.uint8))
             return
         unscored = replace(request, is_scored=False)
         if self._pair is None or self._pair.request != unscored:
-            self._pair = PairReady(unscored, *self._pair_of(request, inputs, should_stop))
-            yield self._pair
+            self._pair = PairReady(unscored, *self._make_pair(request, inputs, should_stop))
+        yield self._pair
         if request.is_scored and not should_stop():
             left, right = self._pair.left, self._pair.right
             yield PairScored(request, psnr_db(left, right), mean_flip(right, left))
 
-    def _pair_of(
+    def _make_pair(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
     ) -> tuple[Bytes, Bytes]:
         if request.truth is not None:
@@ -135,14 +136,14 @@ class ComparisonJob:
             truth = read_view(Path(request.truth.path).expanduser(), *request.view)
             made = inputs.stored
             if made is None:
-                made = _bytes_of(self._made(request, inputs, inputs.quality, should_stop).colors)
+                made = _bytes_of(self._make_view(request, inputs, inputs.quality, should_stop).colors)
             if truth.shape != made.shape:
                 raise InputError(f"{request.truth.path}: its views have changed; choose the folder again")
             return _bytes_of(made), _bytes_of(truth)
-        fast, exact = (self._made(request, inputs, quality, should_stop) for quality in ("fast", "exact"))
+        fast, exact = (self._make_view(request, inputs, quality, should_stop) for quality in ("fast", "exact"))
         return _bytes_of(fast.colors), _bytes_of(exact.colors)
 
-    def _made(
+    def _make_view(
         self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality, should_stop: Callable[[], bool]
     ) -> RenderedView:
         """The view by the ray set of the scene's plan, or at the ground truth's places; the middle one is the photo."""
@@ -174,56 +175,28 @@ class ComparisonJob:
             return synthesis.render(self._rays, plan.grid.offset(*request.view))
 
 
-class ComparisonWorker:
-    """The thread that carries out the newest request. wake is called, in that thread, when something was found."""
+class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):
+    """Carries out the newest request. wanted: what it is about."""
 
     def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when something was found."""
+        super().__init__("iibr-comparison", wake, self._compare, lambda asked, message: Failed(asked.id, message))
         self.wanted: InspectionRequest | None = None
-        self._wake = wake
         self._comparison_job = ComparisonJob()
-        self._found: queue.SimpleQueue[ComparisonResult] = queue.SimpleQueue()
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="iibr-comparison")
 
     def want(self, request: InspectionRequest | None, inputs: ComparisonInputs | None) -> None:
         """Find this out instead of anything else; nothing happens if it is wanted already, or inputs are missing."""
         if request == self.wanted or (request is not None and inputs is None):
             return
         self.wanted = request
-        if request is not None and inputs is not None:
-            self._thread.submit(self._carry_out, request, inputs)
+        self.submit(ComparisonRequest(request, inputs))
+
+    def _compare(self, job: Job[ComparisonRequest, ComparisonResult]) -> Iterator[ComparisonResult]:
+        request, inputs = job.request.id, job.request.inputs
+        if request is None or inputs is None:
+            self._comparison_job.forget()
         else:
-            self._thread.submit(self._comparison_job.forget)
-
-    def found(self) -> list[ComparisonResult]:
-        """What came of the newest request since the last call."""
-        found = []
-        while not self._found.empty():
-            found.append(self._found.get())
-        return [seen for seen in found if _is_of(seen.request, self.wanted)]
-
-    def close(self) -> None:
-        """Stop, and wait for the thread to end."""
-        self.wanted = None
-        self._thread.shutdown(cancel_futures=True)
-
-    def _carry_out(self, request: InspectionRequest, inputs: ComparisonInputs) -> None:
-        from iibr_core.runtime.tiling import Cancelled
-
-        try:
-            for seen in self._comparison_job.seen(request, inputs, lambda: self.wanted != request):
-                self._post(seen)
-        except Cancelled:
-            return
-        except Exception as error:  # the one place where it can still be shown to the user
-            self._post(ComparisonFailed(request, message_of(error)))
-
-    def _post(self, seen: ComparisonResult) -> None:
-        self._found.put(seen)
-        self._wake()
-
-
-def _is_of(request: InspectionRequest, wanted: InspectionRequest | None) -> bool:
-    return wanted is not None and replace(request, is_scored=wanted.is_scored) == wanted
+            yield from self._comparison_job.results_of(request, inputs, job.should_stop)
 
 
 def _bytes_of(colors: StoredColors | FloatImage) -> Bytes:

@@ -1,17 +1,12 @@
 """The worker thread: reads a scene, plans it and makes its views, and hands each result over as soon as it is there.
 
-A frozen `SceneRequest` carries all the inputs, so there is nothing to lock. The newest request wins: the job before it
-stops at its next row band, and whatever it still had to say is dropped. The core's heavy imports happen in this
-thread, so the window comes first.
+The newest request wins: the job before it stops at its next row band, see `viewer.background.jobs`.
 """
 
 from __future__ import annotations
 
 import itertools
-import queue
-import threading
 import time
-import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,18 +15,14 @@ import numpy as np
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.types import FloatImage, InputError, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
+from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
 from viewer.model.state.app_state import CENTRE, Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
 
-QUEUED_RESULTS = 8
-"""Results that may wait for the window: enough to keep the worker busy, few enough to cost no memory."""
-
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Where to look for the focus in a light field that says nothing about disparity."""
-
-POST_RETRY_S = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,140 +55,34 @@ class ViewReady:
     progress: Progress
 
 
-@dataclass(frozen=True, eq=False)
-class ProgressReport:
-    """What the job is busy with before there is a scene."""
-
-    generation: int
-    progress: Progress
-
-
-@dataclass(frozen=True, eq=False)
-class Failed:
-    """The job ended early; the message is one line for people."""
-
-    generation: int
-    message: str
-
-
-SceneResult = SceneReady | ViewReady | ProgressReport | Failed
-Work = Callable[[SceneRequest, Callable[[], bool], Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
+SceneResult = SceneReady | ViewReady | ProgressReport[int] | Failed[int]
+SceneWork = Callable[[SceneRequest, Callable[[], bool], Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
 """What a job does: (request, should_stop, where the user looks) -> its results, in order. See `results_of`."""
 
 
-class SceneWorker:
-    """One thread that carries out the newest request.
+class SceneWorker(JobThread[SceneRequest, SceneResult]):
+    """Carries out the newest request. Results are told apart by the generation of their request.
 
-    wake is called (in that thread) when a result was posted. work is what a job does, `results_of` by default.
+    eye: where the user looks now; views near it are made first. Set by the window, read by the job.
     """
 
-    def __init__(self, wake: Callable[[], None], work: Work | None = None) -> None:
+    def __init__(self, wake: Callable[[], None], work: SceneWork | None = None) -> None:
+        """wake: called, in the thread, when a result was posted. work: what a job does, `results_of` by default."""
+        super().__init__("iibr-scene", wake, self._carry_out_scene, _failure)
         self.eye = CENTRE
-        """Where the user looks now; views near it are made first. Set by the window, read by the job."""
-        self.is_lost = False
-        """Whether the thread ended unasked. The next request starts another one."""
-        self._wake = wake
-        self._work = work or self._results_of
-        self._results: queue.Queue[SceneResult] = queue.Queue(QUEUED_RESULTS)
-        self._changed = threading.Condition()
-        self._wanted: SceneRequest | None = None
-        self._is_closed = False
-        self._thread = self._started_thread()
+        self._scene_work = work
 
-    def submit(self, request: SceneRequest) -> None:
-        """Start this job; the one before it is cancelled. A lost thread is replaced."""
-        with self._changed:
-            self._wanted = request
-            self._changed.notify()
-        if self.is_lost:
-            self._thread.join()
-            self.is_lost = False
-            self._thread = self._started_thread()
-
-    def cancel(self) -> None:
-        """Stop the present job; nothing more is heard of it."""
-        with self._changed:
-            self._wanted = None
-            self._changed.notify()
-
-    def next_result(self) -> SceneResult | None:
-        """The next result of the newest request, or None. Results of earlier requests are dropped here."""
-        while True:
-            try:
-                result = self._results.get_nowait()
-            except queue.Empty:
-                return None
-            if self._wanted is not None and result.generation == self._wanted.generation:
-                return result
-
-    def close(self) -> None:
-        """Cancel, and wait for the thread to end."""
-        with self._changed:
-            self._is_closed = True
-            self._changed.notify()
-        self._thread.join()
-
-    def _started_thread(self) -> threading.Thread:
-        thread = threading.Thread(target=self._run_and_wake, name="iibr-worker", daemon=True)
-        thread.start()
-        return thread
-
-    def _run_and_wake(self) -> None:
-        try:
-            self._run()
-        except BaseException:  # the window says so and goes on; the trace is for whoever mends it
-            traceback.print_exc()
-            self.is_lost = True
-            self._wake()
-
-    def _run(self) -> None:
-        request: SceneRequest | None = None
-        while True:
-            with self._changed:
-                while self._wanted is request and not self._is_closed:
-                    self._changed.wait()
-                request = self._wanted
-            if self._is_closed:
-                return
-            if request is not None:
-                self._carry_out(request)
-
-    def _carry_out(self, request: SceneRequest) -> None:
-        def should_stop() -> bool:
-            return self._is_closed or self._wanted is not request
-
-        try:
-            for result in self._work(request, should_stop, lambda: self.eye):
-                if should_stop():
-                    return
-                self._post(result, should_stop)
-        except Exception as error:  # the one place where a job's error can still be shown to the user
-            self._post(Failed(request.generation, message_of(error)), should_stop)
-
-    def _results_of(
-        self, request: SceneRequest, should_stop: Callable[[], bool], nearest_to: Callable[[], ViewOffset]
-    ) -> Iterator[SceneReady | ViewReady]:
-        """`results_of`, what it is busy with posted as it goes."""
-
+    def _carry_out_scene(self, job: Job[SceneRequest, SceneResult]) -> Iterator[SceneResult]:
         def report_progress(progress: Progress) -> None:
-            self._post(ProgressReport(request.generation, progress), should_stop)
+            job.post(ProgressReport(job.request.generation, progress))
 
-        return results_of(request, should_stop, nearest_to, report_progress)
-
-    def _post(self, result: SceneResult, should_stop: Callable[[], bool]) -> None:
-        while not should_stop():
-            try:
-                self._results.put(result, timeout=POST_RETRY_S)
-            except queue.Full:
-                continue
-            self._wake()
-            return
+        if self._scene_work is not None:
+            return iter(self._scene_work(job.request, job.should_stop, lambda: self.eye))
+        return results_of(job.request, job.should_stop, lambda: self.eye, report_progress)
 
 
-def message_of(error: Exception) -> str:
-    """One line for people: an input error speaks for itself, any other says what kind it is."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, InputError) else f"{type(error).__name__}: {text or 'no message'}"
+def _failure(request: SceneRequest, message: str) -> Failed[int]:
+    return Failed(request.generation, message)
 
 
 def results_of(
@@ -206,9 +91,10 @@ def results_of(
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Iterator[SceneReady | ViewReady]:
-    """Everything a job has to say, in order: the scene, then each of its views. tell: what it does until then.
+    """Everything a job has to say, in order: the scene, then each of its views.
 
-    Raises InputError for a file that cannot be opened, Cancelled where should_stop says so while it is read.
+    report_progress: is told what it does until there is a scene. Raises InputError for a file that cannot be opened,
+    Cancelled where should_stop says so while it is read.
     """
     from iibr_core.formats.light_fields.hci import is_light_field_folder
 

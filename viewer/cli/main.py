@@ -255,9 +255,8 @@ def screenshot(
     ways = DepthChoice(depth, str(disparity) if disparity else None, disparity_scale, depth_model, refine, memory)
     source = _source(path, ways, grid, focus_disparity, max_pixels, quality, inpaint)
     _require_existing(source)
-    from iibr_core.formats.images.photo import write_image
     from viewer.app.headless import HeadlessViewer
-    from viewer.app.image_export import is_float, write_picture
+    from viewer.app.image_export import export_image, is_float, settings_of
     from viewer.model.actions import Action, MoveEye, SetAperture, SetFocus, TakeSettings
     from viewer.model.saved_settings import read_settings, source_like
 
@@ -283,10 +282,7 @@ def screenshot(
             print_notes(viewer.state.scene.notes)
         viewer.do(*actions)
         pixels = viewer.screen(size or DEMO_SIZE) if ui else viewer.picture(size, is_float(output))
-    if ui:
-        write_image(output, pixels)
-    else:
-        write_picture(output, pixels, viewer.state, (pixels.shape[1], pixels.shape[0]))
+    export_image(output, pixels, None if ui else settings_of(viewer.state, (pixels.shape[1], pixels.shape[0])))
     print(output)
 
 
@@ -375,16 +371,16 @@ def demo() -> None:
 
 
 def _demo_pictures(source: Source) -> None:
-    from iibr_core.formats.images.photo import write_image
     from viewer.app.contact_sheet import contact_sheet
     from viewer.app.headless import HeadlessViewer
+    from viewer.app.image_export import export_image
 
     DEMO_FOLDER.mkdir(exist_ok=True)
     with HeadlessViewer() as viewer:
         with show_progress("reading") as show:
             viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total, progress.doing))
-        write_image(DEMO_FOLDER / "demo.png", viewer.screen(DEMO_SIZE) if viewer.has_panels else viewer.picture())
-        write_image(DEMO_FOLDER / "demo-views.png", contact_sheet(viewer))
+        export_image(DEMO_FOLDER / "demo.png", viewer.screen(DEMO_SIZE) if viewer.has_panels else viewer.picture())
+        export_image(DEMO_FOLDER / "demo-views.png", contact_sheet(viewer))
     print(f"{DEMO_FOLDER / 'demo.png'}: the viewer's window")
     print(f"{DEMO_FOLDER / 'demo-views.png'}: viewpoints above, focus from near to far below")
 

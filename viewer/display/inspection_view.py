@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from iibr_core.types import ViewUpdate
 from viewer.background.comparison_worker import (
-    ComparisonFailed,
     ComparisonInputs,
     ComparisonResult,
     EntropyReady,
     PairReady,
     PairScored,
 )
+from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle, SheetCell
@@ -129,20 +129,20 @@ class InspectionView:
         stored = self._passes.read_view(scene_view.renderer.field, *request.view)
         return None if stored is None else ComparisonInputs(scene.source.quality, stored=stored)
 
-    def take(self, seen: ComparisonResult) -> list[Action]:
-        """Show what the second request found."""
-        request = seen.request
-        match seen:
-            case PairReady():
-                self._pair = seen
+    def take(self, result: ComparisonResult) -> list[Action]:
+        """Show what was found; what is to be known of it comes back as actions."""
+        match result:
+            case PairReady(request):
+                self._pair = result
                 return [PairCompared(Pair(request.generation, _comparison_of(request), request.view))]
-            case PairScored(_, psnr_db, flip):
+            case PairScored(request, psnr_db, flip):
                 return [PairCompared(Pair(request.generation, _comparison_of(request), request.view, psnr_db, flip))]
             case EntropyReady():
-                self._entropy = seen
+                self._entropy = result
                 return []
-            case ComparisonFailed(_, message):
-                off = SetOverlay(None) if request.kind == "entropy" else Compare(None)
+            case Failed(id=request, message=message):
+                is_overlay = request is not None and request.kind == "entropy"
+                off = SetOverlay(None) if is_overlay else Compare(None)
                 return [Notify(Notice(message, is_error=True)), off]
 
     def release(self) -> None:

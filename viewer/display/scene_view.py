@@ -18,8 +18,9 @@ from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.state.app_state import CENTRE, AppState, DrawReport, Picture, Scene
+from viewer.model.state.app_state import CENTRE, AppState, DrawReport, Optics, Picture, Scene
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
@@ -166,10 +167,13 @@ class SceneView:
     def picture(self, state: AppState, size_px: tuple[int, int], is_linear: bool = False) -> NDArray[Any]:
         """The converged picture of any size, (height, width, 3): uint8, sRGB-encoded, or float32 linear light.
 
-        Before the first view it is black. The window's own picture is drawn anew after this.
+        Before the first view it is black. The window's own picture stays.
         """
-        self._drawn = None
         return self.renderer.converged_picture(state.optics, size_px, is_linear)
+
+    def start_picture(self, optics: Optics, size_px: tuple[int, int], is_linear: bool) -> PictureDrawing:
+        """The same, to be drawn a step at a time; another one, or other views, stop it."""
+        return self.renderer.start_picture(optics, size_px, is_linear)
 
     @property
     def note(self) -> str:

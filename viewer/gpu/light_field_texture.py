@@ -5,6 +5,8 @@ Colours are stored as the square root of linear light: summing light then costs 
 
 from __future__ import annotations
 
+from copy import copy
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +96,12 @@ class LightFieldTexture:
         self._fill_texels(colors, disparity if keeps_disparity else None)
         self.colors.write(self._texels, self._viewport(row, column))
         self.present[row, column], self.has_disparity[row, column] = True, keeps_disparity
+
+    def snapshot(self) -> LightFieldTexture:
+        """The same arrays, with the views that are there now: those that come later are not seen in it."""
+        now = copy(self)
+        now.present, now.has_disparity = self.present.copy(), self.has_disparity.copy()
+        return now
 
     def release(self) -> None:
         """Free the arrays."""

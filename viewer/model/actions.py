@@ -25,6 +25,7 @@ from viewer.model.state.app_state import (
 )
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.saving import SavingChanged
 
 # The viewpoint
 
@@ -382,6 +383,7 @@ Action = (
     | ResumeWork
     | WorkerLost
     | PictureDrawn
+    | SavingChanged
     | DoTask
     | TaskTaken
     | ShowPrompt

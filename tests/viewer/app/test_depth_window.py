@@ -17,7 +17,6 @@ from viewer.app.main_loop import App
 from viewer.model.actions import (
     AskForPath,
     AskToSave,
-    DoTask,
     EndGesture,
     MoveEye,
     Notify,
@@ -26,7 +25,7 @@ from viewer.model.actions import (
     ShowPrompt,
     ToggleSection,
 )
-from viewer.model.state.app_state import Notice, PalettePrompt, PathPrompt, SavePrompt, SaveTask
+from viewer.model.state.app_state import Notice, PalettePrompt, PathPrompt, SavePrompt
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetOpacity, SetOverlay, ShowEpis
 
@@ -234,20 +233,6 @@ def test_one_escape_closes_the_palette(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.prompt is None)
     viewer.until_idle()
     assert not viewer.app.state.should_quit
-
-
-def test_a_large_picture_is_announced_before_the_window_stands_still(
-    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("viewer.app.side_effects.LARGE_PIXELS", 2000)
-    out = tmp_path / "out.png"
-    frames = viewer.app.frames_shown
-    viewer.app.do(DoTask(SaveTask(str(out), (96, 64))))
-    viewer.until(lambda app: any("stands still" in notice.text for notice in app.state.notices))
-    assert not out.exists()
-    viewer.until(lambda app: out.exists())
-    assert viewer.app.frames_shown > frames
-    assert [notice.text for notice in viewer.app.state.notices] == [f"Saved {out}"]
 
 
 def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None:

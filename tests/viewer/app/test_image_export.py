@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,15 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.app.headless import HeadlessViewer
-from viewer.app.image_export import AlreadyThereError, render_pixels, save_picture
+from viewer.app.image_export import (
+    AlreadyThereError,
+    export_image,
+    is_float,
+    map_path,
+    picture_path,
+    render_pixels,
+    settings_of,
+)
 from viewer.model.actions import MoveEye, SetAperture, SetFocus
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import SaveTask, Source
@@ -44,7 +52,7 @@ def opened(photo: Path) -> Iterator[HeadlessViewer]:
 
 
 def saved(viewer: HeadlessViewer, path: Path, size_px: tuple[int, int]) -> np.ndarray:
-    save_picture(viewer._scene_view, viewer.state, SaveTask(str(path), size_px))
+    export_image(path, viewer.picture(size_px, is_float(path)), settings_of(viewer.state, size_px))
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))[..., :3]
 
 
@@ -76,13 +84,14 @@ def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
     assert np.mean(np.abs(in_parts - at_once).max(-1) > 3) < 0.005
 
 
-def test_the_window_draws_its_own_picture_again(opened: HeadlessViewer) -> None:
+def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
     scene_view, size_px = opened._scene_view, (WIDTH, HEIGHT)
     scene_view.converge(opened.state, size_px)
     shown, drawn = scene_view.renderer.read_image(), scene_view.pictures_drawn
     scene_view.picture(opened.state, (40, 30))
+    assert np.array_equal(scene_view.renderer.read_image(), shown)
     scene_view.converge(opened.state, size_px)
-    assert scene_view.pictures_drawn == drawn + 1
+    assert scene_view.pictures_drawn == drawn
     assert np.array_equal(scene_view.renderer.read_image(), shown)
 
 
@@ -92,17 +101,26 @@ def test_absurd_sizes_are_refused(opened: HeadlessViewer, size_px: tuple[int, in
         render_pixels(opened._scene_view, opened.state, size_px)
 
 
-def test_files_are_not_replaced_unasked(opened: HeadlessViewer, tmp_path: Path) -> None:
+@pytest.mark.parametrize("path_for", [picture_path, map_path])
+def test_files_are_not_replaced_unasked(tmp_path: Path, path_for: Callable[[SaveTask], Path]) -> None:
     path = tmp_path / "taken.png"
     path.write_bytes(b"mine")
     with pytest.raises(AlreadyThereError, match=r"taken\.png"):
-        saved(opened, path, (8, 8))
-    assert path.read_bytes() == b"mine"
-    save_picture(opened._scene_view, opened.state, SaveTask(str(path), (8, 8), may_replace=True))
-    assert path.read_bytes() != b"mine"
+        path_for(SaveTask(str(path), (8, 8)))
+    assert path_for(SaveTask(str(path), (8, 8), may_replace=True)) == path
+
+
+def test_a_name_without_an_ending_gets_one(tmp_path: Path) -> None:
+    assert picture_path(SaveTask(f" {tmp_path}/a ", (8, 8))) == tmp_path / "a.png"
+    assert map_path(SaveTask(f"{tmp_path}/a", (8, 8))) == tmp_path / "a.pfm"
 
 
 @pytest.mark.parametrize("name", ["", "a.jpg", "missing-folder/a.png"])
-def test_places_that_cannot_be_written(opened: HeadlessViewer, tmp_path: Path, name: str) -> None:
+def test_places_that_cannot_be_written_are_told_before_anything_is_drawn(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError):
-        save_picture(opened._scene_view, opened.state, SaveTask(str(tmp_path / name) if name else "", (8, 8)))
+        picture_path(SaveTask(str(tmp_path / name) if name else "", (8, 8)))
+
+
+def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"missing-folder.* does not exist"):
+        saved(opened, tmp_path / "missing-folder" / "a.png", (8, 8))

@@ -22,7 +22,6 @@ from iibr_core.types import GridShape, InputError
 from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import write_scene
 from viewer.background.comparison_worker import (
-    ComparisonFailed,
     ComparisonInputs,
     ComparisonJob,
     ComparisonResult,
@@ -33,6 +32,7 @@ from viewer.background.comparison_worker import (
     mean_flip,
     psnr_db,
 )
+from viewer.background.jobs import Failed
 from viewer.background.loaded_photo import load_photo
 from viewer.model.inspection_request import InspectionRequest
 from viewer.model.state.app_state import Source
@@ -84,7 +84,7 @@ def test_flip_is_0_between_equals_and_grows_with_the_difference() -> None:
 
 def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: ComparisonInputs) -> None:
     request = InspectionRequest(1, "entropy", (0, 0))
-    (seen,) = ComparisonJob().seen(request, inputs, never)
+    (seen,) = ComparisonJob().results_of(request, inputs, never)
     assert isinstance(seen, EntropyReady)
     loaded, plan = inputs.loaded, inputs.plan
     assert loaded is not None
@@ -102,7 +102,7 @@ def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: Comp
     np.testing.assert_array_equal(with_entropy.colors, without.colors)
     assert 0 <= with_entropy.entropy.min() <= with_entropy.entropy.max() <= 1
     np.testing.assert_allclose(seen.entropy, with_entropy.entropy * 255, atol=0.5)
-    middle = next(ComparisonJob().seen(replace(request, view=plan.grid.centre), inputs, never))
+    middle = next(ComparisonJob().results_of(replace(request, view=plan.grid.centre), inputs, never))
     assert isinstance(middle, EntropyReady)
     assert not middle.entropy.any(), "every ray of the middle view is the photo's own"
 
@@ -112,7 +112,7 @@ def test_fast_and_exact_are_the_views_generate_makes(inputs: ComparisonInputs) -
     assert loaded is not None
     assert plan is not None
     view = (0, 1)
-    pair, scored = ComparisonJob().seen(InspectionRequest(1, "quality", view, is_scored=True), inputs, never)
+    pair, scored = ComparisonJob().results_of(InspectionRequest(1, "quality", view, is_scored=True), inputs, never)
     assert isinstance(pair, PairReady)
     disparity = plan.field_disparity(loaded.disparity)
     for image, quality in ((pair.left, "fast"), (pair.right, "exact")):
@@ -147,7 +147,9 @@ def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(
 ) -> None:
     """The plan for viewing has its own scale and focus; views beside ground truth are made at the truth's."""
     for view in ((0, 0), (1, 2), (1, 1)):
-        pair, scored = ComparisonJob().seen(InspectionRequest(1, "truth", view, truth, is_scored=True), inputs, never)
+        pair, scored = ComparisonJob().results_of(
+            InspectionRequest(1, "truth", view, truth, is_scored=True), inputs, never
+        )
         assert isinstance(pair, PairReady)
         np.testing.assert_array_equal(pair.right, read_view(Path(truth.path), *view))
         assert isinstance(scored, PairScored)
@@ -157,7 +159,7 @@ def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(
 def test_a_stored_view_is_held_against_the_truth_as_it_is(truth: GroundTruth) -> None:
     stored = np.full((truth.height, truth.width, 3), 100, np.uint8)
     request = InspectionRequest(1, "truth", (2, 0), truth, is_scored=True)
-    pair, scored = ComparisonJob().seen(request, ComparisonInputs("fast", stored=stored), never)
+    pair, scored = ComparisonJob().results_of(request, ComparisonInputs("fast", stored=stored), never)
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)
     np.testing.assert_array_equal(pair.left, stored)
@@ -166,15 +168,20 @@ def test_a_stored_view_is_held_against_the_truth_as_it_is(truth: GroundTruth) ->
 
 def test_a_pair_is_made_once_and_scored_when_asked(inputs: ComparisonInputs, truth: GroundTruth) -> None:
     job, request = ComparisonJob(), InspectionRequest(1, "truth", (0, 0), truth)
-    assert [type(seen) for seen in job.seen(request, inputs, never)] == [PairReady]
-    assert [type(seen) for seen in job.seen(replace(request, is_scored=True), inputs, never)] == [PairScored]
+    (pair,) = job.results_of(request, inputs, never)
+    assert isinstance(pair, PairReady)
+    again, scored = job.results_of(replace(request, is_scored=True), inputs, never)
+    assert again is pair, "told again, for the first may have been dropped, but not made again"
+    assert isinstance(scored, PairScored)
     job.forget()
-    assert [type(seen) for seen in job.seen(request, inputs, never)] == [PairReady]
+    (anew,) = job.results_of(request, inputs, never)
+    assert isinstance(anew, PairReady)
+    assert anew is not pair
 
 
 def test_a_look_that_is_not_wanted_any_more_stops(inputs: ComparisonInputs) -> None:
     with pytest.raises(Cancelled):
-        list(ComparisonJob().seen(InspectionRequest(1, "quality", (0, 0)), inputs, lambda: True))
+        list(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), inputs, lambda: True))
 
 
 def test_truth_that_changed_on_disk_is_an_input_error(inputs: ComparisonInputs, truth: GroundTruth) -> None:
@@ -182,10 +189,10 @@ def test_truth_that_changed_on_disk_is_an_input_error(inputs: ComparisonInputs, 
     for path in Path(truth.path).glob("input_Cam*.png"):
         write_image(path, np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(InputError, match="changed"):
-        list(ComparisonJob().seen(request, inputs, never))
+        list(ComparisonJob().results_of(request, inputs, never))
     next(Path(truth.path).glob("input_Cam000.png")).unlink()
     with pytest.raises(InputError, match="input_Cam000"):
-        list(ComparisonJob().seen(request, inputs, never))
+        list(ComparisonJob().results_of(request, inputs, never))
 
 
 def test_one_view_of_a_folder_is_the_one_read_with_all_others(truth: GroundTruth) -> None:
@@ -208,9 +215,9 @@ def comparisons() -> Iterator[tuple[ComparisonWorker, Callable[[type[ComparisonR
         while True:
             assert woken.wait(DEADLINE_S)
             woken.clear()
-            for seen in thread.found():
-                if isinstance(seen, kind):
-                    return seen
+            while (result := thread.next_result()) is not None:
+                if isinstance(result, kind):
+                    return result
 
     yield thread, found
     thread.close()
@@ -227,7 +234,7 @@ def test_the_newest_look_wins(
     thread.want(requests[0], None)
     assert thread.wanted == requests[-1], "without inputs nothing changes"
     thread.want(None, None)
-    assert thread.found() == []
+    assert thread.next_result() is None
 
 
 def test_what_fails_is_told_in_one_line(
@@ -237,8 +244,8 @@ def test_what_fails_is_told_in_one_line(
 ) -> None:
     thread, found = comparisons
     thread.want(InspectionRequest(1, "truth", (0, 0), replace(truth, path="nowhere")), inputs)
-    failed = found(ComparisonFailed)
-    assert isinstance(failed, ComparisonFailed)
+    failed = found(Failed)
+    assert isinstance(failed, Failed)
     assert failed.message.startswith("nowhere")
     assert "\n" not in failed.message
 
@@ -248,7 +255,7 @@ def test_a_field_of_one_view_can_be_compared(inputs: ComparisonInputs) -> None:
     loaded = inputs.loaded
     assert loaded is not None
     plan = plan_literal(loaded.photo, loaded.disparity, GridShape(1, 1))
-    pair = next(ComparisonJob().seen(InspectionRequest(1, "quality", (0, 0)), replace(inputs, plan=plan), never))
+    pair = next(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), replace(inputs, plan=plan), never))
     assert isinstance(pair, PairReady)
     np.testing.assert_array_equal(pair.left, np.rint(loaded.photo.pixels * 255))
 
@@ -260,7 +267,7 @@ def test_the_middle_view_is_the_photo_whatever_its_disparity(inputs: ComparisonI
     torn = np.random.default_rng(5).uniform(-30, 30, loaded.photo.size).astype(np.float32)
     loaded = replace(loaded, disparity=replace(loaded.disparity, values=torn))
     plan = plan_literal(loaded.photo, loaded.disparity, GRID)
-    pair, scored = ComparisonJob().seen(
+    pair, scored = ComparisonJob().results_of(
         InspectionRequest(1, "quality", GRID.centre, is_scored=True), replace(inputs, loaded=loaded, plan=plan), never
     )
     assert isinstance(pair, PairReady)

@@ -12,15 +12,14 @@ import pytest
 
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewUpdate
+from viewer.background.jobs import QUEUED_RESULTS, Failed
 from viewer.background.scene_worker import (
-    QUEUED_RESULTS,
-    Failed,
     SceneReady,
     SceneRequest,
     SceneResult,
+    SceneWork,
     SceneWorker,
     ViewReady,
-    Work,
     results_of,
 )
 from viewer.model.state.app_state import CENTRE, Progress, Source
@@ -32,7 +31,7 @@ VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)
 class Desk:
     """A worker, and the window's end of it: waits for wake-ups instead of polling."""
 
-    def __init__(self, work: Work | None = None) -> None:
+    def __init__(self, work: SceneWork | None = None) -> None:
         self._woken = threading.Semaphore(0)
         self.worker = SceneWorker(self._woken.release, work)
 
@@ -52,7 +51,7 @@ class Desk:
 def desk_for() -> Iterator[Callable[..., Desk]]:
     desks: list[Desk] = []
 
-    def make(work: Work | None = None) -> Desk:
+    def make(work: SceneWork | None = None) -> Desk:
         desks.append(Desk(work))
         return desks[-1]
 

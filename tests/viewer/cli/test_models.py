@@ -14,7 +14,8 @@ import typer
 from iibr_core.depth.models.catalog import KNOWN_MODELS
 from iibr_core.types import GridShape
 from tests.viewer.conftest import write_scene
-from viewer.background.scene_worker import ProgressReport, SceneReady, SceneRequest, SceneWorker, results_of
+from viewer.background.jobs import ProgressReport
+from viewer.background.scene_worker import SceneReady, SceneRequest, SceneWorker, results_of
 from viewer.cli.options import depth_start_from_text, refine_from_text
 from viewer.model.state.app_state import CENTRE, Progress, Source
 
@@ -119,7 +120,7 @@ def test_the_worker_tells_what_it_is_busy_with_before_the_scene(tmp_path: Path) 
     worker.close()
     assert isinstance(results[0], ProgressReport)
     assert results[0].progress.doing
-    assert results[0].generation == 1
+    assert results[0].id == 1
 
 
 def run_command(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:

@@ -75,7 +75,7 @@ def test_no_search_ends_outside_its_tiles_span(
     field, view = renderer.field, lens(renderer, Optics(eye))
     assert field is not None
     field.range_px = -10.0, 11.0  # wider than what is there: something can be saved
-    passes._find_march_intervals(field, view, WHOLE, targets)
+    passes._find_march_intervals(field, view, WHOLE, WHOLE, targets)
     spans = np.concatenate([read(texture) for texture in targets.spans.textures], axis=-1)
     flat = spans[..., 1] < 0
     assert 0.1 < flat.mean() < 0.9

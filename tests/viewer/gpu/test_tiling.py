@@ -99,3 +99,74 @@ def test_light_between_the_steps_of_eight_bits(renderer: Renderer) -> None:
     light = renderer.converged_picture(OPTICS[1], (160, 120), is_linear=True)
     steps = srgb_from_linear(light) * 255
     assert np.mean(np.abs(steps - np.rint(steps)) > 0.1) > 0.5
+
+
+@pytest.mark.parametrize("is_linear", [False, True])
+@pytest.mark.parametrize("optics", OPTICS)
+def test_a_picture_drawn_in_steps_is_the_one_drawn_at_once(
+    renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch, optics: Optics, is_linear: bool
+) -> None:
+    SCENE.fill(renderer, GRID)
+    monkeypatch.setattr(gl, "max_texture_size", 256)
+    at_once = renderer.converged_picture(optics, LARGE, is_linear)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-5)
+    drawing = renderer.start_picture(optics, LARGE, is_linear)
+    seen = [drawing.progress]
+    while not drawing.is_done:
+        drawing.advance(budget_s=0.0)
+        seen.append(drawing.progress)
+    assert len(seen) > 50, "a step is small"
+    assert seen == sorted(seen)
+    assert (seen[0], seen[-1]) == (0.0, 1.0)
+    np.testing.assert_array_equal(drawing.image, at_once)
+
+
+def test_the_picture_on_the_screen_is_drawn_between_the_steps(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dragging while a picture is saved: neither disturbs the other."""
+    SCENE.fill(renderer, GRID)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
+    saved, alone = Optics(ViewOffset(0.3, 0.2), aperture_diameter=4.0), []
+    expected = renderer.converged_picture(saved, (160, 120), is_linear=False)
+    eyes = [Optics(ViewOffset(0.1 * i, -0.2), dolly=0.5, aperture_diameter=2.0) for i in range(5)]
+    for optics in eyes:
+        renderer.render(optics, (80, 60))
+        alone.append(renderer.read_image())
+    drawing = renderer.start_picture(saved, (160, 120), is_linear=False)
+    for optics, image in zip(eyes, alone):
+        drawing.advance(budget_s=0.0)
+        renderer.render(optics, (80, 60))
+        np.testing.assert_array_equal(renderer.read_image(), image)
+    assert not drawing.is_done
+    drawing.advance()
+    np.testing.assert_array_equal(drawing.image, expected)
+    np.testing.assert_array_equal(renderer.read_image(), alone[-1])
+
+
+def test_views_that_come_while_a_picture_is_drawn_are_not_seen_in_it(renderer: Renderer) -> None:
+    SCENE.open(renderer, GRID)
+    for view in ((0, 0), (2, 2)):
+        SCENE.upload(renderer, GRID, *view)
+    optics = Optics(ViewOffset(0.3, 0.2), aperture_diameter=4.0)
+    expected = renderer.converged_picture(optics, (160, 120), is_linear=False)
+    drawing = renderer.start_picture(optics, (160, 120), is_linear=False)
+    drawing.advance(budget_s=0.0)
+    SCENE.upload(renderer, GRID, 4, 4)
+    drawing.advance()
+    assert drawing.is_done
+    np.testing.assert_array_equal(drawing.image, expected)
+
+
+def test_another_field_stops_a_picture(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    for change in (
+        lambda: SCENE.upload(renderer, GRID, 2, 2),
+        lambda: SCENE.fill(renderer, GRID),
+    ):
+        drawing = renderer.start_picture(Optics(aperture_diameter=4.0), (160, 120), is_linear=False)
+        drawing.advance(budget_s=0.0)
+        change()
+        assert drawing.is_stopped
+        drawing.advance()
+        assert not drawing.is_done

@@ -15,7 +15,7 @@ from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
 from tests.viewer.model.test_history import after
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.headless import HeadlessViewer
-from viewer.app.image_export import save_map, settings_of
+from viewer.app.image_export import export_map, settings_of
 from viewer.app.input import Keys, Pointer, actions_from_drop, actions_from_keys, actions_from_pointer
 from viewer.background.loaded_photo import apply_depth_settings, load_photo, make_plan
 from viewer.background.scene_worker import SceneRequest, results_of
@@ -26,7 +26,7 @@ from viewer.model.opening import action_for_path
 from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
-from viewer.model.state.app_state import AppState, DepthOrigin, PathPrompt, SavePrompt, SaveTask, Source
+from viewer.model.state.app_state import AppState, DepthOrigin, PathPrompt, SavePrompt, Source
 from viewer.model.state.depth_editing import (
     Brush,
     DepthSettings,
@@ -313,10 +313,10 @@ def test_a_saved_map_is_the_same_scene_when_it_is_opened_again(photo_path: Path,
     out = tmp_path / "edited.pfm"
     with HeadlessViewer("egl") as viewer:
         viewer.open(source, 1.0, lambda progress: None, edits)
-        save_map(viewer._scene_view, SaveTask(str(out), (1, 1), what="map"))
         loaded = viewer._scene_view.loaded
         assert loaded is not None
         wanted = loaded.disparity.values
+        assert export_map(out, wanted) == f"Saved {out}."
     np.testing.assert_array_equal(read_disparity(out, ImageSize(HEIGHT, WIDTH)).values, wanted)
     again = load_photo(replace(source, disparity_path=str(out), refine=0.0))
     np.testing.assert_array_equal(again.disparity.values, wanted)

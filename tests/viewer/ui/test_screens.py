@@ -47,6 +47,8 @@ from viewer.model.state.app_state import (
     Section,
     Source,
 )
+from viewer.model.state.saving import Saving, SavingChanged
+from viewer.ui.overlays.notices import saving_text
 from viewer.ui.style import DARK, LIGHT
 
 SIZE = 640, 880
@@ -89,6 +91,7 @@ def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section
         AskToSave(),
         AskForPath("photo"),
         Notify(Notice("damaged.png: cut off", is_error=True)),
+        SavingChanged(Saving("large.png", 0.4, waiting=1)),
         ShowTiltHandles(True),
         SetHover(Hover(48.0, 32.0, 1.5)),
     ],
@@ -177,3 +180,9 @@ def test_settings_on_offer_have_a_button(viewer: HeadlessViewer) -> None:
     offer = replace(plain, offer=SavedSettings(viewer.state.optics, 1.0, Source(""), (1, 1)))
     viewer.do(Notify(plain))
     assert changed_after(viewer, DismissNotice(plain), Notify(offer)).sum() > 5 * ENOUGH_PIXELS
+
+
+def test_what_is_being_saved_in_words() -> None:
+    assert saving_text(Saving("a.png", 0.234)) == "Drawing a.png, 23 %"
+    assert saving_text(Saving("a.png", 0.0, 2)) == "Drawing a.png, 0 %, 2 more to save"
+    assert saving_text(Saving("a.exr", 1.0)) == "Writing a.exr"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 
@@ -12,10 +13,10 @@ import moderngl
 from iibr_core.types import ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.lens import Lens
+from viewer.gpu.refocus.lens import WHOLE, Lens, PictureCell
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
 from viewer.gpu.refocus.view_sampling import ApertureSample, clamp_to_grid, nearest_present
-from viewer.gpu.render_targets import RenderTargets
+from viewer.gpu.render_targets import RenderTarget, RenderTargets
 
 MAX_PASSES = 16
 """A still picture is the mean of at most so many passes, each with its samples elsewhere."""
@@ -87,6 +88,12 @@ def r2_sequence(count: int) -> list[ViewOffset]:
 HIGHLIGHT_SPREAD = 2.0
 """Samples of many passes lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""
 
+PINHOLE_SAMPLES = 8
+"""What the pinhole view costs a pixel, in samples of the aperture, about: it searches."""
+
+LEAST_ROWS = 16
+"""Of a step: fewer save nothing, for a draw has its own cost."""
+
 
 class Accumulator:
     """Sums light of a field into targets."""
@@ -112,7 +119,7 @@ class Accumulator:
 
         seconds_per_sample: how long one is thought to take; no more are drawn at once than there is time for.
         """
-        self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
+        self._disable_tests()
         if not field.present.any():
             for target in (targets.light, targets.blurred):
                 target.framebuffer.clear()
@@ -126,6 +133,22 @@ class Accumulator:
                 break
         self._ctx.disable(moderngl.BLEND)
 
+    def sum_up_in_steps(
+        self,
+        field: LightFieldTexture,
+        accumulation: ProgressiveAccumulation,
+        targets: RenderTargets,
+        pixels_per_step: float,
+    ) -> Iterator[None]:
+        """All passes, in steps of about so many pixels and samples; between two, anything else may be drawn.
+
+        The sum is the same to the last bit however small the steps are: they part rows, never samples.
+        """
+        if not field.present.any():
+            self.sum_up(field, accumulation, targets, len(accumulation.places))
+        while not accumulation.is_complete:
+            yield from self._batch_steps(field, accumulation, targets, MAX_SAMPLES, pixels_per_step)
+
     def finish(
         self,
         accumulation: ProgressiveAccumulation,
@@ -134,7 +157,7 @@ class Accumulator:
         is_linear: bool,
     ) -> None:
         """Smooth what is summed up and write it. is_linear: as light, unbounded, instead of sRGB-encoded."""
-        self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
+        self._disable_tests()
         if accumulation.lens.keeps_layers:
             narrowing = _smoothing_spread(accumulation.lens) / math.sqrt(max(accumulation.pass_index, 1))
             self.passes.smooth(accumulation.lens, targets, min(narrowing, 1.0))
@@ -144,21 +167,43 @@ class Accumulator:
     def _draw_some(
         self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets, count: int
     ) -> None:
-        """Draw the next samples; the pinhole's share comes with the first of a pass."""
+        """Draw the next samples at once."""
+        for _ in self._batch_steps(field, accumulation, targets, count, math.inf):
+            pass
+
+    def _batch_steps(
+        self,
+        field: LightFieldTexture,
+        accumulation: ProgressiveAccumulation,
+        targets: RenderTargets,
+        count: int,
+        pixels_per_step: float,
+    ) -> Iterator[None]:
+        """Draw the next samples, at most count; the pinhole's share comes with the first of a pass."""
         lens = accumulation.lens
         if accumulation.at == 0:
             self._start_pass(field, accumulation, targets)
         batch = _first_batch(accumulation.samples[accumulation.at :][:count], field)
+        has_pinhole = accumulation.at == 0 and lens.aperture_share < 1
         layers = {"SHARP": targets.light, "BLURRED": targets.blurred} if lens.keeps_layers else {"": targets.light}
         for layer, target in layers.items():
-            if accumulation.at == 0 and lens.aperture_share < 1:
-                self.passes.draw_pinhole(field, lens, accumulation.within_px, target, targets, layer)
-            if batch:
-                self.passes.draw_aperture(field, lens, batch, accumulation.sparse, target, targets, layer)
+            keeps = target.holds_sum
+            for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
+                self._disable_tests()
+                self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, layer, rows, keeps)
+                yield
+            keeps = target.holds_sum
+            for rows in _row_bands(target, pixels_per_step / len(batch)) if batch else ():
+                self._disable_tests()
+                self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, layer, rows, keeps)
+                yield
         accumulation.at += len(batch)
         accumulation.done += max(len(batch), 1)
         if accumulation.at >= len(accumulation.samples):
             accumulation.pass_index, accumulation.at = accumulation.pass_index + 1, 0
+
+    def _disable_tests(self) -> None:
+        self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
 
     def _start_pass(
         self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets
@@ -182,6 +227,15 @@ class Accumulator:
             self.passes.update_fallback_views(field)
         if lens.keeps_layers:
             self.passes.find_defocus(field, lens, accumulation.samples or [_eye_sample(lens, field)], targets)
+
+
+def _row_bands(target: RenderTarget, pixels: float) -> list[PictureCell]:
+    """The rows of a target in bands of so many pixels, at least LEAST_ROWS each, in texture coordinates of it."""
+    width, height = target.framebuffer.size
+    if width * height <= pixels:
+        return [WHOLE]
+    rows = max(int(pixels / width), LEAST_ROWS)
+    return [PictureCell(0.0, top / height, 1.0, min(top + rows, height) / height) for top in range(0, height, rows)]
 
 
 def _smoothing_spread(lens: Lens) -> float:

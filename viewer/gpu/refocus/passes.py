@@ -62,20 +62,26 @@ class Passes:
         field: LightFieldTexture,
         lens: Lens,
         within_px: ViewOffset,
-        target: RenderTarget,
         targets: RenderTargets,
         layer: str,
+        rows: PictureCell,
+        keeps: bool,
     ) -> None:
-        """Add the share of the pinhole view. layer: "SHARP", "BLURRED", or "" for all light.
+        """Add the share of the pinhole view in some rows of its target. layer: "SHARP", "BLURRED", or "" for all light.
 
-        within_px: where in a pixel of the target it is asked which surface shows, from the middle.
+        within_px: where in a pixel of the target it is asked which surface shows, from the middle. keeps: whether to
+        add to what is there; else it is replaced.
         """
         kinds = ("FLAT", "EDGES") if self.adaptive and field.has_disparity.any() else ("",)
-        keeps, size_px = target.holds_sum, target.framebuffer.size
+        target = _target_of(layer, targets)
+        size_px = target.framebuffer.size
         for cell in _cells(field, lens):
+            drawn = _rows_of(lens.part.seen(cell), rows)
+            if drawn is None:
+                continue
             if "FLAT" in kinds:
-                self._find_march_intervals(field, lens, cell, targets)
-            target.framebuffer.scissor = _pixels_of(lens.part.seen(cell), *size_px)
+                self._find_march_intervals(field, lens, cell, drawn, targets)
+            target.framebuffer.scissor = _pixels_of(drawn, *size_px)
             target.add(keeps)
             for kind in kinds:
                 self._draw_pinhole_tiles(field, lens, cell, within_px, targets, layer, kind)
@@ -93,7 +99,7 @@ class Passes:
     ) -> None:
         """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES"."""
         program, quad = self._programs.get("pinhole.frag", _switches(lens, layer, lens.has_dolly and "DOLLY", kind))
-        target = targets.blurred if layer == "BLURRED" else targets.light
+        target = _target_of(layer, targets)
         width, height = target.framebuffer.size
         self._set_field(program, field, lens)
         self._set_sources(program, field, lens, cell)
@@ -109,9 +115,11 @@ class Passes:
         quad.render(moderngl.TRIANGLES, vertices=6 * tiles if kind else 3)
 
     def _find_march_intervals(
-        self, field: LightFieldTexture, lens: Lens, cell: PictureCell, targets: RenderTargets
+        self, field: LightFieldTexture, lens: Lens, cell: PictureCell, drawn: PictureCell, targets: RenderTargets
     ) -> None:
-        """Fill the tiles of a cell with the first and the last step of each march that can find a surface."""
+        """Fill the tiles of a cell with the first and the last step of each march that can find a surface. drawn: what of
+        it is asked for.
+        """
         program, quad = self._programs.get("march_intervals.frag", _switches(lens, "", lens.has_dolly and "DOLLY"))
         self._set_field(program, field, lens)
         self._set_sources(program, field, lens, cell)
@@ -119,7 +127,7 @@ class Passes:
         width, height = targets.blurred.framebuffer.size
         program.set_uniforms(pixel_uv=(lens.part.width / width, lens.part.height / height))
         target = targets.spans
-        target.framebuffer.scissor = _covering_pixels(lens.part.seen(cell), *target.framebuffer.size)
+        target.framebuffer.scissor = _covering_pixels(drawn, *target.framebuffer.size)
         self._ctx.disable(moderngl.BLEND)
         target.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
@@ -153,11 +161,12 @@ class Passes:
         lens: Lens,
         samples: list[ApertureSample],
         sparse: dict[ViewOffset, float],
-        target: RenderTarget,
         targets: RenderTargets,
         layer: str,
+        rows: PictureCell,
+        keeps: bool,
     ) -> None:
-        """Add samples of the lens, at most MAX_SAMPLES. layer: see `draw_pinhole`.
+        """Add samples of the lens, at most MAX_SAMPLES. layer, rows, keeps: see `draw_pinhole`.
 
         sparse: weights of the samples that suffice where all is sharp; those among `samples` must come first.
         """
@@ -171,6 +180,7 @@ class Passes:
         )
         self._set_field(program, field, lens)
         self._set_samples(program, field, lens, samples, sparse)
+        target = _target_of(layer, targets)
         program.set_uniforms(share=lens.aperture_share, nudge=_nudge(target, layer))
         if tiles:
             self._bind(targets.tiles.textures[0], "tiles")
@@ -178,8 +188,10 @@ class Passes:
             _set_declared(
                 program, tiles=UNITS["tiles"], sparse_count=sparse_count, sparse_up_to_px=lens.sparse_up_to_px
             )
-        target.add()
+        target.framebuffer.scissor = _pixels_of(rows, *target.framebuffer.size)
+        target.add(keeps)
         quad.render(moderngl.TRIANGLES, vertices=3)
+        target.framebuffer.scissor = 0, 0, *target.framebuffer.size
 
     def find_defocus(
         self, field: LightFieldTexture, lens: Lens, samples: list[ApertureSample], targets: RenderTargets
@@ -360,6 +372,16 @@ def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[PictureCell]:
     for top, bottom in pairwise(down):
         for left, right in pairwise(across):
             yield PictureCell(left, top, right, bottom)
+
+
+def _target_of(layer: str, targets: RenderTargets) -> RenderTarget:
+    return targets.blurred if layer == "BLURRED" else targets.light
+
+
+def _rows_of(cell: PictureCell, rows: PictureCell) -> PictureCell | None:
+    """What of a cell lies in these rows, None if nothing."""
+    top, bottom = max(cell.top, rows.top), min(cell.bottom, rows.bottom)
+    return PictureCell(cell.left, top, cell.right, bottom) if top < bottom else None
 
 
 def _pixels_of(cell: PictureCell, width: int, height: int) -> tuple[int, int, int, int]:

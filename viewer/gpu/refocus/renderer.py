@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -30,10 +28,10 @@ from viewer.gpu.refocus.frame_budget import (
     choose_quality_level,
     stretch_image,
 )
-from viewer.gpu.refocus.lens import TargetWindow, lens_of
+from viewer.gpu.refocus.lens import lens_of
 from viewer.gpu.refocus.passes import TILE_PX
-from viewer.gpu.refocus.tiling import PictureTile, picture_tiles
-from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind
+from viewer.gpu.refocus.picture_drawing import PictureDrawing, read_pixels
+from viewer.gpu.render_targets import RenderTargets
 from viewer.model.state.app_state import DrawReport, Optics
 
 KEPT_SIZES = 2
@@ -67,6 +65,7 @@ class Renderer:
         self._refining_s = 4 * gl.seconds_per_fetch
         self._level = 0
         self._errors = ErrorEstimate()
+        self._picture: PictureDrawing | None = None
 
     @property
     def adaptive(self) -> bool:
@@ -85,13 +84,17 @@ class Renderer:
         """
         field, self.note = _field_that_fits(self.ctx, grid, width, height, hdr, with_disparity)
         if self.field is not None:
+            self._stop_picture()
             self.field.release()
         self.field = field
         self._accumulation = None
 
     def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Add or replace one view; see LightFieldTexture.upload."""
-        self._open_field().upload(row, column, colors, disparity)
+        field = self._open_field()
+        if 0 <= row < field.grid.rows and 0 <= column < field.grid.columns and field.present[row, column]:
+            self._stop_picture()
+        field.upload(row, column, colors, disparity)
         self._accumulation = None
 
     def render(
@@ -155,17 +158,25 @@ class Renderer:
             self._errors.add(self.read_image(), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
-    def converged_picture(self, optics: Optics, size_px: Size, is_linear: bool) -> NDArray[np.uint8 | np.float32]:
-        """The picture with every sample it will get, (height, width, 3), of any size: drawn part by part.
+    def start_picture(self, optics: Optics, size_px: Size, is_linear: bool) -> PictureDrawing:
+        """A picture with every sample it will get, of any size, to be drawn step by step; one at a time.
 
-        is_linear: float32 linear light, not cut off at white; else sRGB-encoded uint8.
+        is_linear: float32 linear light, not cut off at white; else sRGB-encoded uint8. What was drawn last stays as it
+        is. Another field, or another image of a view that is there, stops it.
         """
-        width, height = size_px
-        image = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
-        for part in picture_tiles(size_px, self.gl.max_texture_size):
-            drawn = self._converged_part(optics, size_px, part, is_linear)
-            image[part.kept] = drawn[part.kept_of_drawn]
-        return image
+        self._stop_picture()
+        accumulator = Accumulator(self.ctx, self.programs)
+        accumulator.passes.adaptive = self.adaptive
+        whole = self._accumulation_of(optics, size_px, BEST_QUALITY)
+        self._picture = PictureDrawing(self.gl, accumulator, self._open_field(), whole, is_linear)
+        return self._picture
+
+    def converged_picture(self, optics: Optics, size_px: Size, is_linear: bool) -> NDArray[np.uint8 | np.float32]:
+        """The picture of `start_picture`, (height, width, 3), at once."""
+        drawing = self.start_picture(optics, size_px, is_linear)
+        drawing.advance()
+        self._stop_picture()
+        return drawing.image
 
     @property
     def is_converged(self) -> bool:
@@ -209,6 +220,7 @@ class Renderer:
 
     def release(self) -> None:
         """Free every GL object."""
+        self._stop_picture()
         self.programs.release()
         self._accumulator.release()
         for targets in self._targets.values():
@@ -255,19 +267,10 @@ class Renderer:
         self._accumulator.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
         self._shown = targets
 
-    def _converged_part(
-        self, optics: Optics, size_px: Size, part: PictureTile, is_linear: bool
-    ) -> NDArray[np.uint8 | np.float32]:
-        whole = self._accumulation_of(optics, size_px, BEST_QUALITY)
-        accumulation = replace(whole, lens=replace(whole.lens, part=TargetWindow(*part.window)), size_px=part.size_px)
-        targets = self._targets_of(part.size_px)
-        self._accumulator.sum_up(self._open_field(), accumulation, targets, len(accumulation.places))
-        target = RenderTarget(self.ctx, [self.ctx.texture(part.size_px, 4, dtype="f4" if is_linear else "f1")])
-        self._accumulator.finish(accumulation, targets, target.framebuffer, is_linear)
-        pixels = read_pixels(target.framebuffer, np.float32 if is_linear else np.uint8)
-        unbind(self.ctx)
-        target.release()
-        return pixels
+    def _stop_picture(self) -> None:
+        if self._picture is not None:
+            self._picture.stop()
+            self._picture = None
 
     def _work(self, optics: Optics, size_px: Size, level: QualityLevel) -> DrawCost:
         field = self._open_field()
@@ -289,13 +292,6 @@ class Renderer:
 def scale_size(size_px: Size, scale: float) -> Size:
     """That size times scale, at least one pixel."""
     return max(round(size_px[0] * scale), 1), max(round(size_px[1] * scale), 1)
-
-
-def read_pixels(framebuffer: moderngl.Framebuffer, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
-    """What was drawn, (H, W, 3), row 0 at the top."""
-    width, height = framebuffer.size
-    raw = framebuffer.read(components=3, alignment=1, dtype="f1" if dtype is np.uint8 else "f4")
-    return np.frombuffer(raw, dtype).reshape(height, width, 3)[::-1].copy()
 
 
 def _field_that_fits(

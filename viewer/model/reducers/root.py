@@ -75,6 +75,7 @@ from viewer.model.state.app_state import (
 )
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.saving import SavingChanged
 
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
 
@@ -141,6 +142,8 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, prompt=SavePrompt(_path_beside(state, what), size_px, what=what))
         case PictureDrawn(report):
             return replace(state, report=report)
+        case SavingChanged(saving):
+            return replace(state, saving=saving)
         case SetHover(hover):
             return move_pointer(state, hover)
         case Notify(notice):

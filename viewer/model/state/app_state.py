@@ -15,6 +15,7 @@ from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.inspection import Inspection
+from viewer.model.state.saving import CancelSaveTask, Saving
 
 CENTRE = ViewOffset(0.0, 0.0)
 AS_FOUND = DepthSettings()
@@ -313,7 +314,7 @@ class ReadTruthTask:
     path: str
 
 
-Task = ChooseTask | SaveTask | ReadMaskTask | ReadTruthTask
+Task = ChooseTask | SaveTask | CancelSaveTask | ReadMaskTask | ReadTruthTask
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
 Theme = Literal["dark", "light"]
@@ -351,7 +352,7 @@ class AppState:
 
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
-    depth: what is made of the scene's depth; stroke: of the brush, while it is drawn.
+    depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saving: None without.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -377,6 +378,7 @@ class AppState:
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None
+    saving: Saving | None = None
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,15 @@
-"""Notices over the lower left of the picture, each with a button that takes it away, and one for what it offers."""
+"""Notices over the lower left of the picture, each with a button that takes it away, and one for what it offers; above
+them the picture that is being saved.
+"""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DismissNotice, TakeSettings
+from viewer.model.actions import Action, DismissNotice, DoTask, TakeSettings
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.saving import CancelSaveTask, Saving
 from viewer.ui.style import Palette, palette_of
 
 NOTICE_WIDTH = 420.0
@@ -24,7 +27,7 @@ _FLAGS = (
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
     """Build the notices, the newest at the bottom; what was pressed comes back as actions."""
-    if not state.notices:
+    if not state.notices and state.saving is None:
         return []
     margin = MARGIN * layout.ui_scale
     right, bottom = layout.panel.x - margin, layout.window.height - margin
@@ -40,8 +43,29 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     most = max(bottom - margin / 2, LEAST_HEIGHT * layout.ui_scale)
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
     imgui.begin("notices", None, _FLAGS)
-    actions = [action for i, notice in enumerate(state.notices) for action in _notice(i, notice, palette)]
+    actions = _saving(state.saving, layout) if state.saving is not None else []
+    actions += [action for i, notice in enumerate(state.notices) for action in _notice(i, notice, palette)]
     imgui.end()
+    return actions
+
+
+def saving_text(saving: Saving) -> str:
+    """What is being saved, and how far it is: "Drawing a.png, 23 %, 1 more to save"."""
+    words = f"Drawing {saving.name}, {saving.drawn:.0%}".replace("%", " %")
+    words = words if saving.drawn < 1 else f"Writing {saving.name}"
+    return f"{words}, {saving.waiting} more to save" if saving.waiting else words
+
+
+def _saving(saving: Saving, layout: Layout) -> list[Action]:
+    """A bar, and a button as long as it can still be given up."""
+    actions: list[Action] = []
+    imgui.progress_bar(saving.drawn, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+    if saving.drawn < 1:
+        if imgui.button("Cancel##saving"):
+            actions.append(DoTask(CancelSaveTask()))
+        imgui.same_line()
+    imgui.align_text_to_frame_padding()
+    imgui.text_wrapped(saving_text(saving))
     return actions
 
 

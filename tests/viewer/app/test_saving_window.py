@@ -1,0 +1,151 @@
+"""Pictures saved in a real window: it lives on meanwhile; what is given up leaves nothing behind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.types import GridShape, InputError, ViewOffset
+from tests.viewer.conftest import Driver, write_scene
+from viewer.app.image_export import render_pixels
+from viewer.model.actions import Action, DoTask, MoveEye, OpenPath, SetAperture, SetDepthStrength
+from viewer.model.saved_settings import read_settings
+from viewer.model.state.app_state import SavePrompt, SaveTask, Source
+from viewer.model.state.saving import CancelSaveTask
+
+SIZE = 300, 200
+LARGE = 1500, 1000
+
+
+@pytest.fixture
+def viewer(open_window: Callable[..., Driver], photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Driver:
+    """One small step of a picture a turn, so that there are many turns however fast the machine is."""
+    monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    driver.send("mousemove", *driver.position(0.1, 0.1))
+    driver.app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0))
+    driver.until_idle()
+    return driver
+
+
+def start(viewer: Driver, path: Path, size_px: tuple[int, int] = LARGE) -> None:
+    """Ask for a picture, and wait until some of it is drawn."""
+    viewer.app.do(DoTask(SaveTask(str(path), size_px)))
+    viewer.until(lambda app: app.state.saving is not None and app.state.saving.drawn > 0)
+
+
+def texts(viewer: Driver) -> list[str]:
+    return [notice.text for notice in viewer.app.state.notices]
+
+
+@pytest.mark.parametrize("name", ["out.png", "out.exr"])
+def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: Path, name: str) -> None:
+    app, out = viewer.app, tmp_path / name
+    asked = app.state
+    expected = render_pixels(app.scene_view, asked, SIZE, as_float=name.endswith("exr"))
+    app.do(DoTask(SaveTask(str(out), SIZE)))
+    app.step()
+    frames, drawn, turns, shares = app.frames_shown, app.scene_view.pictures_drawn, 0, []
+    while not texts(viewer):
+        app.do(MoveEye(ViewOffset(0.01 * (turns % 50), 0.2)))
+        app.step()
+        turns += 1
+        if app.state.saving is not None:
+            shares.append(app.state.saving.drawn)
+            assert app.state.saving.drawn == 1 or app.wait_s == 0.0
+    assert texts(viewer) == [f"Saved {out}"]
+    assert app.state.saving is None
+    assert shares == sorted(shares)
+    assert len(set(shares)) > 5
+    assert min(app.frames_shown - frames, app.scene_view.pictures_drawn - drawn) > len(set(shares))
+    settings = read_settings(out)
+    assert (settings.optics, settings.size_px) == (asked.optics, SIZE), "as it was when it was asked for"
+    shade = 0.51 / 255 if name.endswith("png") else 1e-6
+    np.testing.assert_allclose(read_photo(out).pixels, expected / (255 if name.endswith("png") else 1), atol=shade)
+
+
+def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_path: Path) -> None:
+    before = set(tmp_path.iterdir())
+    start(viewer, tmp_path / "large.png")
+    viewer.app.do(DoTask(SaveTask(str(tmp_path / "next.png"), (48, 32))))
+    viewer.until(lambda app: app.state.saving is not None and app.state.saving.waiting == 1)
+    viewer.press("Cancel##saving", "notices")
+    viewer.until(lambda app: app.state.saving is None or app.state.saving.name == "next.png")
+    viewer.until(lambda app: app.state.saving is None)
+    assert texts(viewer) == [f"Saved {tmp_path / 'next.png'}"]
+    assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
+    viewer.app.do(DoTask(CancelSaveTask()))
+    viewer.until_idle()
+
+
+def test_pictures_are_saved_in_the_order_in_which_they_were_asked_for(viewer: Driver, tmp_path: Path) -> None:
+    eyes = [ViewOffset(0.0, s) for s in (-1.0, 0.0, 1.0)]
+    for i, eye in enumerate(eyes):
+        viewer.app.do(MoveEye(eye), DoTask(SaveTask(str(tmp_path / f"{i}.png"), (48, 32))))
+        viewer.app.step()
+    viewer.until(lambda app: len(app.state.notices) == 3 and app.state.saving is None)
+    assert texts(viewer) == [f"Saved {tmp_path / f'{i}.png'}" for i in range(3)]
+    assert [read_settings(tmp_path / f"{i}.png").optics.eye for i in range(3)] == eyes
+
+
+def test_a_file_that_waits_to_be_written_is_replaced_only_when_that_is_said(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / "large.png"
+    start(viewer, out)
+    viewer.app.do(DoTask(SaveTask(str(out), (48, 32))))
+    viewer.until(lambda app: app.state.prompt == SavePrompt(str(out), (48, 32), already_there=True))
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("change", ["scene", "depth"])
+def test_a_picture_whose_views_go_is_given_up(viewer: Driver, tmp_path: Path, change: str) -> None:
+    other = write_scene(tmp_path, "other", seed=1)
+    action: Action = SetDepthStrength(1.5, is_finished=True)
+    if change == "scene":
+        action = OpenPath(Source(str(other), grid=GridShape(3, 3)))
+    before = set(tmp_path.iterdir())
+    start(viewer, tmp_path / "large.png")
+    viewer.app.do(action)
+    viewer.until(lambda app: app.state.saving is None)
+    assert any("large.png: not saved" in text for text in texts(viewer))
+    viewer.until_idle()
+    assert set(tmp_path.iterdir()) == before
+    viewer.app.do(DoTask(SaveTask(str(tmp_path / "small.png"), (48, 32))))
+    viewer.until(lambda app: any("Saved" in text for text in texts(viewer)))
+
+
+def test_closing_the_window_gives_up_what_is_being_drawn(viewer: Driver, tmp_path: Path) -> None:
+    before = set(tmp_path.iterdir())
+    start(viewer, tmp_path / "large.png")
+    viewer.close()
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_closing_the_window_waits_for_what_is_being_written(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / "out.png"
+    viewer.app.do(DoTask(SaveTask(str(out), SIZE)))
+    viewer.until(lambda app: app.state.saving is not None and app.state.saving.drawn == 1)
+    viewer.close()
+    assert read_photo(out).pixels.shape == (200, 300, 3)
+    assert not list(tmp_path.glob(".out*"))
+
+
+@pytest.mark.parametrize("error", [InputError("the disk is full"), SystemExit("a library tried to end the program")])
+def test_a_file_that_cannot_be_written_is_a_notice_and_the_next_is_saved(
+    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    with monkeypatch.context() as broken:
+        broken.setattr("viewer.app.picture_saver.export_picture", fail)
+        viewer.app.do(DoTask(SaveTask(str(tmp_path / "a.png"), (48, 32))))
+        viewer.until(lambda app: bool(app.state.notices))
+    assert [notice.is_error for notice in viewer.app.state.notices] == [True]
+    viewer.app.do(DoTask(SaveTask(str(tmp_path / "a.png"), (48, 32))))
+    viewer.until(lambda app: f"Saved {tmp_path / 'a.png'}" in texts(viewer))

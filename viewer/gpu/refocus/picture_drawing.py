@@ -1,0 +1,115 @@
+"""A picture of any size with every sample it will get, drawn a step at a time beside what the screen shows."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Generator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.gpu.context import GLContext
+from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
+from viewer.gpu.refocus.lens import TargetWindow
+from viewer.gpu.refocus.passes import TILE_PX
+from viewer.gpu.refocus.tiling import PictureTile, picture_tiles
+from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind
+
+STEP_S = 0.008
+"""What a step is meant to take: a hand that drags waits for no more than one of them."""
+
+Pixels = NDArray[np.uint8 | np.float32]
+
+
+class PictureDrawing:
+    """Draws a picture tile by tile into targets of its own. Call it only from the thread its context belongs to.
+
+    image: (height, width, 3), whole once `is_done`: float32 linear light, not cut off at white, or sRGB-encoded uint8.
+    is_stopped: by `stop`, because the field it is drawn from has changed; the image then stays unfinished.
+    """
+
+    def __init__(
+        self,
+        gl: GLContext,
+        accumulator: Accumulator,
+        field: LightFieldTexture,
+        whole: ProgressiveAccumulation,
+        is_linear: bool,
+    ) -> None:
+        """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun.
+
+        Views that `field` gets from now on are not seen: all tiles show the same.
+        """
+        width, height = whole.size_px
+        self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
+        self.is_done = self.is_stopped = False
+        self._gl = gl
+        self._accumulator = accumulator
+        self._field = field.snapshot()
+        self._whole = whole
+        self._is_linear = is_linear
+        self._tiles = picture_tiles(whole.size_px, gl.max_texture_size)
+        self._tiles_done = 0
+        self._under_way: ProgressiveAccumulation | None = None
+        self._is_in_steps = False
+        self._steps = self._draw()
+
+    @property
+    def progress(self) -> float:
+        """How much of it is drawn, 0..1."""
+        passes = len(self._whole.places)
+        begun = self._under_way.pass_index if self._under_way is not None else 0
+        return (self._tiles_done * passes + begun) / (len(self._tiles) * passes)
+
+    def advance(self, budget_s: float = math.inf) -> None:
+        """Draw on for about that long, at least a step; all of it without a budget."""
+        self._is_in_steps = budget_s < math.inf
+        end = time.perf_counter() + budget_s
+        for _ in self._steps:
+            if self._is_in_steps:
+                self._gl.ctx.finish()
+                if time.perf_counter() >= end:
+                    return
+
+    def stop(self) -> None:
+        """Draw no more, and free every GL object; nothing happens where it is done."""
+        self.is_stopped = not self.is_done
+        self._steps.close()
+        self._accumulator.release()
+
+    def _draw(self) -> Generator[None]:
+        for tile in self._tiles:
+            target = RenderTarget(
+                self._gl.ctx, [self._gl.ctx.texture(tile.size_px, 4, dtype="f4" if self._is_linear else "f1")]
+            )
+            targets = RenderTargets(self._gl.ctx, tile.size_px, TILE_PX)
+            try:
+                yield from self._draw_tile(tile, targets, target)
+            finally:
+                unbind(self._gl.ctx)
+                target.release()
+                targets.release()
+            self._tiles_done, self._under_way = self._tiles_done + 1, None
+            yield
+        self.is_done = True
+
+    def _draw_tile(self, tile: PictureTile, targets: RenderTargets, target: RenderTarget) -> Generator[None]:
+        lens = replace(self._whole.lens, part=TargetWindow(*tile.window))
+        self._under_way = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
+        pixels = STEP_S / self._gl.seconds_per_fetch if self._is_in_steps else math.inf
+        yield from self._accumulator.sum_up_in_steps(self._field, accumulation, targets, pixels)
+        self._accumulator.finish(accumulation, targets, target.framebuffer, self._is_linear)
+        yield
+        drawn = read_pixels(target.framebuffer, np.float32 if self._is_linear else np.uint8)
+        self.image[tile.kept] = drawn[tile.kept_of_drawn]
+
+
+def read_pixels(framebuffer: Any, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
+    """What was drawn, (H, W, 3), row 0 at the top."""
+    width, height = framebuffer.size
+    raw = framebuffer.read(components=3, alignment=1, dtype="f1" if dtype is np.uint8 else "f4")
+    return np.frombuffer(raw, dtype).reshape(height, width, 3)[::-1].copy()

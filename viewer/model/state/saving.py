@@ -1,0 +1,29 @@
+"""A picture on its way to a file: what the panel says of it, and the action that changes that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Saving:
+    """The picture that is being saved. name: of its file. drawn: share that is drawn, 0..1; at 1 it is being written.
+
+    waiting: how many more wait for it.
+    """
+
+    name: str
+    drawn: float = 0.0
+    waiting: int = 0
+
+
+@dataclass(frozen=True)
+class SavingChanged:
+    """Another picture is being saved, or it has come further; None: nothing is any more."""
+
+    saving: Saving | None
+
+
+@dataclass(frozen=True)
+class CancelSaveTask:
+    """Give up the picture that is being drawn for a file; the next one follows."""
