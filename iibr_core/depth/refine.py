@@ -230,6 +230,14 @@ def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights
 
 
 @kernel
+def _continue_plateau(values, x, y, across, down, length, level, limit):
+    """The height at (x, y) of a plateau that begins `length` away at `level`, from its slope over two pixels there."""
+    far = length + 2
+    slope = (_at(values, x + across * far, y + down * far) - level) / 2
+    return level - EXTENSION * length * min(max(slope, -limit), limit)
+
+
+@kernel
 def _foreground_colour(photo, x, y, across, down, front, behind):
     """Matting: a colour between those so far away; -0.5 background .. 0.5 foreground, nearer 0 the less sure."""
     height, width = photo.shape[:2]
@@ -286,10 +294,8 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
                 continue
             # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
             limit = MOST_EXTENSION * steepest
-            beyond = (_at(values, x + across * (up + 2), y + down * (up + 2)) - top) / 2
-            top = max(top - EXTENSION * up * min(max(beyond, -limit), limit), here)
-            beyond = (_at(values, x - across * (back + 2), y - down * (back + 2)) - bottom) / 2
-            bottom = min(bottom - EXTENSION * back * min(max(beyond, -limit), limit), here)
+            top = max(_continue_plateau(values, x, y, across, down, up, top, limit), here)
+            bottom = min(_continue_plateau(values, x, y, -across, -down, back, bottom, limit), here)
             if not top > bottom:
                 continue
 

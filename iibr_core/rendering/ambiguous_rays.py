@@ -100,9 +100,13 @@ def find_ambiguous_rays(
     is_soft = around.softness > SOFT
     looks = len(AROUND) if is_soft else AROUND_SHARP
     certain = candidates.smooth & (not every and not is_soft)
+    selected = _select_rays(
+        certain, candidates.count, weights, *shown, around.step, from_sources,
+        parallax, is_soft, looks, candidates.first_row, first, last, every, pixel,
+    )  # fmt: skip
     count = _collect_hypotheses(
-        certain, candidates.count, candidates.disparity, candidates.source, weights, *shown, around.step,
-        from_sources, rays.photo_images, parallax, is_soft, looks, candidates.first_row, first, last, every,
+        selected, candidates.count, candidates.disparity, candidates.source, weights, *shown, rays.size.height,
+        from_sources, rays.photo_images, parallax, looks, candidates.first_row, every,
         pixel, number, disparity, source, share, nearest,
     )  # fmt: skip
     pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
@@ -185,17 +189,13 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
 
 
 @kernel
-def _collect_hypotheses(
-    certain, count, surface, origin, weights, shown_disparity, shown_source, step, offsets,
-    photo_images, parallax, is_soft, looks, first_row, first, last, every,
-    pixel, number, disparity, source, share, nearest,
+def _select_rays(
+    certain, count, weights, shown_disparity, shown_source, step, offsets,
+    parallax, is_soft, looks, first_row, first, last, every, pixel,
 ):  # fmt: skip
-    """Select ambiguous rays, none in certain cells; pick the surfaces on each, then again and again the one around it
-    farthest from those. nearest: how many pixels away each surface lands.
-    """
-    _, rows, width = surface.shape
-    height = step.shape[1]
-    near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
+    """Write the (row, column) of the ambiguous rays, none in certain cells, to pixel; returns how many they are."""
+    rows = len(count)
+    _, height, width = step.shape
     found = 0
     for y in range(first, last):
         # Band rows count from first_row, cells from the picture's first row.
@@ -219,79 +219,99 @@ def _collect_hypotheses(
                         is_ambiguous |= apart > AMBIGUOUS_AROUND_PX
             elif not is_ambiguous:
                 # Sharp edges: the source ray that shows here has a depth edge beside it.
-                d, origin_here = shown_disparity[y, x], np.int64(shown_source[y, x])
-                t, s = offsets[origin_here, 0], offsets[origin_here, 1]
+                d, source = shown_disparity[y, x], np.int64(shown_source[y, x])
+                t, s = offsets[source, 0], offsets[source, 1]
                 u = min(max(nearest_pixel(x + d * s), 0), width - 1)
                 v = min(max(nearest_pixel(first_row + y + d * t), 0), height - 1)
-                is_ambiguous = step[origin_here, v, u] * parallax > AMBIGUOUS_PX
-            if not is_ambiguous:
-                continue
-            # First the surfaces on the ray itself. One slot stays free for the plain hypothesis.
-            picked = 0
-            for k in range(np.int64(count[y, x])):
-                if weights[k, y, x] > LEAST_WEIGHT and picked < disparity.shape[1] - 1:
-                    disparity[found, picked], source[found, picked] = surface[k, y, x], origin[k, y, x]
-                    share[found, picked] = weights[k, y, x]
-                    picked += 1
-            # What shows around it, the nearest first.
-            n = 0
-            for i in range(looks):
-                v, u = y + AROUND[i, 0], x + AROUND[i, 1]
-                if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
-                    continue
-                d, image = shown_disparity[v, u], np.int64(shown_source[v, u])
-                source_x, source_y = x + d * offsets[image, 1], first_row + y + d * offsets[image, 0]
-                is_inside = -0.5 <= source_x <= width - 0.5 and -0.5 <= source_y <= height - 0.5
-                if is_inside or image >= photo_images:  # the photo shows nothing beyond its frame
-                    near_d[n], near_k[n], near_px[n] = d, image, AROUND_DISTANCE[i]
-                    n += 1
-            # In a hole: begin with the front-most surface around it.
-            if picked == 0 and n > 0:
-                front = np.argmax(near_d[:n])
-                disparity[found, 0], source[found, 0], share[found, 0] = near_d[front], near_k[front], 0.0
-                picked = 1
-            # Farthest-point sampling of the disparities around it, until slots or distinct ones run out.
-            own_picked = picked
-            while 0 < picked < disparity.shape[1] - 1:
-                best, best_distance = -1, DISTINCT_PX
-                for i in range(n):
-                    distance = np.inf
-                    for j in range(picked):
-                        apart = abs(near_d[i] - disparity[found, j]) * parallax
-                        if (near_k[i] >= photo_images) != (source[found, j] >= photo_images):
-                            apart += INPAINTED_APART_PX
-                        distance = min(distance, apart)
-                    if distance > best_distance:
-                        best, best_distance = i, distance
-                if best < 0:
-                    break
-                disparity[found, picked], source[found, picked] = near_d[best], near_k[best]
-                share[found, picked] = 0.0
-                picked += 1
-            # Is there anything to decide?
-            apart = 0.0
-            for j in range(picked):
-                apart = max(apart, abs(disparity[found, j] - disparity[found, 0]) * parallax)
-            if picked > 0 and (every or apart > DISTINCT_PX):
-                # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
-                mixed = 0
-                for j in range(own_picked):
-                    if disparity[found, j] > disparity[found, mixed]:
-                        mixed = j
-                disparity[found, picked], source[found, picked] = disparity[found, mixed], source[found, mixed] + PLAIN
-                share[found, picked] = 0.0
-                picked += 1
-                # How near each surface lands: 0 on the ray itself, else by the first landing like it.
-                for j in range(picked):
-                    nearest[found, j] = 0.0 if share[found, j] > 0 else REACH_PX + 1.0
-                    if share[found, j] > 0:
-                        continue
-                    for i in range(n):
-                        if abs(near_d[i] - disparity[found, j]) * parallax < OWN_LANDING_PX:
-                            nearest[found, j] = near_px[i]
-                            break
-                pixel[found, 0], pixel[found, 1], number[found] = y, x, picked
+                is_ambiguous = step[source, v, u] * parallax > AMBIGUOUS_PX
+            if is_ambiguous:
+                pixel[found, 0], pixel[found, 1] = y, x
                 found += 1
+    return found
+
+
+@kernel
+def _collect_hypotheses(
+    selected, count, surface, origin, weights, shown_disparity, shown_source, height, offsets,
+    photo_images, parallax, looks, first_row, every,
+    pixel, number, disparity, source, share, nearest,
+):  # fmt: skip
+    """Pick the surfaces on each of the first `selected` rays of pixel, then again and again the one around it farthest
+    from those. Rays with nothing to decide are dropped: what is left moves up; returns how many those are.
+
+    nearest: how many pixels away each surface lands.
+    """
+    rows, width = count.shape
+    near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
+    found = 0
+    for ray in range(selected):
+        y, x = pixel[ray]
+        # First the surfaces on the ray itself. One slot stays free for the plain hypothesis.
+        picked = 0
+        for k in range(np.int64(count[y, x])):
+            if weights[k, y, x] > LEAST_WEIGHT and picked < disparity.shape[1] - 1:
+                disparity[found, picked], source[found, picked] = surface[k, y, x], origin[k, y, x]
+                share[found, picked] = weights[k, y, x]
+                picked += 1
+        # What shows around it, the nearest first.
+        n = 0
+        for i in range(looks):
+            v, u = y + AROUND[i, 0], x + AROUND[i, 1]
+            if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
+                continue
+            d, image = shown_disparity[v, u], np.int64(shown_source[v, u])
+            source_x, source_y = x + d * offsets[image, 1], first_row + y + d * offsets[image, 0]
+            is_inside = -0.5 <= source_x <= width - 0.5 and -0.5 <= source_y <= height - 0.5
+            if is_inside or image >= photo_images:  # the photo shows nothing beyond its frame
+                near_d[n], near_k[n], near_px[n] = d, image, AROUND_DISTANCE[i]
+                n += 1
+        # In a hole: begin with the front-most surface around it.
+        if picked == 0 and n > 0:
+            front = np.argmax(near_d[:n])
+            disparity[found, 0], source[found, 0], share[found, 0] = near_d[front], near_k[front], 0.0
+            picked = 1
+        # Farthest-point sampling of the disparities around it, until slots or distinct ones run out.
+        own_picked = picked
+        while 0 < picked < disparity.shape[1] - 1:
+            best, best_distance = -1, DISTINCT_PX
+            for i in range(n):
+                distance = np.inf
+                for j in range(picked):
+                    apart = abs(near_d[i] - disparity[found, j]) * parallax
+                    if (near_k[i] >= photo_images) != (source[found, j] >= photo_images):
+                        apart += INPAINTED_APART_PX
+                    distance = min(distance, apart)
+                if distance > best_distance:
+                    best, best_distance = i, distance
+            if best < 0:
+                break
+            disparity[found, picked], source[found, picked] = near_d[best], near_k[best]
+            share[found, picked] = 0.0
+            picked += 1
+        # Is there anything to decide?
+        apart = 0.0
+        for j in range(picked):
+            apart = max(apart, abs(disparity[found, j] - disparity[found, 0]) * parallax)
+        if picked > 0 and (every or apart > DISTINCT_PX):
+            # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
+            mixed = 0
+            for j in range(own_picked):
+                if disparity[found, j] > disparity[found, mixed]:
+                    mixed = j
+            disparity[found, picked], source[found, picked] = disparity[found, mixed], source[found, mixed] + PLAIN
+            share[found, picked] = 0.0
+            picked += 1
+            # How near each surface lands: 0 on the ray itself, else by the first landing like it.
+            for j in range(picked):
+                nearest[found, j] = 0.0 if share[found, j] > 0 else REACH_PX + 1.0
+                if share[found, j] > 0:
+                    continue
+                for i in range(n):
+                    if abs(near_d[i] - disparity[found, j]) * parallax < OWN_LANDING_PX:
+                        nearest[found, j] = near_px[i]
+                        break
+            pixel[found, 0], pixel[found, 1], number[found] = y, x, picked
+            found += 1
     return found
 
 

@@ -87,6 +87,18 @@ def _half_extent(gap):
 
 
 @kernel
+def _rearmost(coverage, disparity, row, column):
+    """The slot with the smallest mean disparity, of sums weighted by coverage; all slots are used."""
+    slot = 0
+    for k in range(1, len(coverage)):
+        # Compared crosswise to save the divisions.
+        ahead = disparity[slot, row, column] * coverage[k, row, column]
+        if disparity[k, row, column] * coverage[slot, row, column] < ahead:
+            slot = k
+    return slot
+
+
+@kernel
 def _land_rays(
     ray_disparity, ray_coverage, needed, needed_rows, index, s, t, first_row, count, coverage, disparity, source
 ):  # fmt: skip
@@ -149,12 +161,7 @@ def _land_rays(
                         if used < slots:
                             count[row, column] = used + 1
                         else:
-                            slot = 0
-                            for k in range(1, slots):
-                                # Means, compared crosswise to save the divisions.
-                                ahead = disparity[slot, row, column] * coverage[k, row, column]
-                                if disparity[k, row, column] * coverage[slot, row, column] < ahead:
-                                    slot = k
+                            slot = _rearmost(coverage, disparity, row, column)
                             if disparity[slot, row, column] >= d * coverage[slot, row, column]:
                                 continue
                         coverage[slot, row, column] = overlap

@@ -106,21 +106,30 @@ def _row_edges(rows, least_edge, changes, lefts):
 
 @kernel
 def _window_extremes(disparity, first, last, low, high, step):
-    """Rows [first, last) of the range, and of the largest step, within a square: along rows first, then columns.
-
-    NaN lies around the frame, as where nothing is: it is neither less nor greater than anything.
-    """
+    """Rows [first, last) of the range, and of the largest step, within a square: along rows first, then columns."""
     height, width = disparity.shape
     top, bottom = max(first - STEP_AROUND_PX, 0), min(last + STEP_AROUND_PX, height)
     row_low, row_high = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
     row_step, row_rise = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
+    _extremes_along_rows(disparity, top, row_low, row_high, row_step, row_rise)
+    _extremes_along_columns(row_low, row_high, row_step, row_rise, top, first, last, low, high, step)
+
+
+@kernel
+def _extremes_along_rows(disparity, top, low, high, step, rise):
+    """Rows from top on, within some columns to both sides: range, largest step along the row, largest step down to it.
+
+    NaN lies around the frame, as where nothing is: it is neither less nor greater than anything.
+    """
+    width = disparity.shape[1]
     here = np.full(width + 2 * STEP_AROUND_PX, np.nan, np.float32)
     above = np.full(width + 2 * STEP_AROUND_PX, np.nan, np.float32)
-    for y in range(top, bottom):
-        here[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[y]
-        if y > 0:
-            above[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[y - 1]
+    for row in range(len(low)):
+        here[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[top + row]
+        if top + row > 0:
+            above[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[top + row - 1]
         for x in range(width):
+            # Written out: NaN fails every comparison, where min and max might keep it.
             least, most = np.float32(np.inf), np.float32(-np.inf)
             for i in range(STEP_AROUND_PX - AROUND_PX, STEP_AROUND_PX + AROUND_PX + 1):
                 d = here[x + i]
@@ -132,14 +141,22 @@ def _window_extremes(disparity, first, last, low, high, step):
             for i in range(2 * STEP_AROUND_PX + 1):
                 change = abs(here[x + i] - above[x + i])
                 steepest = change if change > steepest else steepest
-            row_low[y - top, x], row_high[y - top, x] = least, most
-            row_step[y - top, x], row_rise[y - top, x] = widest, steepest
+            low[row, x], high[row, x] = least, most
+            step[row, x], rise[row, x] = widest, steepest
+
+
+@kernel
+def _extremes_along_columns(row_low, row_high, row_step, row_rise, top, first, last, low, high, step):
+    """Rows [first, last) of low, high and step from those of the single rows, which begin at row top."""
+    bottom, width = top + len(row_low), row_low.shape[1]
     for y in range(first, last):
         least_here, most_here, widest_here = low[y], high[y], step[y]
         least_here[:], most_here[:], widest_here[:] = np.inf, -np.inf, 0.0
-        for v in range(max(y - STEP_AROUND_PX, 0), min(y + STEP_AROUND_PX + 1, height)):
+        # Row by row, so that the inner loops run along the rows in memory.
+        for v in range(max(y - STEP_AROUND_PX, 0), min(y + STEP_AROUND_PX + 1, bottom)):
             for x in range(width):
                 widest_here[x] = max(widest_here[x], row_step[v - top, x])
+            # A rise comes from the row before: that of the first row leads out of the square.
             if v > y - STEP_AROUND_PX:
                 for x in range(width):
                     widest_here[x] = max(widest_here[x], row_rise[v - top, x])
@@ -147,6 +164,7 @@ def _window_extremes(disparity, first, last, low, high, step):
                 for x in range(width):
                     least_here[x] = min(least_here[x], row_low[v - top, x])
                     most_here[x] = max(most_here[x], row_high[v - top, x])
+        # Nothing near by: both 0.
         for x in range(width):
             if not least_here[x] <= most_here[x]:
                 least_here[x], most_here[x] = 0.0, 0.0

@@ -216,6 +216,7 @@ def smooth_within_contours(photo: FloatImage, disparity: FloatImage, radius: flo
         _measure_steps(turned, parting, noise, step)
     values = np.array(disparity, np.float32, order="C")
     for k in range(SMOOTHING_ROUNDS):
+        # Each round half as wide as the one before; their variances sum to radius^2.
         sigma = radius * sqrt(3) * 2 ** (SMOOTHING_ROUNDS - k - 1) / sqrt(4**SMOOTHING_ROUNDS - 1)
         for step in steps:
             _smooth_rows(values, step, sqrt(2) / sigma)
@@ -275,6 +276,7 @@ def _contour(photo, y, x, other_y, other_x, noise):
     total = 0.0
     for c in range(3):
         total += (photo[y, x, c] - photo[other_y, other_x, c]) ** 2
+    # Root of the summed squares, in sRGB-encoded values as CONTOUR_CONTRAST is.
     return max(sqrt(total) - noise, 0.0)
 
 
@@ -290,6 +292,7 @@ def _measure_unlikeness(photo, colors, unlike):
                 for c in range(3):
                     total += (photo[y, x, c] - colors[n, c]) ** 2
                 least = min(least, total)
+            # Squares are compared, one root a pixel is taken.
             unlike[y, x] = max(sqrt(least) - LIKENESS, 0.0)
 
 
@@ -351,6 +354,7 @@ def _measure_steps(photo, parting, noise, steps):
     """How far every pixel counts as being from the one at its left; steps: (H, W)."""
     for y in range(photo.shape[0]):
         for x in range(1, photo.shape[1]):
+            # The domain transform: a step of one pixel, longer by what the colours differ.
             steps[y, x] = 1.0 + parting * _contour(photo, y, x, y, x - 1, noise)
 
 

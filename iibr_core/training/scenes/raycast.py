@@ -258,23 +258,29 @@ def _albedo(p, x, y, z, pixel):
 
 
 @kernel
+def _find_met(bounds, x, y, margin, met):
+    """Broad phase: the primitives but the backdrop whose bounds a pixel's rays may meet, in order; returns how many."""
+    count = 0
+    for k in range(len(bounds) - 1):
+        if not (
+            x + margin < bounds[k, 0]
+            or x - margin > bounds[k, 1]
+            or y + margin < bounds[k, 2]
+            or y - margin > bounds[k, 3]
+        ):
+            met[count] = k
+            count += 1
+    return count
+
+
+@kernel
 def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, camera, lens, light, colors, disparity):
     """See `cast`. places, weights: `sample_places`; lens: centre x, y, focal, infinity, least and greatest z."""
     focal, infinity, least_z, greatest_z = lens[2], lens[3], lens[4], lens[5]
     backdrop = len(primitives) - 1
     met = np.empty(len(primitives), np.int64)
     for n in range(len(xs)):
-        # Broad phase: the primitives whose bounds this pixel's rays may meet.
-        count = 0
-        for k in range(backdrop):
-            if not (
-                xs[n] + margin < bounds[k, 0]
-                or xs[n] - margin > bounds[k, 1]
-                or ys[n] + margin < bounds[k, 2]
-                or ys[n] - margin > bounds[k, 3]
-            ):
-                met[count] = k
-                count += 1
+        count = _find_met(bounds, xs[n], ys[n], margin, met)
         red, green, blue = 0.0, 0.0, 0.0
         # A ray a sample. Its direction (wx, wy, 1): distance along it is depth z.
         for sample in range(len(places)):

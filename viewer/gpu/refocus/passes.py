@@ -117,8 +117,8 @@ class Passes:
     def _find_march_intervals(
         self, field: LightFieldTexture, lens: Lens, cell: PictureCell, drawn: PictureCell, targets: RenderTargets
     ) -> None:
-        """Fill the tiles of a cell with the first and the last step of each march that can find a surface. drawn: what of
-        it is asked for.
+        """Fill the tiles of a cell with the first and the last step of each march that can find a surface. drawn: what
+        of it is asked for.
         """
         program, quad = self._programs.get("march_intervals.frag", _switches(lens, "", lens.has_dolly and "DOLLY"))
         self._set_field(program, field, lens)
