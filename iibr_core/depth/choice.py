@@ -48,7 +48,8 @@ class DepthChoice:
 
     start: where the search begins. file: a map that must be used (a bad one is an error), times file_scale. model: a
     folder or a known model's name, None for the usual one if it is there. refine: how far disparity edges are drawn to
-    the photo's, 0 (not at all) to 1. memory_bytes: what a model may take, None for a share of what there is.
+    the photo's, 0 (not at all) to 1. memory_bytes: what a model may take, and the views made with its depth; None for a
+    share of what there is.
     """
 
     start: DepthStart = "auto"

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
@@ -96,7 +97,7 @@ def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
 
 
 def test_too_little_memory_is_one_line_and_the_worker_goes_on(desk: Desk, tmp_path: Path) -> None:
-    message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)), memory_bytes=10_000)))
+    message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)), DepthChoice(memory_bytes=10_000))))
     assert "raise --memory or lower --max-pixels" in message
     goes_on(desk, tmp_path, 2)
 

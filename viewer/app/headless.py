@@ -74,7 +74,7 @@ class HeadlessViewer:
         self.state = AppState(depth_strength=depth_strength)
         self.do(OpenPath(source))
         on_progress(self.state.progress)
-        depth_settings = DepthSettings(source.refine, edits)
+        depth_settings = DepthSettings(source.depth.refine, edits)
         request = SceneRequest(self.state.generation, source, depth_strength, depth_settings=depth_settings)
         for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
             if isinstance(result, SceneReady):

@@ -12,7 +12,6 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.formats.files import require_folder_of
 from iibr_core.types import FloatImage, InputError
 from viewer.display.scene_view import SceneView
-from viewer.model.saved_settings import ATTRIBUTE, settings_text
 from viewer.model.state.app_state import AppState, SavedSettings, SaveTask
 
 SUFFIXES = (".png", ".exr")
@@ -30,6 +29,7 @@ def export_image(path: Path, pixels: NDArray[Any], settings: SavedSettings | Non
     settings: what it takes to take the picture again, put inside. Raises InputError where it cannot be written.
     """
     from iibr_core.formats.images.photo import write_image
+    from viewer.model.saved_settings import ATTRIBUTE, settings_text
 
     write_image(path, pixels, {ATTRIBUTE: settings_text(settings)} if settings is not None else None)
 
@@ -50,7 +50,7 @@ def export_map(path: Path, values: FloatImage) -> str:
 def settings_of(state: AppState, size_px: tuple[int, int]) -> SavedSettings:
     """What it takes to take the present picture again. size_px: (width, height)."""
     assert state.source is not None
-    source = replace(state.source, path="", disparity_path=None, refine=state.depth.refine)
+    source = replace(state.source, path="", depth=replace(state.source.depth, file=None, refine=state.depth.refine))
     return SavedSettings(state.optics, state.depth_strength, source, size_px, state.depth.edits)
 
 

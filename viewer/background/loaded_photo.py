@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from iibr_core.depth.choice import DepthChoice, DepthOrigin
+from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import UNEDITED, Levels, levels_of
 from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, ScenePlan, plan_for_viewing
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import Disparity, FloatImage, Photo
-from viewer.model.saved_settings import settings_text_in
 from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.depth_editing import DepthSettings
 
@@ -64,6 +63,7 @@ def load_photo(
     from iibr_core.depth.search import open_with_depth
     from iibr_core.formats.images.heic import is_heic
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+    from viewer.model.saved_settings import settings_text_in
 
     said_at: dict[str, float] = {}
 
@@ -76,14 +76,7 @@ def load_photo(
     path = Path(source.path)
     found = open_with_depth(
         path,
-        DepthChoice(
-            source.depth_start,
-            source.disparity_path,
-            source.disparity_scale,
-            source.depth_model,
-            NOT_YET,
-            source.memory_bytes,
-        ),
+        replace(source.depth, refine=NOT_YET),
         source.max_pixels or DEFAULT_MAX_PIXELS,
         source.grid,
         should_stop,
@@ -91,7 +84,7 @@ def load_photo(
     )
     # This program saves no HEIC.
     settings = "" if is_heic(path) else settings_text_in(path)
-    return _prepare(found, settings, _models_here(), depth_settings or DepthSettings(source.refine), should_stop)
+    return _prepare(found, settings, _models_here(), depth_settings or DepthSettings(source.depth.refine), should_stop)
 
 
 def apply_depth_settings(
@@ -119,7 +112,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> Sce
         zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
         range_px, edited_px = (_robust_range(map_.values) for map_ in (loaded.refined, loaded.disparity))
         depth_strength *= edited_px / range_px if range_px else 1.0
-    overrides = PlanOverrides(source.grid, depth_strength, zero, source.memory_bytes)
+    overrides = PlanOverrides(source.grid, depth_strength, zero, source.depth.memory_bytes)
     return plan_for_viewing(loaded.photo, loaded.disparity, overrides)
 
 

@@ -148,7 +148,7 @@ def _results_of_photo(
     report_progress: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
-    depth_settings = request.depth_settings or DepthSettings(source.refine)
+    depth_settings = request.depth_settings or DepthSettings(source.depth.refine)
     loaded = (
         load_photo(source, should_stop, report_progress, depth_settings)
         if request.loaded is None

@@ -396,25 +396,12 @@ def _source(
 ) -> Source:
     from viewer.model.state.app_state import Source
 
-    return Source(
-        str(path),
-        ways.file,
-        ways.file_scale,
-        grid,
-        focus_disparity,
-        max_pixels,
-        ways.memory_bytes,
-        quality,
-        ways.start,
-        ways.model,
-        ways.refine,
-        inpaint,
-    )
+    return Source(str(path), ways, grid, focus_disparity, max_pixels, quality, inpaint)
 
 
 def _require_existing(source: Source) -> None:
     """Say so before a window opens, rather than in it."""
-    for path in (source.path, source.disparity_path):
+    for path in (source.path, source.depth.file):
         if path is not None and not Path(path).exists():
             raise InputError(f"{path}: no such file")
 

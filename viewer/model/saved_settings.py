@@ -1,66 +1,100 @@
-"""Settings inside a saved picture, as JSON in its metadata: enough to take the same picture of the same photo again."""
+"""Settings inside a saved picture, as JSON in its metadata: enough to take the same picture of the same photo again.
+
+Whoever needs this module imports it late: msgspec would cost the window 10 to 40 ms before its first frame.
+"""
 
 from __future__ import annotations
 
 import base64
 import dataclasses
 import json
-import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any
 
-from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke, require_sound
-from iibr_core.types import GridShape, InputError, Quality, ViewOffset
-from viewer.model.lens.limits import is_finite
-from viewer.model.state.app_state import APERTURE_KINDS, ApertureMask, ApertureShape, Optics, SavedSettings, Source
+import msgspec
+
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
+from iibr_core.types import GridShape, InputError, Quality
+from viewer.model.lens.limits import BLADES_LIMITS
+from viewer.model.state.app_state import ApertureShape, Optics, SavedSettings, Source
 
 ATTRIBUTE = "iibr:settings"
 FORMAT = 1
 MOST_CHARACTERS = 1_000_000
+MASK_LIMITS = (1, 4096)
+UNKNOWN_TOLD = 3
+
+SidePx = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
+Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
+Amount = Annotated[int, msgspec.Meta(ge=1, le=2**62)]
+
+
+class SourceText(msgspec.Struct, frozen=True, kw_only=True):
+    """What a picture keeps of a `Source`, by the names in its text: neither paths nor what is on one machine only."""
+
+    disparity_scale: float
+    grid: tuple[Views, Views] | None = None
+    focus_disparity: float | None = None
+    max_pixels: Amount | None = None
+    memory_bytes: Amount | None = None
+    quality: Quality
+    refine: float = 1.0
+
+
+class FormatText(msgspec.Struct, frozen=True, kw_only=True):
+    """What says whether the rest can be read."""
+
+    format: int
+
+
+class SettingsText(FormatText, frozen=True, kw_only=True):
+    """The whole text; `SavedSettings` says what each means. What later programs add comes with a default."""
+
+    optics: Optics
+    depth_strength: float
+    source: SourceText
+    size_px: tuple[SidePx, SidePx]
+    depth_edits: DepthEdits = UNEDITED
 
 
 def settings_text(settings: SavedSettings) -> str:
     """The settings as JSON."""
-    optics = dataclasses.asdict(settings.optics)
-    shape = optics["aperture_shape"]
-    if settings.optics.aperture_shape.mask is not None:
-        shape["mask"]["values"] = base64.b64encode(settings.optics.aperture_shape.mask.values).decode("ascii")
-    source = dataclasses.asdict(settings.source)
-    decided = {name: source[name] for name in _SOURCE_FIELDS}
     whole = {
         "format": FORMAT,
-        "optics": optics,
+        "optics": settings.optics,
         "depth_strength": settings.depth_strength,
-        "source": decided,
+        "source": _text_of_source(settings.source),
         "size_px": settings.size_px,
     }
     if settings.depth_edits != UNEDITED:
-        whole["depth_edits"] = dataclasses.asdict(settings.depth_edits)
-    return json.dumps(whole, separators=(",", ":"), allow_nan=False)
+        whole["depth_edits"] = settings.depth_edits
+    # not by msgspec, which refuses numpy's numbers
+    return json.dumps(whole, separators=(",", ":"), allow_nan=False, default=_json_value)
 
 
 def settings_from_text(text: str, name: str) -> SavedSettings:
     """The inverse of `settings_text`. name: of the picture, for the message.
 
-    Raises InputError where the text is damaged, of a newer program, or means nothing.
+    What this program does not know is left out and named in the result. Raises InputError, which names the field, where
+    the text is damaged, of a newer program, or means nothing: a picture like another but for one value is not like it.
     """
     try:
-        whole = json.loads(text if len(text) <= MOST_CHARACTERS else "")
-        if whole["format"] != FORMAT:
-            raise InputError(f"{name}: its settings have format {whole['format']!r}, this program reads {FORMAT}")
-        width, height = (_whole_number(side, 1, 1_000_000) for side in whole["size_px"])
-        optics, source = _optics(whole["optics"]), _source(whole["source"])
-        edits = _depth_edits(whole.get("depth_edits"))
-        settings = SavedSettings(optics, _number(whole["depth_strength"]), source, (width, height), edits)
-    except InputError:
-        raise
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        reason = " ".join(str(error).split())[:80]
+        whole = msgspec.json.decode(text if len(text) <= MOST_CHARACTERS else "")
+        number = msgspec.convert(whole, FormatText).format
+        if number != FORMAT:
+            raise ValueError(f"format {number}, this program reads {FORMAT}")
+        read = msgspec.convert(whole, SettingsText)
+        _require_sound_shape(read.optics.aperture_shape)
+        require_sound(read.depth_edits)
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
         raise InputError(
             f"{name}: its settings are damaged or of another program ({reason}); set them by hand"
         ) from error
-    return settings
+    unknown = tuple(dict.fromkeys(_unknown_fields(whole, msgspec.to_builtins(read))))
+    source = _source_from_text(Source(""), read.source)
+    return SavedSettings(read.optics, read.depth_strength, source, read.size_px, read.depth_edits, unknown)
 
 
 def read_settings(path: Path) -> SavedSettings:
@@ -91,82 +125,79 @@ def settings_text_in(path: Path) -> str:
 
 
 def source_like(source: Source, saved: SavedSettings, given: Collection[str]) -> Source:
-    """The source with what was decided for the saved picture, except for the fields named in `given`."""
-    taken = {name: getattr(saved.source, name) for name in _SOURCE_FIELDS if name not in given}
-    return dataclasses.replace(source, **taken)
+    """The source with what was decided for the saved picture, but for what is named in `given`, as in `SourceText`."""
+    decided = msgspec.structs.asdict(_text_of_source(saved.source))
+    taken = {name: value for name, value in decided.items() if name not in given}
+    return _source_from_text(source, msgspec.structs.replace(_text_of_source(source), **taken))
 
 
-_SOURCE_FIELDS = ("disparity_scale", "grid", "focus_disparity", "max_pixels", "memory_bytes", "quality", "refine")
+def unknown_note(settings: SavedSettings) -> str:
+    """One sentence about what was left out; empty where all was understood."""
+    names = settings.unknown_fields
+    if not names:
+        return ""
+    more = f" and {len(names) - UNKNOWN_TOLD} more" if len(names) > UNKNOWN_TOLD else ""
+    return f"Its settings hold what this program does not know and leaves out: {', '.join(names[:UNKNOWN_TOLD])}{more}."
 
 
-def _optics(fields: dict[str, Any]) -> Optics:
-    t, s = (_number(value) for value in fields["eye"])
-    right, down = (_number(value) for value in fields["focus_tilt"])
-    plain = ("dolly", "focus_disparity", "focus_range", "aperture_diameter", "highlight_recovery", "exposure_stops")
-    numbers = {name: _number(fields[name]) for name in plain}
-    shape = _shape(fields["aperture_shape"])
-    optics = Optics(eye=ViewOffset(t, s), focus_tilt=(right, down), aperture_shape=shape, **numbers)
-    if not is_finite(optics):
-        raise ValueError("a value is not finite")
-    return optics
+def _json_value(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return base64.b64encode(value).decode("ascii")
+    return msgspec.structs.asdict(value) if isinstance(value, msgspec.Struct) else dataclasses.asdict(value)
 
 
-def _shape(fields: dict[str, Any]) -> ApertureShape:
-    if fields["kind"] not in APERTURE_KINDS:
-        raise ValueError(f"aperture shape {fields['kind']!r}")
-    numbers = {name: _number(fields[name]) for name in ("rotation_deg", "ring_inner", "cat_eye")}
-    mask = None if fields["mask"] is None else _mask(fields["mask"])
-    return ApertureShape(fields["kind"], _whole_number(fields["blades"], 3, 11), mask=mask, **numbers)
-
-
-def _mask(fields: dict[str, Any]) -> ApertureMask:
-    rows, columns = (_whole_number(fields[name], 1, 4096) for name in ("rows", "columns"))
-    values = base64.b64decode(fields["values"], validate=True)
-    if len(values) != rows * columns or not any(values):
-        raise ValueError("aperture mask is empty or of another size")
-    return ApertureMask(str(fields["name"]), rows, columns, values)
-
-
-def _source(fields: dict[str, Any]) -> Source:
-    def some(name: str) -> Any:
-        return fields.get(name)
-
-    grid = None if some("grid") is None else GridShape(*(_whole_number(n, 1, 99) for n in fields["grid"]))
-    focus = None if some("focus_disparity") is None else _number(fields["focus_disparity"])
-    most, memory = (None if some(n) is None else _whole_number(fields[n], 1, 2**62) for n in _SOURCE_FIELDS[3:5])
-    quality = fields["quality"]
-    if quality not in get_args(Quality):
-        raise ValueError(f"quality {quality!r}")
-    scale, refine = _number(fields["disparity_scale"]), _number(fields.get("refine", 1.0))
-    return Source("", None, scale, grid, focus, most, memory, quality, refine=refine)
-
-
-def _depth_edits(fields: dict[str, Any] | None) -> DepthEdits:
-    """Raises InputError where they make no sense."""
-    if fields is None:
-        return UNEDITED
-    strokes = tuple(
-        Stroke(
-            stroke["tool"],
-            tuple((_number(x), _number(y)) for x, y in stroke["points"]),
-            _number(stroke["radius"]),
-            _number(stroke["strength"]),
-        )
-        for stroke in fields["strokes"]
+def _text_of_source(source: Source) -> SourceText:
+    return SourceText(
+        disparity_scale=source.depth.file_scale,
+        grid=source.grid,
+        focus_disparity=source.focus_disparity,
+        max_pixels=source.max_pixels,
+        memory_bytes=source.depth.memory_bytes,
+        quality=source.quality,
+        refine=source.depth.refine,
     )
-    numbers = {name: _number(fields[name]) for name in ("far_clip", "near_clip", "gamma")}
-    edits = DepthEdits(bool(fields["is_inverted"]), strokes=strokes, **numbers)
-    require_sound(edits)
-    return edits
 
 
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{value!r} is no number")
-    return float(value)
+def _source_from_text(source: Source, text: SourceText) -> Source:
+    """The source with what the text says; its paths and where depth is looked for stay."""
+    return dataclasses.replace(
+        source,
+        depth=dataclasses.replace(
+            source.depth, file_scale=text.disparity_scale, refine=text.refine, memory_bytes=text.memory_bytes
+        ),
+        grid=None if text.grid is None else GridShape(*text.grid),
+        focus_disparity=text.focus_disparity,
+        max_pixels=text.max_pixels,
+        quality=text.quality,
+    )
 
 
-def _whole_number(value: Any, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ValueError(f"{value!r} is not from {low} to {high}")
-    return value
+def _require_sound_shape(shape: ApertureShape) -> None:
+    """Raise ValueError where numbers of the opening lie outside what a type can say."""
+    _require_within("blades", shape.blades, BLADES_LIMITS)
+    mask = shape.mask
+    if mask is None:
+        return
+    for side, count in (("rows", mask.rows), ("columns", mask.columns)):
+        _require_within(f"mask.{side}", count, MASK_LIMITS)
+    if len(mask.values) != mask.rows * mask.columns or not any(mask.values):
+        raise ValueError("optics.aperture_shape.mask is empty or of another size")
+
+
+def _require_within(name: str, value: int, limits: tuple[int, int]) -> None:
+    low, high = limits
+    if not low <= value <= high:
+        raise ValueError(f"optics.aperture_shape.{name}: {value} is not from {low} to {high}")
+
+
+def _unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:
+    """Names, with dots, of what stands in the text but not in what was read from it."""
+    if isinstance(raw, dict) and isinstance(known, dict):
+        for name, value in raw.items():
+            if name in known:
+                yield from _unknown_fields(value, known[name], f"{within}{name}.")
+            else:
+                yield within + " ".join(name.split())[:40]
+    elif isinstance(raw, list) and isinstance(known, list | tuple):
+        for value, known_value in zip(raw, known):
+            yield from _unknown_fields(value, known_value, within)

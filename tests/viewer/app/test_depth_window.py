@@ -201,7 +201,7 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
     viewer.until_idle()
     viewer.type(str(out))
     viewer.send("key", "Return")
-    viewer.until(lambda app: app.state.source is not None and app.state.source.disparity_path == str(out))
+    viewer.until(lambda app: app.state.source is not None and app.state.source.depth.file == str(out))
     viewer.until(is_made)
     viewer.until_idle()
     assert viewer.app.state.depth.edits == DepthEdits()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.input import (
     DRAG_ACROSS_GRID,
@@ -212,7 +213,7 @@ def test_presses_and_releases_part_the_edits() -> None:
 )
 def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:
     (action,) = actions_from_drop(paths, STATE)
-    assert action == OpenPath(Source(opened, disparity, max_pixels=7))
+    assert action == OpenPath(Source(opened, DepthChoice(file=disparity), max_pixels=7))
 
 
 def test_a_map_dropped_on_nothing_is_tried_as_a_photo() -> None:

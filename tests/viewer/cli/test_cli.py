@@ -296,7 +296,7 @@ from viewer.app.main_loop import App
 app = App()
 while not app.frames_shown:
     app.step()
-print([name for name in ("torch", "numba", "OpenImageIO") if name in sys.modules])
+print([name for name in ("torch", "numba", "OpenImageIO", "msgspec") if name in sys.modules])
 copies = {line.split()[-1] for line in open("/proc/self/maps") if "libglfw" in line}
 print(len(copies))
 app.close()

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import GAMMA_LIMITS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import GridShape, ImageSize, InputError
@@ -136,7 +137,7 @@ def test_the_depth_of_a_light_field_is_left_alone() -> None:
 
 def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back() -> None:
     edited = after(opened(), SetTone(TONE, True), SetRefine(0.25, True))
-    source = Source("b.png", refine=0.5)
+    source = Source("b.png", DepthChoice(refine=0.5))
     asked = reduce(edited, OpenPath(source))
     assert depth_settings_for_worker(asked) == DepthSettings(0.5)
     failed = reduce(asked, OpenFailed(asked.generation, "gone"))
@@ -154,19 +155,17 @@ def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
 
 
 def test_reset_takes_everything_back_at_once() -> None:
-    state = after(opened(Source("a.png", refine=0.5)), SetTone(TONE, True), SetRefine(1.0, True), ResetDepth())
+    state = after(
+        opened(Source("a.png", DepthChoice(refine=0.5))), SetTone(TONE, True), SetRefine(1.0, True), ResetDepth()
+    )
     assert state.depth == DepthSettings(0.5)
 
 
 DECIDED = Source(
     "a.png",
-    disparity_path="a.pfm",
-    disparity_scale=2.0,
-    focus_disparity=1.0,
+    DepthChoice("model", file="a.pfm", file_scale=2.0, model="midas", refine=0.25),
     grid=GRID,
-    depth_start="model",
-    depth_model="midas",
-    refine=0.25,
+    focus_disparity=1.0,
 )
 
 
@@ -174,17 +173,19 @@ DECIDED = Source(
 def test_another_file_keeps_what_was_decided_about_depth(way: str) -> None:
     state = opened(DECIDED)
     action = action_for_path("photo", "b.png", state) if way == "dialog" else actions_from_drop(["b.png"], state)[0]
-    wanted = replace(DECIDED, path="b.png", disparity_path=None, disparity_scale=1.0, focus_disparity=None)
+    depth = DepthChoice("model", model="midas", refine=0.25)
+    wanted = replace(DECIDED, path="b.png", depth=depth, focus_disparity=None)
     assert action == OpenPath(wanted)
 
 
 def test_a_map_is_for_the_photo_that_is_open() -> None:
-    wanted = replace(DECIDED, disparity_path="b.pfm", disparity_scale=1.0, focus_disparity=None, depth_start="auto")
+    depth = DepthChoice("auto", file="b.pfm", model="midas", refine=0.25)
+    wanted = replace(DECIDED, depth=depth, focus_disparity=None)
     assert action_for_path("map", "b.pfm", opened(DECIDED)) == OpenPath(wanted)
     assert actions_from_drop(["b.pfm"], opened(DECIDED)) == [OpenPath(wanted)]
     model = action_for_path("model", "/m", opened(DECIDED))
     assert isinstance(model, OpenPath)
-    assert (model.source.depth_start, model.source.depth_model, model.source.disparity_path) == ("model", "/m", None)
+    assert model.source.depth == DepthChoice("model", model="/m", refine=0.25)
 
 
 def pointer_at(share_x: float, share_y: float, **more: object) -> tuple[Pointer, object]:
@@ -243,7 +244,7 @@ def test_settings_bring_the_edits_along() -> None:
     settings = settings_of(state, (96, 64))
     again = settings_from_text(settings_text(settings), "a.png")
     assert again.depth_edits == state.depth.edits
-    assert again.source.refine == 0.5
+    assert again.source.depth.refine == 0.5
     plain = settings_of(replace(state, depth=DepthSettings()), (96, 64))
     assert "depth_edits" not in settings_text(plain)
     assert settings_from_text(settings_text(plain), "a.png").depth_edits == UNEDITED
@@ -256,7 +257,7 @@ def test_damaged_edits_in_settings_are_told(damage: str) -> None:
     text = settings_text(settings_of(state, (96, 64)))
     whole = text.replace(f"{name}:2.0", damage).replace(f"{name}:[]", damage)
     assert whole != text
-    with pytest.raises(InputError, match=r"a\.png|depth edits"):
+    with pytest.raises(InputError, match=rf"a\.png: .*{name.strip(chr(34))}"):
         settings_from_text(whole, "a.png")
 
 
@@ -290,11 +291,13 @@ def test_refining_is_from_what_was_found_each_time(tmp_path: Path) -> None:
     for _ in range(6):
         soft[:, 1:-1] = (soft[:, :-2] + soft[:, 1:-1] + soft[:, 2:]) / 3
     np.save(tmp_path / "scene_disparity.npy", soft)
-    loaded = load_photo(Source(str(path), refine=0.0))
+    loaded = load_photo(Source(str(path), DepthChoice(refine=0.0)))
     np.testing.assert_array_equal(loaded.disparity.values, soft)
     full = apply_depth_settings(loaded, DepthSettings(1.0))
     assert not np.array_equal(full.disparity.values, soft)
-    np.testing.assert_array_equal(full.disparity.values, load_photo(Source(str(path), refine=1.0)).disparity.values)
+    np.testing.assert_array_equal(
+        full.disparity.values, load_photo(Source(str(path), DepthChoice(refine=1.0))).disparity.values
+    )
     np.testing.assert_array_equal(apply_depth_settings(full, DepthSettings(0.0)).disparity.values, soft)
 
 
@@ -318,7 +321,7 @@ def test_a_saved_map_is_the_same_scene_when_it_is_opened_again(photo_path: Path,
         wanted = loaded.disparity.values
         assert export_map(out, wanted) == f"Saved {out}."
     np.testing.assert_array_equal(read_disparity(out, ImageSize(HEIGHT, WIDTH)).values, wanted)
-    again = load_photo(replace(source, disparity_path=str(out), refine=0.0))
+    again = load_photo(replace(source, depth=DepthChoice(file=str(out), refine=0.0)))
     np.testing.assert_array_equal(again.disparity.values, wanted)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
@@ -46,12 +49,15 @@ optics = st.builds(
 sources = st.builds(
     Source,
     st.just(""),
-    st.none(),
-    numbers,
+    st.builds(
+        DepthChoice,
+        file_scale=numbers,
+        refine=st.floats(0, 1),
+        memory_bytes=st.none() | st.integers(1, 10**12),
+    ),
     st.none() | st.builds(GridShape, st.integers(1, 99), st.integers(1, 99)),
     st.none() | numbers,
     st.none() | st.integers(1, 10**9),
-    st.none() | st.integers(1, 10**12),
     st.sampled_from(("fast", "balanced", "exact")),
 )
 settings = st.builds(SavedSettings, optics, numbers, sources, st.tuples(st.integers(1, 9999), st.integers(1, 9999)))
@@ -73,7 +79,8 @@ def test_a_picture_carries_its_settings(tmp_path: Path, suffix: str) -> None:
 
 
 def test_no_path_of_the_users_goes_into_a_picture() -> None:
-    text = settings_text(SavedSettings(Optics(), 1.0, Source("/home/somebody/a.png", "/home/somebody/a.pfm"), (1, 1)))
+    depth = DepthChoice(file="/home/somebody/a.pfm", model="/home/somebody/model")
+    text = settings_text(SavedSettings(Optics(), 1.0, Source("/home/somebody/a.png", depth), (1, 1)))
     assert "somebody" not in text
 
 
@@ -131,6 +138,88 @@ def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
     assert [notice.is_error for notice in state.notices] == [True]
 
 
+FIRST_TEXT = (
+    '{"format":1,"optics":{"eye":[-0.5,0.5],"dolly":0.0,"focus_disparity":0.2,"focus_range":0.25,"focus_tilt":[0.0,'
+    '1.5],"aperture_diameter":2.0,"aperture_shape":{"kind":"mask","blades":6,"rotation_deg":0.0,"ring_inner":0.5,'
+    '"cat_eye":0.5,"mask":{"name":"st\\u00e4r.png","rows":1,"columns":3,"values":"AP8Q"}},"highlight_recovery":0.5,'
+    '"exposure_stops":-1.0},"depth_strength":1.5,"source":{"disparity_scale":2.0,"grid":[3,5],"focus_disparity":null,'
+    '"max_pixels":400000,"memory_bytes":1073741824,"quality":"balanced"},"size_px":[741,500]}'
+)
+"""As the first version wrote it: `refine` and depth edits came later."""
+
+LATER_TEXT = FIRST_TEXT.replace('"balanced"}', '"balanced","refine":0.5}')[:-1] + (
+    ',"depth_edits":{"is_inverted":true,"far_clip":0.125,"near_clip":1.0,"gamma":2.0,"strokes":[{"tool":"nearer",'
+    '"points":[[0.5,0.25],[0.75,0.25]],"radius":0.03,"strength":0.25}]}}'
+)
+SAVED = SavedSettings(
+    Optics(
+        eye=ViewOffset(t=-0.5, s=0.5),
+        focus_disparity=0.2,
+        focus_range=0.25,
+        focus_tilt=(0.0, 1.5),
+        aperture_diameter=2.0,
+        aperture_shape=ApertureShape("mask", mask=ApertureMask("stär.png", 1, 3, b"\x00\xff\x10")),
+        highlight_recovery=0.5,
+        exposure_stops=-1.0,
+    ),
+    1.5,
+    Source("", DepthChoice(file_scale=2.0, memory_bytes=2**30), GridShape(3, 5), max_pixels=400_000),
+    (741, 500),
+)
+STROKE = Stroke("nearer", ((0.5, 0.25), (0.75, 0.25)), 0.03, 0.25)
+
+
+def test_texts_written_before_are_read() -> None:
+    assert settings_from_text(FIRST_TEXT, "a.png") == SAVED
+    depth = replace(SAVED.source.depth, refine=0.5)
+    edits = DepthEdits(is_inverted=True, far_clip=0.125, gamma=2.0, strokes=(STROKE,))
+    later = replace(SAVED, source=replace(SAVED.source, depth=depth), depth_edits=edits)
+    assert settings_from_text(LATER_TEXT, "a.png") == later
+    assert settings_text(later) == LATER_TEXT
+
+
+def test_numbers_of_numpy_are_written_like_any() -> None:
+    optics = Optics(focus_disparity=np.float64(0.1))
+    assert settings_text(replace(SAVED, optics=optics)) == settings_text(
+        replace(SAVED, optics=Optics(focus_disparity=0.1))
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (changed(format=2), "format 2"),
+        (changed(optics__eye=["1", 2]), "optics.eye"),
+        (changed(optics__dolly=None), "optics.dolly"),
+        (changed(optics__aperture_shape__kind="star"), "optics.aperture_shape.kind"),
+        (changed(optics__aperture_shape__blades=2), "optics.aperture_shape.blades"),
+        (changed(optics__aperture_shape__mask={"name": "a", "rows": 2, "columns": 2, "values": "AAAA"}), "shape.mask"),
+        (changed(source__grid=[0, 3]), "source.grid"),
+        (changed(source__quality="best"), "source.quality"),
+        (changed(depth_edits={"gamma": 0.0}), "gamma"),
+        (changed(size_px=[0, 10]), "size_px"),
+    ],
+)
+def test_what_is_damaged_is_named(text: str, named: str) -> None:
+    with pytest.raises(InputError) as error:
+        settings_from_text(text, "a.png")
+    assert str(error.value).startswith("a.png: ")
+    assert named in str(error.value)
+
+
+def test_what_a_later_program_added_is_named_and_the_rest_counts() -> None:
+    strokes = [{"tool": "nearer", "points": [[0.5, 0.25]], "radius": 0.03, "strength": 0.25, "tilt_deg": 5}]
+    text = changed(film="grain", optics__bokeh={"deep": [1]}, depth_edits={"strokes": strokes}, source__a="\n" * 90)
+    state = reduce(state_with(None), SceneOpened(1, scene_of(settings=text)))
+    (notice,) = state.notices
+    assert not notice.is_error
+    assert notice.offer is not None
+    assert notice.offer.unknown_fields == ("optics.bokeh", "source.a", "film", "depth_edits.strokes.tilt_deg")
+    assert replace(notice.offer, unknown_fields=(), depth_edits=ONE.depth_edits) == ONE
+    assert "optics.bokeh, source.a, film and 1 more" in notice.text
+    assert "film" not in settings_text(notice.offer)
+
+
 def test_a_saved_picture_opens_as_a_photo_and_offers_its_settings() -> None:
     state = reduce(state_with(None), SceneOpened(1, scene_of(settings=settings_text(ONE))))
     (notice,) = state.notices
@@ -150,7 +239,7 @@ def test_pictures_without_settings_and_other_files(tmp_path: Path) -> None:
 
 
 def test_options_given_beat_the_saved_ones() -> None:
-    source = Source("photo.png", "map.pfm", 2.0, GridShape(9, 9))
+    source = Source("photo.png", DepthChoice("model", "map.pfm", 2.0), GridShape(9, 9))
     merged = source_like(source, ONE, given={"grid"})
-    assert merged == Source("photo.png", "map.pfm", 1.0, GridShape(9, 9))
+    assert merged == Source("photo.png", DepthChoice("model", "map.pfm", 1.0), GridShape(9, 9))
     assert source_like(source, ONE, ()).grid == GridShape(3, 5)

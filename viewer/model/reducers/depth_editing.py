@@ -51,7 +51,7 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
             # the worker was stopped when the stroke began
             return replace(state, stroke=None, generation=state.generation + 1)
         case ResetDepth():
-            return _with_settings(state, DepthSettings(state.scene.source.refine), "ResetDepth", is_finished=True)
+            return _with_settings(state, DepthSettings(state.scene.source.depth.refine), "ResetDepth", is_finished=True)
     return state
 
 
@@ -76,7 +76,7 @@ def depth_settings_for_worker(state: AppState) -> DepthSettings:
     """What the worker is to make of the depth. Where another scene is asked for, it begins with its own."""
     source, scene = state.source, state.scene
     is_open = source is None or (scene is not None and scene.source is source)
-    return state.depth if source is None or is_open else DepthSettings(source.refine)
+    return state.depth if source is None or is_open else DepthSettings(source.depth.refine)
 
 
 def is_depth_ahead(state: AppState, asked_for: DepthSettings) -> bool:

@@ -8,7 +8,6 @@ from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerEvent
 from viewer.model.reducers.history import map_optics
 from viewer.model.reducers.lens import carry_optics
-from viewer.model.saved_settings import settings_from_text
 from viewer.model.state.app_state import AppState, History, Motion, Notice, Progress, Scene
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import of_next_scene
@@ -70,7 +69,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     recent = remember_recent(state.recent, scene.source.path)
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
-    depth = DepthSettings(scene.source.refine)
+    depth = DepthSettings(scene.source.depth.refine)
     return replace(opened, notices=notices, history=History(), motion=motion, recent=recent, depth=depth, stroke=None)
 
 
@@ -83,11 +82,14 @@ def _offers(scene: Scene) -> tuple[Notice, ...]:
     """A picture saved by this program brings its settings."""
     if not scene.settings:
         return ()
+    from viewer.model.saved_settings import settings_from_text, unknown_note
+
     try:
         settings = settings_from_text(scene.settings, scene.name)
     except InputError as error:
         return (Notice(str(error), is_error=True),)
-    return (Notice("This picture was saved by iibr, with its settings.", offer=settings),)
+    words = f"This picture was saved by iibr, with its settings. {unknown_note(settings)}"
+    return (Notice(words.strip(), offer=settings),)
 
 
 def _leave_job(state: AppState) -> AppState:

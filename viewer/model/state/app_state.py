@@ -6,9 +6,9 @@ Comparing two records decides what an edit costs: a new `generation` restarts th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
-from iibr_core.depth.choice import DepthOrigin, DepthStart
+from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
@@ -19,6 +19,7 @@ from viewer.model.state.saving import CancelSaveTask, Saving
 
 CENTRE = ViewOffset(0.0, 0.0)
 AS_FOUND = DepthSettings()
+AS_USUAL = DepthChoice()
 
 
 ApertureKind = Literal["disc", "polygon", "ring", "cat_eye", "mask"]
@@ -79,40 +80,37 @@ class Optics:
 class Source:
     """What to open and what the user decided about it; None leaves the choice to the program.
 
-    path: a photo or a light-field folder. disparity_path, disparity_scale, depth_start, depth_model, refine: see
-    `iibr_core.depth.choice.DepthChoice`. focus_disparity: in the units of the given disparity. quality: where the ray
+    path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
     transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`.
     """
 
     path: str
-    disparity_path: str | None = None
-    disparity_scale: float = 1.0
+    depth: DepthChoice = AS_USUAL
     grid: GridShape | None = None
     focus_disparity: float | None = None
     max_pixels: int | None = None
-    memory_bytes: int | None = None
     quality: Quality = DEFAULT_QUALITY
-    depth_start: DepthStart = "auto"
-    depth_model: str | None = None
-    refine: float = 1.0
     inpaint: str = DEFAULT_INPAINTER
 
 
 def source_beside(source: Source | None, path: str) -> Source:
     """To open another file: what was decided about the one before counts, but for what belongs to its depth map."""
-    base = source or Source("")
-    return replace(base, path=path, disparity_path=None, disparity_scale=1.0, focus_disparity=None)
+    return _with_depth(replace(source or Source(""), path=path), file=None)
 
 
 def source_with_map(source: Source, path: str) -> Source:
     """The same photo with this disparity map."""
-    return replace(source, disparity_path=path, disparity_scale=1.0, focus_disparity=None, depth_start="auto")
+    return _with_depth(source, file=path, start="auto")
 
 
 def source_with_depth(source: Source, start: DepthStart, model: str | None = None) -> Source:
     """The same photo, its depth looked for from here on; model: a name or a folder."""
-    without_map = replace(source, disparity_path=None, disparity_scale=1.0, focus_disparity=None)
-    return replace(without_map, depth_start=start, depth_model=model or source.depth_model)
+    return _with_depth(source, file=None, start=start, model=model or source.depth.model)
+
+
+def _with_depth(source: Source, **changes: Any) -> Source:
+    """What was said in the units of the map before, its scale and the focus, counts no longer."""
+    return replace(source, depth=replace(source.depth, file_scale=1.0, **changes), focus_disparity=None)
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ class Progress:
 class SavedSettings:
     """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
 
-    depth_edits: of the photo's disparity.
+    depth_edits: of the photo's disparity. unknown_fields: names of what was saved too, but is not known here.
     """
 
     optics: Optics
@@ -167,6 +165,7 @@ class SavedSettings:
     source: Source
     size_px: tuple[int, int]
     depth_edits: DepthEdits = UNEDITED
+    unknown_fields: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

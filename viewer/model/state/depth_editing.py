@@ -12,7 +12,7 @@ from iibr_core.depth.editing.edits import UNEDITED, BrushTool, DepthEdits
 
 @dataclass(frozen=True)
 class DepthSettings:
-    """What disparity is made of what was found: refined this far (see `Source.refine`), then edited."""
+    """What disparity is made of what was found: refined this far (see `DepthChoice.refine`), then edited."""
 
     refine: float = 1.0
     edits: DepthEdits = UNEDITED

@@ -73,9 +73,9 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     source = state.source
     if source is None:
         return []
-    wanted = _choice_text(source.depth_start, source.depth_model, source.disparity_path)
+    wanted = _choice_text(source.depth.start, source.depth.model, source.depth.file)
     ways: list[tuple[DepthStart, str | None]] = [("auto", None), ("embedded", None)]
-    ways += [("model", name) for name in _models(scene, source.depth_model)] + [("rough", None), ("flat", None)]
+    ways += [("model", name) for name in _models(scene, source.depth.model)] + [("rough", None), ("flat", None)]
     actions: list[Action] = []
     label("From", layout, "Where depth is looked for. The photo is opened anew.")
     if imgui.begin_combo("##depth from", wanted):
