@@ -37,9 +37,10 @@ from iibr_core.training.losses import LossWeights, color_loss, to_perceptual, to
 from iibr_core.training.scenes.random_scene import is_visible_from, random_scene, render
 from iibr_core.training.trainer import Batch
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
-from viewer.cli.train import LAMBDAS
+from viewer.cli.train import ENTROPY_WEIGHT
 
 HELD_OUT_SEED = 1_000_003
+LAMBDAS = LossWeights(entropy=ENTROPY_WEIGHT)
 HELD_OUT = 40
 LEARNING_RATE = 3e-3
 COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]

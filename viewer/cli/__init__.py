@@ -1,1 +1,1 @@
-"""The `iibr` command: one file a command."""
+"""The `iibr` command: one file a command, one line for each in `main`."""

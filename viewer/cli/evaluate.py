@@ -1,4 +1,4 @@
-"""What `iibr evaluate` does: finds scenes, judges them, writes the report. Heavy imports wait."""
+"""`iibr evaluate`: finds scenes, judges them, writes the report. Heavy imports wait."""
 
 from __future__ import annotations
 

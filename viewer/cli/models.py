@@ -1,4 +1,4 @@
-"""What `iibr models` does: list the depth models that are known and which of them are here; fetch one."""
+"""`iibr models`: list the depth models that are known and which of them are here; fetch one."""
 
 from __future__ import annotations
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
 
 import typer
 
-from iibr_core.depth.choice import DepthStart
+from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.types import GridShape, Quality, ViewOffset
+from iibr_core.types import GridShape, InputError, Quality, ViewOffset
+
+if TYPE_CHECKING:
+    from viewer.model.state.app_state import Source
 
 MAX_GRID = 99
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
@@ -22,6 +25,10 @@ class Size(NamedTuple):
 
     width: int
     height: int
+
+
+SCREEN_SIZE = Size(1280, 800)
+"""Of the window in pictures, unless another is asked for."""
 
 
 def grid_from_text(text: str) -> GridShape:
@@ -80,10 +87,24 @@ def finite_from_text(text: str) -> float:
 
 
 def given_options(context: typer.Context) -> set[str]:
-    """Names of the options that were given rather than left at their defaults, as fields of `Source` where they are."""
+    """Names of the options that were given, not left at their defaults; as fields of `SourceText` where they are."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
     names = {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
     return names | {"memory_bytes"} if "memory" in names else names
+
+
+def depth_choice(
+    file: Path | None, file_scale: float, start: DepthStart, model: str | None, refine: float, memory_bytes: int | None
+) -> DepthChoice:
+    """What the options about depth say, in the order of their declarations below."""
+    return DepthChoice(start, str(file) if file else None, file_scale, model, refine, memory_bytes)
+
+
+def require_existing(source: Source) -> None:
+    """Raise InputError before a window opens, rather than say so in it."""
+    for path in (source.path, source.depth.file):
+        if path is not None and not Path(path).exists():
+            raise InputError(f"{path}: no such file")
 
 
 def memory_from_text(text: str) -> int:

@@ -30,7 +30,7 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, step: int) -> None:
             signal.raise_signal(signal.SIGINT)
         return training_batch(now, seed)
 
-    monkeypatch.setattr("viewer.cli.train.training_batch", batch)
+    monkeypatch.setattr("iibr_core.training.batches.training_batch", batch)
 
 
 def test_three_steps_write_weights_that_say_where_they_come_from(
@@ -69,7 +69,7 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_gives_the_same_weights(
     from iibr_core.training.batches import training_batch
 
     monkeypatch.setattr(
-        "viewer.cli.train.training_batch", lambda now, seed: made.append(now) or training_batch(now, seed)
+        "iibr_core.training.batches.training_batch", lambda now, seed: made.append(now) or training_batch(now, seed)
     )
     assert run(monkeypatch, *again) == 0
     assert made == [3]
@@ -94,7 +94,7 @@ def test_training_that_diverges_is_one_line_that_names_the_step(
         good = training_batch(now, seed)
         return replace(good, truth=good.truth * math.nan) if now == 2 else good
 
-    monkeypatch.setattr("viewer.cli.train.training_batch", batch)
+    monkeypatch.setattr("iibr_core.training.batches.training_batch", batch)
     out = tmp_path / "w.safetensors"
     assert run(monkeypatch, *WORDS, "--steps", 3, "--checkpoint-every", 1, "--out", out) == 1
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
@@ -135,7 +135,7 @@ def test_bad_values_are_one_line_and_leave_nothing(
 
 
 def test_a_bug_in_a_batch_is_shown_as_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("viewer.cli.train.training_batch", lambda step, seed: 1 / 0)
+    monkeypatch.setattr("iibr_core.training.batches.training_batch", lambda step, seed: 1 / 0)
     monkeypatch.setattr(sys, "argv", ["iibr", "train", "--steps", "2", "--out", str(tmp_path / "w.safetensors")])
     with pytest.raises(ZeroDivisionError):
         main()

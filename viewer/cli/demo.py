@@ -1,0 +1,60 @@
+"""`iibr demo`: the window on the photo that comes along, or pictures of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from iibr_core.types import InputError
+from viewer.cli.options import SCREEN_SIZE
+from viewer.cli.terminal import show_progress
+
+if TYPE_CHECKING:
+    from viewer.model.state.app_state import Source
+
+DEMO_FOLDER = Path("out")
+
+
+def demo_photo() -> Path:
+    """The photo that comes with the program; its disparity lies beside it."""
+    from iibr_core.runtime.resources import resource_folder
+
+    return resource_folder("assets") / "motorcycle" / "motorcycle.png"
+
+
+def demo() -> None:
+    """Open the viewer on the demo photo; without a display, render it to out/demo.png and out/demo-views.png.
+
+    Example: iibr demo
+    """
+    from viewer.app.main_loop import App, initial_state
+    from viewer.app.preferences_store import user_folder
+    from viewer.model.actions import OpenPath
+    from viewer.model.state.app_state import Source
+
+    source = Source(str(demo_photo()))
+    try:
+        window = App(initial_state(OpenPath(source)), user_folder())
+    except InputError as error:
+        print(f"{error}. Rendering without one.")
+        _demo_pictures(source)
+        return
+    try:
+        window.run()
+    finally:
+        window.close()
+
+
+def _demo_pictures(source: Source) -> None:
+    from viewer.app.contact_sheet import contact_sheet
+    from viewer.app.headless import HeadlessViewer
+    from viewer.app.image_export import export_image
+
+    DEMO_FOLDER.mkdir(exist_ok=True)
+    with HeadlessViewer() as viewer:
+        with show_progress("reading") as show:
+            viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total, progress.doing))
+        export_image(DEMO_FOLDER / "demo.png", viewer.screen(SCREEN_SIZE) if viewer.has_panels else viewer.picture())
+        export_image(DEMO_FOLDER / "demo-views.png", contact_sheet(viewer))
+    print(f"{DEMO_FOLDER / 'demo.png'}: the viewer's window")
+    print(f"{DEMO_FOLDER / 'demo-views.png'}: viewpoints above, focus from near to far below")

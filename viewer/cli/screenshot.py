@@ -1,0 +1,157 @@
+"""`iibr screenshot`: one picture, without a display."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
+from iibr_core.types import DEFAULT_QUALITY, InputError, ViewOffset
+from viewer.cli.options import (
+    SCREEN_SIZE,
+    DepthFrom,
+    DepthModel,
+    DepthStrength,
+    DisparityFile,
+    DisparityScale,
+    FocusDisparity,
+    Grid,
+    Inpaint,
+    MaxPixels,
+    Memory,
+    QualityChoice,
+    Refine,
+    ScenePath,
+    Size,
+    depth_choice,
+    given_options,
+    number_option,
+    require_existing,
+    size_from_text,
+    view_from_text,
+)
+from viewer.cli.terminal import print_depth, print_notes, show_progress
+
+if TYPE_CHECKING:
+    from viewer.model.actions import Action
+    from viewer.model.state.app_state import Source
+
+
+class Backend(StrEnum):
+    """Where OpenGL comes from without a window."""
+
+    auto = "auto"
+    egl = "egl"
+    osmesa = "osmesa"
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """What is opened, and what is done to it before the picture is taken. size: None for the usual one."""
+
+    source: Source
+    depth_strength: float
+    size: Size | None
+    edits: DepthEdits = UNEDITED
+    actions: tuple[Action, ...] = ()
+
+
+def screenshot(
+    context: typer.Context,
+    path: ScenePath,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Image to write (.png, .exr).")],
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A picture saved before: take its settings, except for those given here.",
+            show_default=False,
+        ),
+    ] = None,
+    view: Annotated[
+        ViewOffset | None,
+        typer.Option(
+            parser=view_from_text, metavar="S,T", help="Viewpoint in view steps, right and down.", show_default="0,0"
+        ),
+    ] = None,
+    focus: Annotated[
+        float | None, number_option("Disparity that is sharp, px per view step (the panel's Focus).")
+    ] = None,
+    aperture: Annotated[float | None, number_option("Aperture diameter in view steps.")] = None,
+    size: Annotated[
+        Size | None,
+        typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
+    ] = None,
+    ui: Annotated[bool, typer.Option("--ui", help="With the panels, as in the window.")] = False,
+    backend: Annotated[Backend, typer.Option(help="Where OpenGL comes from.")] = Backend.auto,
+    disparity: DisparityFile = None,
+    disparity_scale: DisparityScale = 1.0,
+    depth: DepthFrom = "auto",
+    depth_model: DepthModel = None,
+    refine: Refine = 1.0,
+    depth_strength: DepthStrength = 1.0,
+    focus_disparity: FocusDisparity = None,
+    grid: Grid = None,
+    max_pixels: MaxPixels = None,
+    memory: Memory = None,
+    quality: QualityChoice = DEFAULT_QUALITY,
+    inpaint: Inpaint = DEFAULT_INPAINTER,
+) -> None:
+    """Render one picture without a display; its settings are saved in it.
+
+    Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
+    """
+    from viewer.model.actions import MoveEye, SetAperture, SetFocus
+    from viewer.model.state.app_state import Source
+
+    choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
+    shot = _Shot(Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint), depth_strength, size)
+    require_existing(shot.source)
+    if like is not None:
+        shot = _shot_like(shot, like, given_options(context), ui)
+    actions: list[Action] = [] if view is None else [MoveEye(view)]
+    actions += [] if focus is None else [SetFocus(focus)]
+    actions += [] if aperture is None else [SetAperture(aperture)]
+    _write(replace(shot, actions=(*shot.actions, *actions)), output, ui, backend)
+    print(output)
+
+
+def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Shot:
+    """With the settings of a picture saved before, except for the options given."""
+    from viewer.model.actions import TakeSettings
+    from viewer.model.saved_settings import read_settings, source_like, unknown_note
+
+    saved = read_settings(like)
+    print_notes(tuple(filter(None, [unknown_note(saved)])))
+    return _Shot(
+        source_like(shot.source, saved, given),
+        shot.depth_strength if "depth_strength" in given else saved.depth_strength,
+        shot.size or (None if ui else Size(*saved.size_px)),
+        saved.depth_edits,
+        (TakeSettings(saved),),
+    )
+
+
+def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> None:
+    from viewer.app.headless import HeadlessViewer
+    from viewer.app.image_export import export_image, is_float, settings_of
+
+    with HeadlessViewer(backend.value) as viewer:
+        if ui and not viewer.has_panels:
+            raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
+        with show_progress("reading") as show:
+            viewer.open(
+                shot.source, shot.depth_strength, lambda made: show(made.done, made.total, made.doing), shot.edits
+            )
+        if viewer.state.scene is not None:
+            print_depth(viewer.state.scene.depth_origin)
+            print_notes(viewer.state.scene.notes)
+        viewer.do(*shot.actions)
+        pixels = viewer.screen(shot.size or SCREEN_SIZE) if ui else viewer.picture(shot.size, is_float(output))
+    export_image(output, pixels, None if ui else settings_of(viewer.state, (pixels.shape[1], pixels.shape[0])))
