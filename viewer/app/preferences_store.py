@@ -1,4 +1,7 @@
-"""What outlasts the program: preferences and recent files, as JSON in the user's own folder. Damage counts as none."""
+"""What outlasts the program: preferences and recent files, as JSON in the user's own folder.
+
+Read by hand, in no time: it is done before the window opens, where importing a library for it takes 10 to 40 ms.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import dataclasses
 import json
 import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +17,12 @@ from iibr_core.formats.files import atomic_write
 from iibr_core.types import InputError
 from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
 from viewer.model.reducers.worker_events import RECENT_KEPT
-from viewer.model.state.app_state import SECTIONS, AppState, Notice, Preferences
+from viewer.model.state.app_state import SECTIONS, AppState, Notice, Preferences, Section, Theme
 
 PREFERENCES_FILE = "preferences.json"
 RECENT_FILE = "recent.json"
 LARGEST_COORDINATE = 100_000
+LEFT_OUT_TOLD = 4
 
 
 def user_folder() -> Path:
@@ -28,10 +33,14 @@ def user_folder() -> Path:
 
 
 def load_preferences(state: AppState, folder: Path) -> AppState:
-    """The state with what was kept; a damaged file is left out, with a notice."""
+    """The state with what was kept; a damaged file or value is left out, with a notice that names it."""
     preferences, recent, notices = state.preferences, state.recent, state.notices
     try:
-        preferences = _preferences(_read(folder / PREFERENCES_FILE))
+        preferences, left_out = _preferences(_read(folder / PREFERENCES_FILE))
+        if left_out:
+            names = f"{', '.join(left_out[:LEFT_OUT_TOLD])}{' …' * (len(left_out) > LEFT_OUT_TOLD)}"
+            path = folder / PREFERENCES_FILE
+            notices = (*notices, Notice(f"{path}: not understood and left out: {names}; the rest counts"))
     except InputError as error:
         notices = (*notices, Notice(f"{error}; the usual preferences are used"))
     try:
@@ -67,31 +76,59 @@ def _read(path: Path) -> Any:
         raise InputError(f"{path}: damaged ({' '.join(str(error).split())[:80]})") from error
 
 
-def _preferences(kept: Any) -> Preferences:
-    """Each value that makes sense; the usual one for each that does not."""
-    usual = Preferences()
+def _preferences(kept: Any) -> tuple[Preferences, tuple[str, ...]]:
+    """Each value that makes sense, the usual one for each that does not, and the names of these and of unknown ones."""
     if kept is None:
-        return usual
+        return Preferences(), ()
     if not isinstance(kept, dict):
         raise InputError(f"{PREFERENCES_FILE}: damaged (no object)")
-    theme, scale, sections = kept.get("theme"), kept.get("font_scale"), kept.get("open_sections")
-    is_scale = isinstance(scale, int | float) and 0 < scale < math.inf
-    return Preferences(
-        theme="light" if theme == "light" else "dark",
-        font_scale=clamp(float(scale or 1), *FONT_SCALE_LIMITS) if is_scale else usual.font_scale,
-        open_sections=tuple(s for s in SECTIONS if s in sections)
-        if isinstance(sections, list)
-        else usual.open_sections,
-        window=_place(kept.get("window")),
-    )
+    values: dict[str, Any] = {}
+    left_out = [name for name in kept if name not in _READERS]
+    for name in _READERS.keys() & kept.keys():
+        try:
+            values[name] = _READERS[name](kept[name])
+        except ValueError:
+            left_out.append(name)
+    if "open_sections" in values and any(section not in SECTIONS for section in kept["open_sections"]):
+        left_out.append("open_sections")  # in part
+    return Preferences(**values), tuple(sorted(" ".join(name.split())[:40] for name in left_out))
+
+
+def _theme(kept: Any) -> Theme:
+    if kept not in ("dark", "light"):
+        raise ValueError
+    return "light" if kept == "light" else "dark"
+
+
+def _font_scale(kept: Any) -> float:
+    if isinstance(kept, bool) or not isinstance(kept, int | float) or not 0 < kept < math.inf:
+        raise ValueError
+    return clamp(float(min(kept, FONT_SCALE_LIMITS[1])), *FONT_SCALE_LIMITS)
+
+
+def _sections(kept: Any) -> tuple[Section, ...]:
+    if not isinstance(kept, list):
+        raise ValueError
+    return tuple(section for section in SECTIONS if section in kept)
 
 
 def _place(kept: Any) -> tuple[int, int, int, int] | None:
-    if not isinstance(kept, list) or len(kept) != 4 or not all(type(value) is int for value in kept):
+    """None, too, where no window can be: that is no damage, for it may have been there."""
+    if kept is None:
         return None
+    if not isinstance(kept, list) or len(kept) != 4 or not all(type(value) is int for value in kept):
+        raise ValueError
     x, y, width, height = kept
     is_possible = max(map(abs, kept)) <= LARGEST_COORDINATE and width >= 200 and height >= 150
     return (x, y, width, height) if is_possible else None
+
+
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "theme": _theme,
+    "font_scale": _font_scale,
+    "open_sections": _sections,
+    "window": _place,
+}
 
 
 def _recent(kept: Any) -> tuple[str, ...]:

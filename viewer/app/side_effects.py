@@ -17,7 +17,7 @@ from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, AskForPath, Notify, SetApertureShape, ShowPrompt, TaskTaken
-from viewer.model.opening import action_for_path
+from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import (
     ApertureMask,
     AppState,

@@ -1,4 +1,7 @@
-"""Everything that can be done by name or key: what the keyboard, the map on F1 and the command palette read."""
+"""Everything that can be done by name or key: what the keyboard, the map on F1 and the command palette read.
+
+And what becomes of a path that the user chose, in a dialog or by typing it.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from viewer.model.actions import (
     ApplyPreset,
     AskToSave,
     DoTask,
+    OpenPath,
     PauseMotion,
     Quit,
     Redo,
@@ -25,7 +29,19 @@ from viewer.model.actions import (
     Undo,
 )
 from viewer.model.lens.presets import PRESETS
-from viewer.model.state.app_state import LOOPS, AppState, ChooseTask, LoopKind, PalettePrompt
+from viewer.model.state.app_state import (
+    LOOPS,
+    AppState,
+    ChoiceOf,
+    ChooseTask,
+    LoopKind,
+    PalettePrompt,
+    ReadMaskTask,
+    ReadTruthTask,
+    source_beside,
+    source_with_depth,
+    source_with_map,
+)
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
 from viewer.model.state.inspection import (
     COMPARISONS,
@@ -158,3 +174,17 @@ def commands_matching(text: str) -> tuple[Command, ...]:
     """Commands whose names hold every word typed."""
     words = text.lower().split()
     return tuple(command for command in COMMANDS if all(word in command.name.lower() for word in words))
+
+
+def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
+    """What a path that the user chose is for."""
+    match what:
+        case "mask":
+            return DoTask(ReadMaskTask(path))
+        case "truth":
+            return DoTask(ReadTruthTask(path))
+        case "map" if state.source is not None:
+            return OpenPath(source_with_map(state.source, path))
+        case "model" if state.source is not None:
+            return OpenPath(source_with_depth(state.source, "model", path))
+    return OpenPath(source_beside(state.source, path))

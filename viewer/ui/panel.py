@@ -20,7 +20,7 @@ from viewer.ui.sections.lens import aperture_section, focus_section, light_secti
 from viewer.ui.sections.scene import scene_section
 from viewer.ui.sections.view import view_section
 from viewer.ui.style import Palette, palette_of
-from viewer.ui.widgets import button, gap, heading, quiet, tooltip
+from viewer.ui.widgets import button, gap, heading, last_part, quiet, tooltip
 
 TOOLS = (
     (icons.ICON_FA_IMAGE, "Open a photo…"),
@@ -151,15 +151,11 @@ def _recent(paths: tuple[str, ...], source: Source | None, layout: Layout) -> li
     if paths:
         quiet("Recent")
     for path in paths:
-        is_chosen, _ = imgui.selectable(f"{_last_part(path)}##{path}", False)
+        is_chosen, _ = imgui.selectable(f"{last_part(path)}##{path}", False)
         tooltip(path, layout)
         if is_chosen:
             actions.append(OpenPath(source_beside(source, path)))
     return actions
-
-
-def _last_part(path: str) -> str:
-    return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or path
 
 
 def _progress(state: AppState, layout: Layout) -> list[Action]:

@@ -116,3 +116,8 @@ def tooltip(text: str, layout: Layout) -> None:
         imgui.text(text)
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
+
+
+def last_part(path: str) -> str:
+    """Name of a file or folder, without those above it; of any system's paths."""
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or path

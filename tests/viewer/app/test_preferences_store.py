@@ -44,31 +44,56 @@ def test_damaged_files_give_a_notice_each_and_the_usual_values(tmp_path: Path, d
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "read"),
+    ("field", "value", "read", "is_told"),
     [
-        ("theme", "purple", "dark"),
-        ("theme", ["light"], "dark"),
-        ("font_scale", 1e9, FONT_SCALE_LIMITS[1]),
-        ("font_scale", float("nan"), 1.0),
-        ("font_scale", "2", 1.0),
-        ("font_scale", -3, 1.0),
-        ("open_sections", ["scene", "kitchen", 7], ("scene",)),
-        ("open_sections", 3, Preferences().open_sections),
-        ("window", [0, 0, 800, 600], (0, 0, 800, 600)),
-        ("window", [0, 0, 8, 6], None),
-        ("window", [0, 0, 10**9, 600], None),
-        ("window", [0.5, 0, 800, 600], None),
-        ("window", "here", None),
+        ("theme", "purple", "dark", True),
+        ("theme", ["light"], "dark", True),
+        ("font_scale", 1e9, FONT_SCALE_LIMITS[1], False),
+        ("font_scale", 10**400, FONT_SCALE_LIMITS[1], False),
+        ("font_scale", float("nan"), 1.0, True),
+        ("font_scale", "2", 1.0, True),
+        ("font_scale", True, 1.0, True),
+        ("font_scale", -3, 1.0, True),
+        ("open_sections", ["scene", "kitchen", 7], ("scene",), True),
+        ("open_sections", [["scene"], {}], (), True),
+        ("open_sections", 3, Preferences().open_sections, True),
+        ("window", [0, 0, 800, 600], (0, 0, 800, 600), False),
+        ("window", [0, 0, 8, 6], None, False),
+        ("window", [0, 0, 10**9, 600], None, False),
+        ("window", [0.5, 0, 800, 600], None, True),
+        ("window", "here", None, True),
     ],
 )
-def test_a_senseless_value_does_not_lose_the_others(tmp_path: Path, field: str, value: object, read: object) -> None:
+def test_a_senseless_value_is_named_and_does_not_lose_the_others(
+    tmp_path: Path, field: str, value: object, read: object, is_told: bool
+) -> None:
     kept = {"theme": "light", "font_scale": 1.5, "open_sections": [], "window": None, field: value}
     (tmp_path / PREFERENCES_FILE).write_text(json.dumps(kept))
     state = load_preferences(AppState(), tmp_path)
     assert getattr(state.preferences, field) == read
-    assert state.notices == ()
+    assert [field in notice.text and PREFERENCES_FILE in notice.text for notice in state.notices] == [True] * is_told
     if field != "theme":
         assert state.preferences.theme == "light"
+
+
+def test_what_a_later_program_keeps_is_named_and_the_rest_counts(tmp_path: Path) -> None:
+    (tmp_path / PREFERENCES_FILE).write_text(json.dumps({"theme": "light", "language\n": "de"}))
+    state = load_preferences(AppState(), tmp_path)
+    assert state.preferences == Preferences(theme="light")
+    (notice,) = state.notices
+    assert "left out: language;" in notice.text
+    assert "\n" not in notice.text
+
+
+def test_a_file_written_before_is_read_without_a_word(tmp_path: Path) -> None:
+    (tmp_path / PREFERENCES_FILE).write_text(
+        '{\n "theme": "light",\n "font_scale": 1.5,\n "open_sections": [\n  "view",\n  "scene"\n ],'
+        '\n "window": [\n  10,\n'
+        "  20,\n  900,\n  700\n ]\n}"
+    )
+    state = load_preferences(AppState(), tmp_path)
+    assert state.preferences == Preferences("light", 1.5, ("view", "scene"), (10, 20, 900, 700))
+    assert state.notices == ()
 
 
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:

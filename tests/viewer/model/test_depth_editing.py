@@ -21,9 +21,8 @@ from viewer.app.input import Keys, Pointer, actions_from_drop, actions_from_keys
 from viewer.background.loaded_photo import apply_depth_settings, load_photo, make_plan
 from viewer.background.scene_worker import SceneRequest, results_of
 from viewer.model.actions import AskToSave, EndGesture, MoveEye, OpenFailed, OpenPath, Redo, SceneOpened, SetFocus, Undo
-from viewer.model.commands import BY_NAME
+from viewer.model.commands import BY_NAME, action_for_path
 from viewer.model.layout import layout_of
-from viewer.model.opening import action_for_path
 from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text

@@ -7,9 +7,8 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action, DoTask, ShowPrompt
-from viewer.model.commands import COMMANDS, commands_matching
+from viewer.model.commands import COMMANDS, action_for_path, commands_matching
 from viewer.model.layout import Layout
-from viewer.model.opening import action_for_path
 from viewer.model.state.app_state import AppState, PalettePrompt, PathPrompt, Prompt, SavePrompt, SaveTask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet

@@ -16,7 +16,7 @@ from viewer.model.state.app_state import AppState, ChooseTask, Scene, source_wit
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
 from viewer.ui.sections.depth_histogram import depth_histogram
-from viewer.ui.widgets import button, checkbox, choice, gap, label, quiet, slider, tooltip
+from viewer.ui.widgets import button, checkbox, choice, gap, label, last_part, quiet, slider, tooltip
 
 START_WORDS: dict[DepthStart, str] = {
     "auto": "The best there is",
@@ -94,12 +94,8 @@ def _models(scene: Scene, chosen: str | None) -> list[str]:
 
 def _choice_text(start: DepthStart, model: str | None, path: str | None) -> str:
     if path is not None:
-        return _last_part(path)
-    return _last_part(model) if start == "model" and model else START_WORDS[start]
-
-
-def _last_part(path: str) -> str:
-    return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or path
+        return last_part(path)
+    return last_part(model) if start == "model" and model else START_WORDS[start]
 
 
 def _strengths(state: AppState, layout: Layout) -> list[Action]:
