@@ -22,7 +22,7 @@ from iibr_core.color import encoded_from_stored
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import edge_blur_px, refine
 from iibr_core.evaluation.datasets import find_scenes
-from iibr_core.evaluation.metrics import psnr
+from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
@@ -125,7 +125,7 @@ def views_psnr(colors: FloatImage, disparity: FloatImage, truth: Mapping[ViewOff
             wanted[offset] = encoded_from_stored(update.colors)
         if len(wanted) == len(truth):
             break
-    return float(np.mean([psnr(wanted[offset], truth[offset]) for offset in truth]))
+    return float(np.mean([bounded_psnr(wanted[offset], truth[offset]) for offset in truth]))
 
 
 def seconds() -> Iterator[str]:
@@ -172,7 +172,7 @@ def guess_table(data: Path) -> Iterator[str]:
         fits = [fit_to(candidate, true) for candidate in maps]
         errors = [float(np.sqrt(np.nanmean((fit - true) ** 2))) for fit in fits]
         ratios = [views_psnr(photo.pixels, fit, truth, side) for fit in fits]
-        flat = float(np.mean([psnr(photo.pixels, view) for view in truth.values()]))
+        flat = float(np.mean([bounded_psnr(photo.pixels, view) for view in truth.values()]))
         holds = f"error {yes(errors[0] < min(errors[1:]))}, PSNR {yes(ratios[0] > flat)}"
         cells = [f"{error:.2f}" for error in errors] + [f"{ratio:.2f}" for ratio in (*ratios, flat)]
         yield f"| {scene.name} | {' | '.join(cells)} | {edge_blur_px(guess):.1f} | {holds} |"

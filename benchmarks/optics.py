@@ -21,15 +21,15 @@ from pathlib import Path
 
 import numpy as np
 import psutil
-from flip_evaluator import evaluate
 from numpy.typing import NDArray
 
 from benchmarks.light_fields import StoredField, read_field
 from benchmarks.refocus import plain_pass
 from benchmarks.speed.rendering import DrawVariant, draw, drawing_cost, shear_light
 from iibr_core.color import encoded_from_stored, srgb_from_linear
+from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.cost_model import CORES
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import FloatImage, GridShape, ViewOffset
 from viewer.gpu.context import GLContext
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.frame_budget import QUALITY_LEVELS, stretch_image
@@ -50,20 +50,7 @@ LEVEL_APERTURES = 0.0, 4.0, 8.0
 """View steps: a drag chooses another level for each."""
 
 
-def psnr_db(image: NDArray[np.float64] | Image, reference: NDArray[np.float64] | Image, border: int = 0) -> float:
-    """Of values 0..255, inside the border."""
-    inside = slice(border, -border or None)
-    difference = image[inside, inside].astype(float) - reference[inside, inside]
-    return float(10 * np.log10(255**2 / max(np.mean(difference**2), 1e-12)))
-
-
-def mean_flip(reference: Image, image: Image) -> float:
-    """Mean FLIP of two sRGB pictures."""
-    pair = [picture.astype(np.float32) / 255 for picture in (reference, image)]
-    return float(evaluate(*pair, "LDR", applyMagma=False)[1])
-
-
-def drawn(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: DrawVariant) -> Image:
+def draw_picture(renderer: Renderer, optics: Optics, size_px: tuple[int, int], variant: DrawVariant) -> Image:
     """The picture of a variant whose views are uploaded."""
     draw(renderer, optics, size_px, variant)
     return stretch_image(renderer.read_image(), size_px)
@@ -92,14 +79,14 @@ def quality_level_table(gl: GLContext, field: StoredField, optics: Optics, round
     renderer, watch = Renderer(gl), Stopwatch(gl, field, optics, rounds)
     field.upload(renderer, field.every)
     chosen = [replace(optics, eye=BETWEEN, aperture_diameter=diameter) for diameter in LEVEL_APERTURES]
-    references = [drawn(renderer, each, SIZE_PX, replace(PLAIN, is_converged=True)) for each in chosen]
+    references = [draw_picture(renderer, each, SIZE_PX, replace(PLAIN, is_converged=True)) for each in chosen]
     for level in QUALITY_LEVELS:
         row = f"| {level.stride} | {level.sources} | {level.scale:g} |"
         for each, reference in zip(chosen, references):
             variant = DrawVariant("", level)
-            image = drawn(renderer, each, SIZE_PX, variant)
+            image = draw_picture(renderer, each, SIZE_PX, variant)
             own, _ = watch.milliseconds(partial(draw, renderer, each, SIZE_PX, variant))
-            row += f" {own:.0f} | {mean_flip(reference, image):.4f} |"
+            row += f" {own:.0f} | {flip(image, reference):.4f} |"
         yield row
     renderer.release()
 
@@ -122,13 +109,13 @@ def growth_while_filling(gl: GLContext, field: StoredField, optics: Optics) -> f
     """The most by which a view that arrives makes the picture worse (rms to the full field's, 1 = white)."""
     renderer = Renderer(gl)
     field.upload(renderer, field.every)
-    final = drawn(renderer, optics, field.size_px, PLAIN).astype(float)
+    final = draw_picture(renderer, optics, field.size_px, PLAIN).astype(float)
     order = sorted(field.every, key=lambda at: (at != field.grid.centre, -sum((np.array(at) - field.grid.centre) ** 2)))
     renderer.open_field(field.grid, *field.size_px, hdr=False, with_disparity=True)
     errors: list[float] = []
     for at in order:
         renderer.upload_view(*at, field.views[at], field.disparities[at])
-        difference = drawn(renderer, optics, field.size_px, PLAIN) - final
+        difference = draw_picture(renderer, optics, field.size_px, PLAIN) - final
         errors.append(float(np.sqrt(np.mean(difference**2)) / 255))
     renderer.release()
     return max(after - min(errors[: k + 1]) for k, after in enumerate(errors))
@@ -150,32 +137,32 @@ def bokeh_from_a_quarter(gl: GLContext, field: StoredField, optics: Optics) -> f
         if 4 * renderer.samples_drawn <= renderer.samples_converged:
             quarter = renderer.read_image()
         renderer.refine(0.0)
-    flip = mean_flip(renderer.read_image(), quarter)
+    error = flip(quarter, renderer.read_image())
     renderer.release()
-    return flip
+    return error
 
 
 def aliasing(gl: GLContext, field: StoredField, optics: Optics) -> tuple[float, float]:
     """PSNR of refocusing 5x5 stored views, and all 81, against the numpy sum of all 81."""
-    reference = numpy_refocus(field, optics)
+    reference, inside = numpy_refocus(field, optics), np.s_[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     renderer = Renderer(gl)
     results = []
     for stored in (EVERY_SECOND, field.every):
         field.upload(renderer, stored)
-        image = drawn(renderer, optics, field.size_px, PLAIN)
-        results.append(psnr_db(image, reference, BORDER_PX))
+        image = draw_picture(renderer, optics, field.size_px, PLAIN)
+        results.append(psnr(encoded_from_stored(image)[inside], reference[inside]))
     renderer.release()
     return results[0], results[1]
 
 
-def numpy_refocus(field: StoredField, optics: Optics) -> NDArray[np.float64]:
-    """(H, W, 3), 0..255: the weighted mean of the views in linear light, sheared by Catmull-Rom interpolation."""
+def numpy_refocus(field: StoredField, optics: Optics) -> FloatImage:
+    """(H, W, 3), sRGB-encoded: the weighted mean of the views in linear light, sheared by Catmull-Rom interpolation."""
     samples = aperture_samples(optics.eye, optics.aperture_diameter, field.grid, np.ones(field.grid, bool))
     total = np.zeros(field.views.shape[2:])
     for wanted, row, column, weight in samples:
         by_px = optics.focus_disparity * (wanted.t - optics.eye.t), optics.focus_disparity * (wanted.s - optics.eye.s)
         total += weight * shear_light(encoded_from_stored(field.views[row, column]), by_px)
-    return np.clip(srgb_from_linear(total / sum(sample.weight for sample in samples)), 0, 1) * 255.0
+    return np.clip(srgb_from_linear(total / sum(sample.weight for sample in samples)), 0, 1)
 
 
 def pinhole_from_five(gl: GLContext, field: StoredField) -> tuple[float, float]:
@@ -187,7 +174,7 @@ def pinhole_from_five(gl: GLContext, field: StoredField) -> tuple[float, float]:
         if at not in FIVE:
             renderer.render(Optics(eye=field.grid.offset(*at)), field.size_px)
             renderer.refine()
-            values.append(psnr_db(renderer.read_image(), field.views[at]))
+            values.append(psnr(renderer.read_image(), field.views[at]))
     renderer.release()
     return float(np.mean(values)), min(values)
 
@@ -233,8 +220,8 @@ def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[st
     yield "\n## Figures\n\n| what | figure | measured |\n| --- | --- | --- |"
     yield from refocus_figures(gl, shop, bokeh[shop.name], rounds)
     for field in (antinous, shop):
-        flip = bokeh_from_a_quarter(gl, field, replace(bokeh[field.name], aperture_diameter=8.0))
-        yield f"| bokeh at 1/4 of the samples against converged, {field.name} | FLIP <= 0.02 | {flip:.4f} |"
+        error = bokeh_from_a_quarter(gl, field, replace(bokeh[field.name], aperture_diameter=8.0))
+        yield f"| bokeh at 1/4 of the samples against converged, {field.name} | FLIP <= 0.02 | {error:.4f} |"
     for field in (antinous, shop):
         sparse, dense = aliasing(gl, field, replace(bokeh[field.name], aperture_diameter=8.0))
         measured = f"{sparse:.2f} dB against {dense:.2f} dB: {dense - sparse:+.2f} dB"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from benchmarks import plucker
 from benchmarks.speed.variants import BenchScene, bench_scenes
 from iibr_core.evaluation.datasets import find_scenes
-from iibr_core.evaluation.metrics import psnr
+from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.generation.light_field import transformer_for
 from iibr_core.generation.update_loop import complete_ray_set
@@ -213,7 +213,7 @@ def scene_psnr(truth: BenchScene, weigh: Weigh | None, choice: RayChoice) -> flo
     described = None if weigh is None else lambda ambiguous: weigh(choice.described(rays, ambiguous))
     with ViewSynthesis(transformer=described, hypotheses=choice.hypotheses) as synthesis:
         views = ((synthesis.render(rays, at).colors, image) for at, image in truth.truth.items())
-        return float(np.mean([psnr(colors, image) for colors, image in views]))
+        return float(np.mean([bounded_psnr(colors, image) for colors, image in views]))
 
 
 def masks() -> list[str]:

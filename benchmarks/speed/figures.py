@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.speed.measure import Cost, Tell, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
 from benchmarks.speed.prediction import whole_field
 from benchmarks.speed.variants import REFERENCE, BenchScene, Draw, Variant, evaluated_views, field_cost, is_possible
-from iibr_core.evaluation.metrics import flip, psnr
+from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, plan_for_viewing
 from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX
 
@@ -85,7 +85,7 @@ def measure_scene(
 def _errors(variant: Variant, scene: BenchScene, draw: Draw | None) -> tuple[float, float]:
     """Mean PSNR and FLIP over the judged views."""
     made = evaluated_views(variant, scene, draw)
-    errors = [(psnr(image, scene.truth[at]), flip(image, scene.truth[at])) for at, image in made.items()]
+    errors = [(bounded_psnr(image, scene.truth[at]), flip(image, scene.truth[at])) for at, image in made.items()]
     mean_psnr, mean_flip = np.mean(errors, axis=0)
     return float(mean_psnr), float(mean_flip)
 

@@ -15,7 +15,7 @@ from benchmarks.speed.prediction import whole_field
 from benchmarks.speed.rendering_figures import DrawingFigures, Drawn
 from benchmarks.speed.variants import BenchScene
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear, stored_from_encoded
-from iibr_core.evaluation.metrics import flip, psnr
+from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.generation.cost_model import CORES
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
@@ -177,7 +177,7 @@ class _Drawer:
         self._upload(variant)
         draw(self.renderer, optics, self._size_px, variant)
         image = stretch_image(self.renderer.read_image(), self._size_px).astype(np.float32) / np.float32(255)
-        return self.renderer.samples_drawn, psnr(image, truth), flip(image, truth)
+        return self.renderer.samples_drawn, bounded_psnr(image, truth), flip(image, truth)
 
     def _upload(self, variant: DrawVariant) -> None:
         if variant.stored == self._uploaded:

@@ -1,6 +1,7 @@
-"""How far a picture is from the true one: PSNR, SSIM, FLIP, of sRGB-encoded colours in 0..1 (LPIPS: see lpips.py).
+"""How far a picture is from the true one: PSNR, SSIM, FLIP, of sRGB-encoded colours (LPIPS: see lpips.py).
 
 All take (image, truth), (H, W, 3), and a mask (H, W) of the pixels that count, None for all; NaN where none does.
+Floats hold 1 for white, bytes 255; either gives the same. Light to import: the viewer uses it too.
 """
 
 from __future__ import annotations
@@ -13,18 +14,29 @@ from numpy.typing import NDArray
 from iibr_core.types import FloatImage
 
 Mask = NDArray[np.bool_]
+Image = FloatImage | NDArray[np.uint8]
 
-LEAST_SQUARE = 1e-10
-"""Mean squared errors count as at least this: equal pictures have 100 dB."""
+MOST_DB = 100.0
+"""What equal pictures count as where means are taken."""
 SSIM_SIGMA = 1.5
 SSIM_LEAST_PX = 11
 
 
-def psnr(image: FloatImage, truth: FloatImage, mask: Mask | None = None) -> float:
-    """Peak signal-to-noise ratio in dB, at most 100."""
+def psnr(image: Image, truth: Image, mask: Mask | None = None) -> float:
+    """Peak signal-to-noise ratio in dB, infinite where the pictures are equal."""
+    white = 255 if image.dtype == np.uint8 else 1
     error = np.square(image.astype(np.float64) - truth)
     error = error if mask is None else error[mask]
-    return 10 * math.log10(1 / max(float(error.mean()), LEAST_SQUARE)) if error.size else math.nan
+    if not error.size:
+        return math.nan
+    mean_square = float(error.mean())
+    return math.inf if mean_square == 0 else 10 * math.log10(white**2 / mean_square)
+
+
+def bounded_psnr(image: Image, truth: Image, mask: Mask | None = None) -> float:
+    """`psnr`, at most MOST_DB: for means and reports, which one pair of equal pictures must not make infinite."""
+    ratio = psnr(image, truth, mask)
+    return ratio if math.isnan(ratio) else min(ratio, MOST_DB)
 
 
 def ssim(image: FloatImage, truth: FloatImage, mask: Mask | None = None) -> float:
@@ -48,28 +60,29 @@ def ssim(image: FloatImage, truth: FloatImage, mask: Mask | None = None) -> floa
     return float(of_pixels[mask].mean()) if mask.any() else math.nan
 
 
-def flip_map(image: FloatImage, truth: FloatImage) -> FloatImage:
+def flip_map(image: Image, truth: Image) -> FloatImage:
     """FLIP (Andersson et al. 2020) of each pixel (H, W), 0 = no difference to be seen, 67 pixels per degree."""
     from flip_evaluator import evaluate
 
-    of_pixels, _, _ = evaluate(*_writeable(truth, image), "LDR", True, False)
+    of_pixels, _, _ = evaluate(*_writable_floats(truth, image), "LDR", True, False)
     return np.asarray(of_pixels, np.float32).reshape(truth.shape[:2])
 
 
-def flip_picture(image: FloatImage, truth: FloatImage) -> FloatImage:
+def flip_picture(image: Image, truth: Image) -> FloatImage:
     """`flip_map` in the colours of its authors (magma), (H, W, 3): black where nothing differs."""
     from flip_evaluator import evaluate
 
-    shown, _, _ = evaluate(*_writeable(truth, image), "LDR", True, True)
+    shown, _, _ = evaluate(*_writable_floats(truth, image), "LDR", True, True)
     return np.asarray(shown, np.float32)
 
 
-def _writeable(*images: FloatImage) -> list[FloatImage]:
-    """Copies: FLIP's binding refuses arrays that may not be written to."""
-    return [np.array(image, np.float32, order="C") for image in images]
+def _writable_floats(*images: Image) -> list[FloatImage]:
+    """Copies, 1 = white: FLIP's binding refuses arrays that may not be written to."""
+    floats = (image / np.float32(255) if image.dtype == np.uint8 else image for image in images)
+    return [np.array(image, np.float32, order="C") for image in floats]
 
 
-def flip(image: FloatImage, truth: FloatImage, mask: Mask | None = None) -> float:
+def flip(image: Image, truth: Image, mask: Mask | None = None) -> float:
     """Mean of `flip_map`."""
     of_pixels = flip_map(image, truth)
     of_pixels = of_pixels if mask is None else of_pixels[mask]

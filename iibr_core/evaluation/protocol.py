@@ -24,7 +24,7 @@ from iibr_core.depth.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
 from iibr_core.evaluation.datasets import read_view
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
-from iibr_core.evaluation.metrics import Mask, flip, psnr, ssim
+from iibr_core.evaluation.metrics import Mask, bounded_psnr, flip, ssim
 from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
 from iibr_core.evaluation.refocus import FocalStack, RefocusResult, foci_of, lens_focus
 from iibr_core.evaluation.refocus import score_methods as refocus_judged
@@ -264,9 +264,9 @@ class _Evaluator:
     ) -> Figures:
         shown = image if known is None else np.where(known[..., None], image, truth)
         return Figures(
-            psnr(image, truth, known),
-            psnr(image, truth, visible),
-            psnr(image, truth, hole),
+            bounded_psnr(image, truth, known),
+            bounded_psnr(image, truth, visible),
+            bounded_psnr(image, truth, hole),
             ssim(shown, truth, known),
             flip(shown, truth, known),
             math.nan if self.lpips is None else self.lpips(shown, truth),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.evaluation.lens_picture import LensPicture
-from iibr_core.evaluation.metrics import flip, psnr
+from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.types import FloatImage, ViewOffset
 
 NEAR, MIDDLE, FAR, LENS = "near", "middle", "far", "path-traced lens"
@@ -177,7 +177,7 @@ def score_methods(
             expected = within(lens.picture, focus)
         else:
             del of_methods[truth]
-        figures = {m: RefocusFigures(psnr(p, expected), flip(p, expected)) for m, p in of_methods.items()}
+        figures = {m: RefocusFigures(bounded_psnr(p, expected), flip(p, expected)) for m, p in of_methods.items()}
         to_see = [stored_from_encoded(picture, False).astype(np.uint8) for picture in (of_methods[shown], expected)]
         found.append(RefocusResult(focus, stacks[truth].views[k], figures, shown, to_see[0], to_see[1]))
     return tuple(found)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from iibr_core.rendering.view_synthesis import RenderedView
 
 Bytes = NDArray[np.uint8]
-EQUAL_PSNR_DB = float("inf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,20 +81,6 @@ ComparisonFinding = PairReady | PairScored | EntropyReady
 ComparisonResult = ComparisonFinding | Failed[InspectionRequest | None]
 
 
-def psnr_db(left: Bytes, right: Bytes) -> float:
-    """Peak signal-to-noise ratio of sRGB bytes; infinite where they are equal."""
-    mean_square = np.mean(np.square(left.astype(np.float32) - right), dtype=np.float64)
-    return float(10 * np.log10(255**2 / mean_square)) if mean_square > 0 else EQUAL_PSNR_DB
-
-
-def mean_flip(reference: Bytes, image: Bytes) -> float:
-    """Mean of FLIP (LDR, usual viewing distance) between sRGB bytes (H, W, 3), 0 = no difference to be seen."""
-    from flip_evaluator import evaluate
-
-    _, mean, _ = evaluate(reference / np.float32(255), image / np.float32(255), "LDR", True, True)
-    return float(mean)
-
-
 class ComparisonJob:
     """Carries requests out, in whatever thread calls it; keeps rays and the last pair from one request to the next."""
 
@@ -125,7 +111,7 @@ class ComparisonJob:
         yield self._pair
         if request.is_scored and not should_stop():
             left, right = self._pair.left, self._pair.right
-            yield PairScored(request, psnr_db(left, right), mean_flip(right, left))
+            yield PairScored(request, psnr(left, right), flip(left, right))
 
     def _make_pair(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iibr_core.evaluation.lpips import Lpips
-from iibr_core.evaluation.metrics import flip, flip_map, flip_picture, psnr, ssim
+from iibr_core.evaluation.metrics import MOST_DB, bounded_psnr, flip, flip_map, flip_picture, psnr, ssim
 from iibr_core.types import InputError
 from tests.iibr_core.scenes import smooth_texture
 
@@ -44,14 +44,32 @@ def slow_ssim(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
 def test_psnr_of_known_errors() -> None:
     truth = np.full((4, 5, 3), 0.5, np.float32)
     assert psnr(truth + np.float32(0.1), truth) == pytest.approx(20, abs=1e-4)
-    assert psnr(truth, truth) == pytest.approx(100)
+    assert psnr(truth, truth) == math.inf
     mask = np.zeros((4, 5), bool)
     assert math.isnan(psnr(truth, truth, mask))
     worse = truth.copy()
     worse[0, 0] += 0.5
     mask[0, 0] = True
     assert psnr(worse, truth, mask) == pytest.approx(10 * math.log10(1 / 0.25), abs=1e-4)
-    assert psnr(worse, truth, ~mask) == pytest.approx(100)
+    assert psnr(worse, truth, ~mask) == math.inf
+    assert math.isnan(psnr(np.full_like(truth, np.nan), truth))
+
+
+def test_psnr_of_bytes_against_its_definition() -> None:
+    rng = np.random.default_rng(1)
+    left, right = (rng.integers(0, 256, (5, 7, 3), np.uint8) for _ in range(2))
+    squares = [(int(a) - int(b)) ** 2 for a, b in zip(left.flat, right.flat)]
+    assert psnr(left, right) == pytest.approx(10 * math.log10(255**2 / (sum(squares) / len(squares))))
+    assert psnr(left, right) == pytest.approx(psnr(left / np.float32(255), right / np.float32(255)), abs=1e-5)
+    assert psnr(left, left) == math.inf
+    assert psnr(np.zeros((1, 1, 3), np.uint8), np.full((1, 1, 3), 255, np.uint8)) == 0
+
+
+def test_equal_pictures_count_with_a_bound_where_means_are_taken() -> None:
+    image, truth = pair()
+    assert bounded_psnr(image, truth) == psnr(image, truth)
+    assert bounded_psnr(truth, truth) == bounded_psnr(truth + np.float32(1e-7), truth) == MOST_DB == 100
+    assert math.isnan(bounded_psnr(truth, truth, np.zeros(truth.shape[:2], bool)))
 
 
 def test_ssim_is_its_slow_twin() -> None:
@@ -79,6 +97,16 @@ def test_flip_of_known_pairs() -> None:
     errors = [flip(np.clip(truth + np.float32(step), 0, 1), truth) for step in (0.01, 0.05, 0.2)]
     assert errors == sorted(errors)
     assert errors[0] > 0
+
+
+def test_flip_of_bytes_is_0_between_equals_and_grows_with_the_difference() -> None:
+    grey = np.full((32, 32, 3), 128, np.uint8)
+    flips = [flip(np.full_like(grey, value), grey) for value in (128, 132, 160, 255)]
+    assert flips[0] == 0
+    assert flips == sorted(flips)
+    assert flips[-1] > 0.3
+    lighter = np.full_like(grey, 160)
+    assert flip(lighter, grey) == flip(lighter / np.float32(255), grey / np.float32(255))
 
 
 def test_flip_masks_and_pictures() -> None:

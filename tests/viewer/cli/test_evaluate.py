@@ -100,7 +100,6 @@ def test_ctrl_c_leaves_nothing(monkeypatch: pytest.MonkeyPatch, data: Path, tmp_
         raise KeyboardInterrupt
 
     monkeypatch.setattr("iibr_core.evaluation.metrics.psnr", interrupted)
-    monkeypatch.setattr("iibr_core.evaluation.protocol.psnr", interrupted)
     assert run(monkeypatch, "evaluate", data / "row", "--out", tmp_path / "report") == 130
     assert not (tmp_path / "report").exists()
 
