@@ -12,6 +12,7 @@ Colour          sRGB-encoded, 1 = white, as photos are; HDR values exceed 1 on t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -29,6 +30,11 @@ Quality = Literal["fast", "balanced", "exact"]
 """Where the ray transformer runs: nowhere, on ambiguous rays, everywhere."""
 
 DEFAULT_QUALITY: Quality = "balanced"
+
+ReportProgress = Callable[[float, float, str], None]
+"""Called with (done, total, doing): how much is done, of how much, and what is being done, in words for people.
+total 0: how much there is to do is not known. Called in whatever thread works.
+"""
 
 
 TOTAL_PARALLAX = 0.04
@@ -134,6 +140,10 @@ class ViewUpdate:
     colors: StoredColors
     disparity: FloatImage | None
     inpainted: NDArray[np.bool_] | None = None
+
+
+def ignore_progress(done: float, total: float, doing: str) -> None:
+    """For work that nobody watches: a ReportProgress that does nothing."""
 
 
 class InputError(ValueError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,9 +12,6 @@ one, none.
 
 DepthStart = Literal["auto", "embedded", "model", "rough", "flat"]
 """With what kind the search begins; "auto" is with a file. What fails is followed by the next."""
-
-Tell = Callable[[str, float], None]
-"""Told what is being done, and which share of it is: 0 to 1."""
 
 BETTER_WAYS = (
     "Better: give a depth map with --disparity FILE, or a trained model with --depth-model "

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin, Tell
+from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.embedded.images import picture_file
 from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
@@ -24,7 +24,16 @@ from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_di
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
-from iibr_core.types import Disparity, FloatImage, GridShape, ImageSize, InputError, Photo
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    GridShape,
+    ImageSize,
+    InputError,
+    Photo,
+    ReportProgress,
+    ignore_progress,
+)
 
 USUAL_GRID = GridShape(9, 9)
 """What estimates without a scale are made to suit where the grid is not yet known."""
@@ -64,7 +73,7 @@ def open_with_depth(
     max_pixels: int = DEFAULT_MAX_PIXELS,
     grid: GridShape | None = None,
     should_stop: ShouldStop = never,
-    report_progress: Tell = lambda doing, share: None,
+    report_progress: ReportProgress = ignore_progress,
 ) -> PhotoWithDepth:
     """Read a photo and find its disparity; every photo gets one.
 
@@ -97,7 +106,7 @@ class _DepthSearch:
     choice: DepthChoice
     max_pixels: int
     should_stop: ShouldStop
-    report_progress: Tell
+    report_progress: ReportProgress
 
     def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _FoundDepth | None]]]:
         ways: dict[DepthKind, Callable[[], _FoundDepth | None]] = {
@@ -148,7 +157,7 @@ class _DepthSearch:
 
     def rough(self) -> _FoundDepth:
         self.go_on()
-        self.report_progress("guessing depth", 0.0)
+        self.report_progress(0, 0, "guessing depth")
         origin = DepthOrigin("rough", "rough, guessed without a model", advice=BETTER_WAYS)
         return _FoundDepth(self.photo, origin, estimate_from_cues(self.photo, self.should_stop))
 

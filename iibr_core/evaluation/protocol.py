@@ -1,4 +1,4 @@
-"""Judges every way of making views on one trial: identity, reference warp, and the qualities asked for.
+"""Compares every way of making views on one trial: identity, reference warp, and the qualities asked for.
 
 Each judged view is read once and made by every method; figures are of the whole frame, of what the given view sees,
 and of holes.
@@ -26,13 +26,22 @@ from iibr_core.evaluation.datasets import read_view
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
 from iibr_core.evaluation.metrics import Mask, bounded_psnr, flip, ssim
 from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
-from iibr_core.evaluation.refocus import FocalStack, RefocusResult, foci_of, lens_focus
-from iibr_core.evaluation.refocus import score_methods as refocus_judged
+from iibr_core.evaluation.refocus import FocalStack, RefocusResult, foci_of, lens_focus, score_methods
 from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Trial, TrialInput, trial_input, trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
-from iibr_core.types import DEFAULT_QUALITY, Disparity, FloatImage, ImageSize, Quality, ViewOffset, image_size
+from iibr_core.types import (
+    DEFAULT_QUALITY,
+    Disparity,
+    FloatImage,
+    ImageSize,
+    Quality,
+    ReportProgress,
+    ViewOffset,
+    ignore_progress,
+    image_size,
+)
 
 if TYPE_CHECKING:
     from iibr_core.evaluation.lpips import Lpips
@@ -45,8 +54,6 @@ LEAST_EPI_VIEWS = 3
 
 Bytes = NDArray[np.uint8]
 """(H, W, 3), sRGB-encoded."""
-Tell = Callable[[int, int, str], None]
-"""Told (steps done, steps in all, what is being done)."""
 
 
 @dataclass(frozen=True)
@@ -122,25 +129,23 @@ class EvaluationResult:
 def evaluate(
     scene: MultiView,
     options: Options | None = None,
-    report_progress: Tell = lambda done, total, doing: None,
+    report_progress: ReportProgress = ignore_progress,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> list[EvaluationResult]:
-    """Judge a scene by the paper's trials: one judgement for each trial and disparity map.
+    """Evaluate a scene by the paper's trials: one result for each trial and disparity map.
 
     Raises InputError where the scene or an option is bad, Cancelled once should_stop is true.
     """
     options = options or Options()
     lpips = None if options.lpips is None else _lpips(options.lpips)
     source: DisparityFrom = "auto" if isinstance(options.source, Path) else options.source
-    judgements = []
+    results = []
     for trial in trials_of(scene, source, options.most_views):
         report_progress(0, 0, f"{scene.name}: disparity")
         given = trial_input(trial, options.source, options.choice, options.max_pixels, should_stop)
         for disparity in given.maps:
-            judgements.append(
-                _Evaluator(trial, given, disparity, options, lpips, report_progress, should_stop).judged()
-            )
-    return judgements
+            results.append(_Evaluator(trial, given, disparity, options, lpips, report_progress, should_stop).evaluate())
+    return results
 
 
 def _lpips(folder: Path) -> Lpips:
@@ -159,7 +164,7 @@ class _Evaluator:
         disparity: Disparity,
         options: Options,
         lpips: Lpips | None,
-        report_progress: Tell,
+        report_progress: ReportProgress,
         should_stop: Callable[[], bool],
     ) -> None:
         self.trial, self.given, self.disparity, self.options = trial, given, disparity, options
@@ -178,7 +183,7 @@ class _Evaluator:
         self.stacks = self._stacks() if options.with_refocus and trial.name == CENTRE_TRIAL else {}
         self.farthest = max(trial.judged, key=lambda k: math.hypot(*trial.offset(k)))
 
-    def judged(self) -> EvaluationResult:
+    def evaluate(self) -> EvaluationResult:
         trial, scene, start = self.trial, self.trial.scene, time.perf_counter()
         offsets = [trial.offset(index) for index in trial.judged]
         with (
@@ -199,7 +204,7 @@ class _Evaluator:
             self.disparity.source,
             rows,
             agreement,
-            self._refocused(),
+            self._score_refocus(),
             Pictures(*self.shown, self._epis(), self.epi_row),
             float(np.mean(self.hole_shares)),
             tuple(dict.fromkeys(self.notes)),
@@ -210,7 +215,7 @@ class _Evaluator:
         offset, view = self.trial.offset(index), self.trial.scene.views[index]
         truth, known = read_view(view, self.options.max_pixels)
         judge = reference_warp(self.given.photo, self.given.judge.values, offset)
-        made = {IDENTITY: (self.given.photo, 0.0), **self._warped(offset)}
+        made = {IDENTITY: (self.given.photo, 0.0), **self._reference_view(offset)}
         for quality in self.options.qualities:
             made_view, ms = maker.timed_view(quality, offset)
             made[quality] = quantise_as_stored(made_view.colors), ms
@@ -247,14 +252,14 @@ class _Evaluator:
             stack.add(ViewOffset(0.0, 0.0), photo)
         return stacks
 
-    def _refocused(self) -> tuple[RefocusResult, ...]:
+    def _score_refocus(self) -> tuple[RefocusResult, ...]:
         if not self.stacks:
             return ()
         qualities = self.options.qualities
         shown = DEFAULT_QUALITY if DEFAULT_QUALITY in qualities else (*qualities, REFERENCE)[0]
-        return refocus_judged(self.stacks, TRUTH, shown, self.lens)
+        return score_methods(self.stacks, TRUTH, shown, self.lens)
 
-    def _warped(self, offset: ViewOffset) -> dict[str, tuple[FloatImage, float]]:
+    def _reference_view(self, offset: ViewOffset) -> dict[str, tuple[FloatImage, float]]:
         start = time.perf_counter()
         colors = reference_warp(self.given.photo, self.disparity.values, offset).colors
         return {REFERENCE: (quantise_as_stored(colors), 1e3 * (time.perf_counter() - start))}

@@ -1,4 +1,4 @@
-"""Judgements on disk: report.json with every figure, report.md with tables, index.html with tables and pictures."""
+"""Results on disk: report.json with every figure, report.md with tables, index.html with tables and pictures."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ def require_report_folder(folder: Path) -> None:
         raise InputError(f"{folder}: {existing} is a file; choose another place with --out")
 
 
-def write_report(folder: Path, judgements: Sequence[EvaluationResult], command: str) -> None:
+def write_report(folder: Path, results: Sequence[EvaluationResult], command: str) -> None:
     """Write FILES into a folder, made if need be; each whole or not at all. command: how they were made.
 
     Raises InputError where the folder cannot be written.
     """
-    texts = (json_of(judgements, command), markdown_of(judgements, command), page_of(judgements, command))
+    texts = (json_of(results, command), markdown_of(results, command), page_of(results, command))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -53,15 +53,15 @@ def write_report(folder: Path, judgements: Sequence[EvaluationResult], command: 
             temporary.write_text(text, encoding="utf-8")
 
 
-def json_of(judgements: Sequence[EvaluationResult], command: str) -> str:
+def json_of(results: Sequence[EvaluationResult], command: str) -> str:
     """Everything but the pictures; what is not known is null."""
     plain = []
-    for judgement in judgements:
-        fields = {name: value for name, value in vars(judgement).items() if name != "pictures"}
-        fields["rows"] = [asdict(replace(row, of_views=dict(row.of_views))) for row in judgement.rows]
-        fields["consistency"] = {name: asdict(found) for name, found in judgement.consistency.items()}
-        fields["refocus"] = [_plain_refocus(found) for found in judgement.refocus]
-        fields["size"] = {"height": judgement.size.height, "width": judgement.size.width}
+    for result in results:
+        fields = {name: value for name, value in vars(result).items() if name != "pictures"}
+        fields["rows"] = [asdict(replace(row, of_views=dict(row.of_views))) for row in result.rows]
+        fields["consistency"] = {name: asdict(found) for name, found in result.consistency.items()}
+        fields["refocus"] = [_plain_refocus(found) for found in result.refocus]
+        fields["size"] = {"height": result.size.height, "width": result.size.width}
         plain.append(fields)
     return json.dumps(_finite({"command": command, "judgements": plain}), indent=1, allow_nan=False) + "\n"
 
@@ -80,19 +80,19 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def markdown_of(judgements: Sequence[EvaluationResult], command: str) -> str:
-    """Tables of all judgements, a summary first."""
-    lines = ["# Evaluation", "", f"Made by `{command}`.", "", *markdown_table(summary_table(judgements))]
-    if any(judgement.consistency for judgement in judgements):
+def markdown_of(results: Sequence[EvaluationResult], command: str) -> str:
+    """Tables of all results, a summary first."""
+    lines = ["# Evaluation", "", f"Made by `{command}`.", "", *markdown_table(summary_table(results))]
+    if any(result.consistency for result in results):
         lines += ["", ABOUT_CONSISTENCY]
-    for judgement in judgements:
-        lines += ["", f"## {heading(judgement)}", "", about(judgement), "", *markdown_table(figures_table(judgement))]
-        if judgement.consistency:
-            lines += ["", *markdown_table(consistency_table(judgement))]
-        if judgement.refocus:
-            lines += ["", about_refocus(judgement), "", *markdown_table(refocus_table(judgement))]
-        if judgement.notes:
-            lines += ["", *(f"- {note}" for note in judgement.notes)]
+    for result in results:
+        lines += ["", f"## {heading(result)}", "", about(result), "", *markdown_table(figures_table(result))]
+        if result.consistency:
+            lines += ["", *markdown_table(consistency_table(result))]
+        if result.refocus:
+            lines += ["", about_refocus(result), "", *markdown_table(refocus_table(result))]
+        if result.notes:
+            lines += ["", *(f"- {note}" for note in result.notes)]
     return "\n".join(lines) + "\n"
 
 

@@ -55,7 +55,7 @@ class LabelledRays(NamedTuple):
     truth: FloatImage
 
 
-def _collect(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
+def _as_found(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
     return ambiguous
 
 
@@ -63,13 +63,13 @@ def _collect(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
 class RayChoice:
     """What rays are given to T; other than the default for ablations only.
 
-    hypotheses: K. inpainted: whether the ray set has what corner views inpaint. described: (rays, ambiguous) ->
+    hypotheses: K. inpainted: whether the ray set has what corner views inpaint. describe: (rays, ambiguous) ->
     ambiguous, with the features T shall see.
     """
 
     hypotheses: int = HYPOTHESES
     inpainted: bool = True
-    described: Callable[[RaySet, AmbiguousRays], AmbiguousRays] = _collect
+    describe: Callable[[RaySet, AmbiguousRays], AmbiguousRays] = _as_found
 
 
 AS_RENDERED = RayChoice()
@@ -131,7 +131,7 @@ def ambiguous_rays_of_view(
 def _keep_visible(scene: RaycastScene, rays: RaySet, ambiguous: AmbiguousRays, choice: RayChoice) -> LabelledRays:
     y, x = ambiguous.pixel.T
     return LabelledRays(
-        choice.described(rays, ambiguous), hypothesis_colors(rays, ambiguous), cast(scene, x, y, ambiguous.offset)[0]
+        choice.describe(rays, ambiguous), hypothesis_colors(rays, ambiguous), cast(scene, x, y, ambiguous.offset)[0]
     )
 
 

@@ -24,7 +24,7 @@ from torch import Tensor, nn
 from iibr_core.formats.files import atomic_write
 from iibr_core.formats.weights import load_weights, read_tensors, require_shapes, save_weights, write_tensors
 from iibr_core.training.losses import EpiShape, LossWeights, to_perceptual, total_loss
-from iibr_core.types import InputError
+from iibr_core.types import InputError, ReportProgress, ignore_progress
 
 __all__ = [
     "Batch",
@@ -50,8 +50,8 @@ class Batch:
 
     features: (N, K, F), what the model sees. mask: (N, K) bool, True where there is a candidate; every ray should
     have one. colors: (N, K, 3), each candidate's vote in linear light, finite in empty slots too. truth: (N, 3), linear
-    light; both are compared as `losses.perceived`. epi_shape: the first
-    E * V * W rays form EPIs (E, V, W) in this order, or None. color_gain: factor on the colour loss of this batch.
+    light; both are compared by `losses.to_perceptual`. epi_shape: the first E * V * W rays form EPIs (E, V, W) in this
+    order, or None. color_gain: factor on the colour loss of this batch.
     """
 
     features: Tensor
@@ -109,12 +109,12 @@ def train(
     *,
     resume: bool = False,
     metadata: Mapping[str, str] | None = None,
-    progress: Callable[[int, int, float], None] | None = None,
+    report_progress: ReportProgress = ignore_progress,
 ) -> None:
     """Train the model in place and write its weights to `out` (.safetensors) with metadata and the configuration.
 
     model(features, mask) gives weights (N, K): >= 0, 0 where there is no candidate, rows with sum 1. batches(step)
-    must depend on nothing but the step, which counts from 1. progress(step, steps, total loss) follows each step.
+    must depend on nothing but the step, which counts from 1. report_progress hears of each step, with its total loss.
     Beside `out` lie a log (`log_path`) and the newest checkpoint (`checkpoint_path`); resume goes on from there.
     The same start gives the same weights, to the bit on one CPU, interrupted or not. Seeds torch's global generator.
 
@@ -135,8 +135,7 @@ def train(
                 with _defer_interrupts():
                     row = run.take_step(batch)
                     write_row(row)
-                if progress:
-                    progress(run.step, config.steps, row.total)
+                report_progress(run.step, config.steps, f"loss {row.total:.4g}")
                 if run.step % config.checkpoint_every == 0 or run.step == config.steps:
                     run.save()
         except KeyboardInterrupt:

@@ -67,11 +67,11 @@ def load_photo(
 
     said_at: dict[str, float] = {}
 
-    def tell_at_times(doing: str, share: float) -> None:
+    def report_at_times(done: float, total: float, doing: str) -> None:
         now = time.perf_counter()
         if now - said_at.get(doing, -math.inf) >= TELL_EVERY_S:
             said_at[doing] = now
-            report_progress(Progress(doing=f"{doing}, {share:.0%}" if share else doing))
+            report_progress(Progress(doing=f"{doing}, {done / total:.0%}" if done and total else doing))
 
     path = Path(source.path)
     found = open_with_depth(
@@ -80,7 +80,7 @@ def load_photo(
         source.max_pixels or DEFAULT_MAX_PIXELS,
         source.grid,
         should_stop,
-        tell_at_times,
+        report_at_times,
     )
     # This program saves no HEIC.
     settings = "" if is_heic(path) else settings_text_in(path)

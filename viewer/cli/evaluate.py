@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -62,12 +63,10 @@ def evaluate(
 
     Example: iibr evaluate hci/dino hci/cotton --out report
     """
-    from iibr_core.evaluation.packages import require_packages
-
-    require_packages("scipy", "skimage")
+    _require_packages("scipy", "skimage", "jinja2")
     from iibr_core.evaluation.datasets import find_scenes
     from iibr_core.evaluation.protocol import QUALITIES, Options
-    from iibr_core.evaluation.protocol import evaluate as judge
+    from iibr_core.evaluation.protocol import evaluate as evaluate_scene
     from iibr_core.evaluation.report import require_report_folder, write_report
     from iibr_core.evaluation.tables import summary_line
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
@@ -79,17 +78,23 @@ def evaluate(
         max_pixels or DEFAULT_MAX_PIXELS, views, lpips,
     )  # fmt: skip
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
-    judgements = []
+    results = []
     with show_progress("reading") as show:
         for scene in scenes:
-            found = judge(scene, options, lambda done, total, doing: show(done, total, doing))
-            judgements += found
-    for judgement in judgements:
-        print(summary_line(judgement))
-    notes = dict.fromkeys(f"{judgement.scene}: {note}" for judgement in judgements for note in judgement.notes)
+            results += evaluate_scene(scene, options, show)
+    for result in results:
+        print(summary_line(result))
+    notes = dict.fromkeys(f"{result.scene}: {note}" for result in results for note in result.notes)
     print_notes(tuple(notes))
-    write_report(out, judgements, shlex.join(["iibr", *sys.argv[1:]]))
+    write_report(out, results, shlex.join(["iibr", *sys.argv[1:]]))
     print(out / "index.html")
+
+
+def _require_packages(*names: str) -> None:
+    """Raise InputError naming those that are not installed: only evaluation needs them, so they are extras."""
+    missing = [name for name in names if find_spec(name) is None]
+    if missing:
+        raise InputError(f"this needs {' and '.join(missing)}; install them with: pip install 'iibr[evaluate]'")
 
 
 def _disparity_source(text: str) -> DisparityFrom | Path:

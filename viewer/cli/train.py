@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from iibr_core.types import ReportProgress
 
 if TYPE_CHECKING:
     from iibr_core.training.trainer import Batch
@@ -69,7 +71,8 @@ def train_weights(
 
     try:
         with _show_bar() as show:
-            trainer.train(model, batches, config, out, resume=resume, metadata={"command": published}, progress=show)
+            about = {"command": published}
+            trainer.train(model, batches, config, out, resume=resume, metadata=about, report_progress=show)
     except KeyboardInterrupt:
         if not trainer.checkpoint_path(out).is_file():
             return _report_end("interrupted before the first step was done", EXIT_INTERRUPTED)
@@ -87,12 +90,12 @@ def _report_end(message: str, code: int) -> int:
 
 
 @contextmanager
-def _show_bar() -> Iterator[Callable[[int, int, float], None]]:
-    """A bar on stderr while the block runs; call what is yielded with (step, steps, loss)."""
+def _show_bar() -> Iterator[ReportProgress]:
+    """A bar on stderr while the block runs; what is yielded moves it and shows what is being done."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[loss]}"), TimeRemainingColumn())
     with Progress("training", *columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None, loss="")
-        yield lambda step, steps, loss: bar.update(task, completed=step, total=steps, loss=f"loss {loss:.4g}")
+        yield lambda done, total, doing: bar.update(task, completed=done, total=total, loss=doing)

@@ -7,7 +7,6 @@ torch and transformers are imported where they are used: a photo with depth of i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,14 +15,13 @@ import numpy as np
 import psutil
 from safetensors import SafetensorError
 
-from iibr_core.depth.choice import Tell
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
 from iibr_core.depth.models.config import Preparation, read_config, read_preparation
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo, image_size
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress, image_size
 
 if TYPE_CHECKING:
     import torch
@@ -61,7 +59,7 @@ def estimate_with(
     photo: Photo,
     memory_bytes: int | None = None,
     should_stop: ShouldStop = never,
-    report_progress: Tell = lambda doing, share: None,
+    report_progress: ReportProgress = ignore_progress,
 ) -> Estimate:
     """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
 
@@ -69,7 +67,7 @@ def estimate_with(
     be used or its result is of no use, Cancelled where should_stop says so.
     """
     _require_weights(model.folder)
-    report_progress(f"looking for what {model.title} said before", 0.0)
+    report_progress(0, 0, f"looking for what {model.title} said before")
     network_input = None
     if model.package == TRANSFORMERS:
         network_input = _input_of(model, photo.size, memory_bytes or psutil.virtual_memory().total // MEMORY_SHARE)
@@ -143,9 +141,9 @@ def _width_of(config: dict[str, Any]) -> int:
 
 
 def _run(
-    model: LocalModel, photo: Photo, network_input: _Input, should_stop: ShouldStop, report_progress: Tell
+    model: LocalModel, photo: Photo, network_input: _Input, should_stop: ShouldStop, report_progress: ReportProgress
 ) -> Estimate:
-    report_progress(f"loading {model.title}", 0.0)
+    report_progress(0, 0, f"loading {model.title}")
     import torch
 
     network = _load_network(model)
@@ -153,7 +151,7 @@ def _run(
     pixels = _network_tensor(photo.pixels, network_input).to(device)
     doing = f"estimating depth with {model.title}"
     try:
-        with torch.inference_mode(), _LayerProgress(network, should_stop, lambda share: report_progress(doing, share)):
+        with torch.inference_mode(), _LayerProgress(network, doing, should_stop, report_progress):
             output = network.to(device)(pixel_values=pixels)
     except (RuntimeError, ValueError, IndexError, TypeError) as error:
         raise InputError(f"{model.title} failed on this photo ({_line(error)})") from error
@@ -183,10 +181,10 @@ class _LayerProgress:
     """While it is entered, a network asks before each of its layers whether to go on, and tells how far it is."""
 
     def __init__(
-        self, network: torch.nn.Module, should_stop: ShouldStop, report_progress: Callable[[float], None]
+        self, network: torch.nn.Module, doing: str, should_stop: ShouldStop, report_progress: ReportProgress
     ) -> None:
         self._layers = [layer for layer in network.modules() if not any(layer.children())]
-        self._should_stop, self._report_progress = should_stop, report_progress
+        self._doing, self._should_stop, self._report_progress = doing, should_stop, report_progress
         self._seen = 0
 
     def __enter__(self) -> None:
@@ -199,7 +197,8 @@ class _LayerProgress:
     def _before(self, *_: object) -> None:
         raise_if_stopped(self._should_stop)
         self._seen += 1
-        self._report_progress(min(self._seen / len(self._layers), 1.0))
+        # A layer that runs twice must not make it more than all.
+        self._report_progress(min(self._seen, len(self._layers)), len(self._layers), self._doing)
 
 
 def _network_tensor(pixels: FloatImage, network_input: _Input) -> torch.Tensor:

@@ -135,7 +135,12 @@ def test_a_model_is_used_and_named(tmp_path: Path) -> None:
     folder = depth_anything(tmp_path / "tiny").folder
     told: list[str] = []
     choice = DepthChoice(model=str(folder))
-    found = open_with_depth(photo_file(tmp_path, None), choice, report_progress=lambda doing, share: told.append(doing))
+
+    def report_progress(done: float, total: float, doing: str) -> None:
+        assert 0 <= done <= total
+        told.append(doing)
+
+    found = open_with_depth(photo_file(tmp_path, None), choice, report_progress=report_progress)
     assert (found.origin.kind, found.origin.words) == ("model", "estimated by the model in tiny")
     assert found.origin.failures == ()
     assert any("estimating depth" in doing for doing in told)

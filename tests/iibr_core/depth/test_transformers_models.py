@@ -328,14 +328,14 @@ def test_nan_in_the_weights_is_told_and_not_kept(tmp_path: Path, own_cache: Path
 def test_it_stops_between_layers_and_tells_how_far_it_is(tmp_path: Path, own_cache: Path) -> None:
     model = depth_anything(tmp_path / "model")
     shares: list[float] = []
-    estimate_with(model, PHOTO, report_progress=lambda doing, share: shares.append(share))
+    estimate_with(model, PHOTO, report_progress=lambda done, total, _: shares.append(done / total if total else 0.0))
     assert shares == sorted(shares)
     assert len(shares) > 50
     for path in own_cache.glob("*"):
         path.unlink()
     told: list[float] = []
     with pytest.raises(Cancelled):
-        estimate_with(model, PHOTO, None, lambda: len(told) >= 20, lambda doing, share: told.append(share))
+        estimate_with(model, PHOTO, None, lambda: len(told) >= 20, lambda done, total, doing: told.append(done))
     assert len(told) == 20
     assert not list(own_cache.glob("*"))
 
@@ -344,7 +344,7 @@ def test_a_kept_estimate_needs_no_network(tmp_path: Path, own_cache: Path) -> No
     model = depth_anything(tmp_path / "model")
     first = estimate_with(model, PHOTO)
     doings: set[str] = set()
-    again = estimate_with(model, PHOTO, report_progress=lambda doing, share: doings.add(doing))
+    again = estimate_with(model, PHOTO, report_progress=lambda done, total, doing: doings.add(doing))
     np.testing.assert_array_equal(values_of(first), values_of(again))
     assert not any("loading" in doing for doing in doings)
     assert len(list(own_cache.glob("*.npz"))) == 1

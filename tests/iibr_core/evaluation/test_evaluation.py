@@ -47,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def judgements(folder: Path) -> list[EvaluationResult]:
+def results(folder: Path) -> list[EvaluationResult]:
     return evaluate(scene_of(folder), Options(choice=UNREFINED))
 
 
@@ -65,12 +65,12 @@ def test_views_are_those_that_generate_makes(quality: Quality) -> None:
             np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
 
 
-def test_both_trials_show_every_row(judgements: list[EvaluationResult]) -> None:
-    assert [j.trial for j in judgements] == [CENTRE_TRIAL, CORNER_TRIAL]
-    centre, corner = judgements
-    for judgement in judgements:
-        assert [row.method for row in judgement.rows] == ALWAYS
-        assert judgement.size == (HEIGHT, WIDTH)
+def test_both_trials_show_every_row(results: list[EvaluationResult]) -> None:
+    assert [j.trial for j in results] == [CENTRE_TRIAL, CORNER_TRIAL]
+    centre, corner = results
+    for result in results:
+        assert [row.method for row in result.rows] == ALWAYS
+        assert result.size == (HEIGHT, WIDTH)
     assert centre.given == "v01 u01"
     assert set(centre.rows[0].of_views) == {f"v{v:02d} u{u:02d}" for v in range(3) for u in range(3)} - {"v01 u01"}
     assert corner.given == "v02 u00"
@@ -78,13 +78,13 @@ def test_both_trials_show_every_row(judgements: list[EvaluationResult]) -> None:
     assert any("carried over" in note for note in corner.notes)
 
 
-def test_figures_are_of_the_right_pictures(folder: Path, judgements: list[EvaluationResult]) -> None:
+def test_figures_are_of_the_right_pictures(folder: Path, results: list[EvaluationResult]) -> None:
     """Identity and reference warp, worked out anew from the files."""
     photo = read_photo(folder / "views/v01_u01.png").pixels
     truth = read_photo(folder / "views/v00_u02.png").pixels
     offset = ViewOffset(-1.0, 1.0)
     warped = reference_warp(photo, disparity_of_square(), offset)
-    rows = {row.method: row.of_views["v00 u02"] for row in judgements[0].rows}
+    rows = {row.method: row.of_views["v00 u02"] for row in results[0].rows}
     for name, image in (("identity", photo), ("reference warp", quantise_as_stored(warped.colors))):
         figures = rows[name]
         assert figures.full_db == pytest.approx(psnr(image, truth))
@@ -95,8 +95,8 @@ def test_figures_are_of_the_right_pictures(folder: Path, judgements: list[Evalua
         assert math.isnan(figures.lpips)
 
 
-def test_means_and_the_worst_view(judgements: list[EvaluationResult]) -> None:
-    for row in judgements[0].rows:
+def test_means_and_the_worst_view(results: list[EvaluationResult]) -> None:
+    for row in results[0].rows:
         full = {name: figures.full_db for name, figures in row.of_views.items()}
         assert row.mean.full_db == pytest.approx(np.mean(list(full.values())))
         assert (row.worst_view, row.worst_db) == min(full.items(), key=lambda item: item[1])
@@ -104,12 +104,12 @@ def test_means_and_the_worst_view(judgements: list[EvaluationResult]) -> None:
         assert row.mean.hole_db == pytest.approx(np.mean(holes))
 
 
-def test_every_way_beats_doing_nothing(judgements: list[EvaluationResult]) -> None:
-    for judgement in judgements:
-        full = {row.method: row.mean.full_db for row in judgement.rows}
+def test_every_way_beats_doing_nothing(results: list[EvaluationResult]) -> None:
+    for result in results:
+        full = {row.method: row.mean.full_db for row in result.rows}
         assert full["identity"] + 10 < min(full["reference warp"], full["fast"])
-        assert set(judgement.consistency) >= {"fast", "balanced", "exact"}
-    assert judgements[0].consistency["truth"].line_off_px < 0.1
+        assert set(result.consistency) >= {"fast", "balanced", "exact"}
+    assert results[0].consistency["truth"].line_off_px < 0.1
 
 
 def test_a_pair_is_judged_from_the_left_without_a_corner_trial(tmp_path: Path) -> None:
@@ -170,11 +170,11 @@ def test_an_estimate_in_the_folder_is_used_where_there_is_no_truth(tmp_path: Pat
 
 
 def test_smaller_pictures_with_disparity_to_match(folder: Path) -> None:
-    (judgement, *_) = evaluate(
+    (result, *_) = evaluate(
         scene_of(folder), Options(choice=UNREFINED, qualities=("fast",), max_pixels=HEIGHT * WIDTH // 4)
     )
-    assert judgement.size == (HEIGHT // 2, WIDTH // 2)
-    full = {row.method: row.mean.full_db for row in judgement.rows}
+    assert result.size == (HEIGHT // 2, WIDTH // 2)
+    full = {row.method: row.mean.full_db for row in result.rows}
     assert full["fast"] > full["identity"] + 5
 
 
@@ -183,43 +183,43 @@ def test_stopping_ends_it(folder: Path) -> None:
         evaluate(scene_of(folder), Options(choice=UNREFINED), should_stop=lambda: True)
 
 
-def test_the_json_holds_every_figure(judgements: list[EvaluationResult]) -> None:
-    read = json.loads(report.json_of(judgements, "iibr evaluate x"), parse_constant=lambda name: pytest.fail(name))
+def test_the_json_holds_every_figure(results: list[EvaluationResult]) -> None:
+    read = json.loads(report.json_of(results, "iibr evaluate x"), parse_constant=lambda name: pytest.fail(name))
     assert read["command"] == "iibr evaluate x"
-    for judgement, stored in zip(judgements, read["judgements"]):
-        assert stored["trial"] == judgement.trial
-        for row, stored_row in zip(judgement.rows, stored["rows"]):
+    for result, stored in zip(results, read["judgements"]):
+        assert stored["trial"] == result.trial
+        for row, stored_row in zip(result.rows, stored["rows"]):
             assert stored_row["mean"]["full_db"] == row.mean.full_db
             assert stored_row["mean"]["lpips"] is None
             assert stored_row["of_views"].keys() == row.of_views.keys()
-        assert stored["consistency"].keys() == judgement.consistency.keys()
+        assert stored["consistency"].keys() == result.consistency.keys()
 
 
-def test_the_markdown_has_a_table_for_each_judgement(judgements: list[EvaluationResult]) -> None:
-    text = report.markdown_of(judgements, "iibr evaluate x")
+def test_the_markdown_has_a_table_for_each_result(results: list[EvaluationResult]) -> None:
+    text = report.markdown_of(results, "iibr evaluate x")
     for method in ALWAYS:
-        assert len(re.findall(rf"(?m)^\| {method} \|", text)) >= len(judgements)
+        assert len(re.findall(rf"(?m)^\| {method} \|", text)) >= len(results)
     for line in text.splitlines():
         assert "nan" not in line
     assert text.count(ABOUT_CONSISTENCY) == 1
-    assert ABOUT_CONSISTENCY not in report.markdown_of([replace(judgements[0], consistency={})], "x")
-    assert f"| fast | – | {judgements[0].consistency['fast'].hole_pixels} |" in text
+    assert ABOUT_CONSISTENCY not in report.markdown_of([replace(results[0], consistency={})], "x")
+    assert f"| fast | – | {results[0].consistency['fast'].hole_pixels} |" in text
     blocks = re.findall(r"(?m)(?:^\|.*\n?)+", text)
-    assert len(blocks) == 1 + sum(2 + bool(judgement.refocus) for judgement in judgements)
+    assert len(blocks) == 1 + sum(2 + bool(result.refocus) for result in results)
     for block in blocks:
         assert len({line.count("|") for line in block.strip().splitlines()}) == 1
 
 
-def test_the_page_needs_nothing_else(judgements: list[EvaluationResult]) -> None:
-    text = report.page_of(judgements, "iibr <evaluate>")
+def test_the_page_needs_nothing_else(results: list[EvaluationResult]) -> None:
+    text = report.page_of(results, "iibr <evaluate>")
     assert "iibr &lt;evaluate&gt;" in text
     assert not re.findall(r'(?:src|href)="(?!data:)|url\(|@import|<script|<link', text)
     images = re.findall(r'alt="([^"]+)" src="data:image/\w+;base64,([^"]+)"', text)
-    per_judgement = 1 + 2 * len(ALWAYS)
-    epis = len(judgements[0].pictures.epis)
+    per_result = 1 + 2 * len(ALWAYS)
+    epis = len(results[0].pictures.epis)
     assert epis == len(ALWAYS)  # the truth and all but identity
     refocused = ("near", "middle", "far")
-    assert len(images) == per_judgement * len(judgements) + epis + 3 * len(refocused)
+    assert len(images) == per_result * len(results) + epis + 3 * len(refocused)
     for name, data in images:
         picture = Image.open(io.BytesIO(base64.b64decode(data)))
         picture.load()
@@ -229,16 +229,16 @@ def test_the_page_needs_nothing_else(judgements: list[EvaluationResult]) -> None
         assert picture.size == ((WIDTH, 3) if name.startswith("EPI") else (WIDTH, HEIGHT))
 
 
-def test_epis_of_the_truth_hold_the_views_own_rows(folder: Path, judgements: list[EvaluationResult]) -> None:
-    pictures = judgements[0].pictures
+def test_epis_of_the_truth_hold_the_views_own_rows(folder: Path, results: list[EvaluationResult]) -> None:
+    pictures = results[0].pictures
     rows = [read_photo(folder / f"views/v01_u{u:02d}.png").pixels[pictures.epi_row] for u in range(3)]
     np.testing.assert_array_equal(pictures.epis["truth"], np.rint(255 * np.stack(rows)))
 
 
-def test_reports_replace_older_ones_whole(judgements: list[EvaluationResult], tmp_path: Path) -> None:
+def test_reports_replace_older_ones_whole(results: list[EvaluationResult], tmp_path: Path) -> None:
     out = tmp_path / "made" / "report"
-    report.write_report(out, judgements, "first")
-    report.write_report(out, judgements[:1], "second")
+    report.write_report(out, results, "first")
+    report.write_report(out, results[:1], "second")
     assert sorted(path.name for path in out.iterdir()) == sorted(report.FILES)
     assert "`second`" in (out / "report.md").read_text()
 
@@ -251,8 +251,8 @@ def test_places_where_no_report_can_be_are_told_before_any_work(tmp_path: Path) 
             report.require_report_folder(folder)
 
 
-def test_the_summary_takes_means_over_scenes(judgements: list[EvaluationResult]) -> None:
-    other = replace(judgements[0], scene="other")
-    text = report.markdown_of([*judgements, other], "x")
+def test_the_summary_takes_means_over_scenes(results: list[EvaluationResult]) -> None:
+    other = replace(results[0], scene="other")
+    text = report.markdown_of([*results, other], "x")
     assert re.search(r"(?m)^\| mean of 2 scenes \|", text)
-    assert "mean of" not in report.markdown_of(judgements, "x")
+    assert "mean of" not in report.markdown_of(results, "x")

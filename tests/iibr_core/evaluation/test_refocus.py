@@ -163,45 +163,45 @@ def test_views_on_disk_follow_the_convention(name: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def judgement(networks: Path) -> EvaluationResult:  # noqa: F811
+def result(networks: Path) -> EvaluationResult:  # noqa: F811
     """Of the fence, by all that there is to judge by; the networks are random ones."""
     scene = read_scene(FOLDER / "fence")
     assert scene is not None
     return evaluate(scene, Options(choice=QUICK.choice, qualities=("fast",), lpips=networks))[0]
 
 
-def test_evaluation_judges_every_focus_and_the_lens(judgement: EvaluationResult) -> None:
-    assert [found.focus.name for found in judgement.refocus] == ["near", "middle", "far", LENS]
-    for found in judgement.refocus:
+def test_evaluation_judges_every_focus_and_the_lens(result: EvaluationResult) -> None:
+    assert [found.focus.name for found in result.refocus] == ["near", "middle", "far", LENS]
+    for found in result.refocus:
         db = {method: figures.db for method, figures in found.figures.items()}
         assert db["fast"] > db["identity"] + 3
         assert found.figures["fast"].flip < found.figures["identity"].flip
         assert found.views == 21  # the corners lie outside the aperture
         assert found.made.shape == found.expected.shape
-    *grid, lens = judgement.refocus
+    *grid, lens = result.refocus
     assert set(lens.figures) == {"truth", "identity", "reference warp", "fast"}
     assert all("truth" not in found.figures for found in grid)
     assert lens.figures["truth"].db == pytest.approx(true_db(scene_of("fence")))
     assert MADE_DB["fence"] < lens.figures["fast"].db + 1 < lens.figures["truth"].db + 1
 
 
-def test_reports_hold_the_refocus(judgement: EvaluationResult) -> None:
-    read = json.loads(report.json_of([judgement], "x"))["judgements"][0]
-    for found, stored in zip(judgement.refocus, read["refocus"], strict=True):
+def test_reports_hold_the_refocus(result: EvaluationResult) -> None:
+    read = json.loads(report.json_of([result], "x"))["judgements"][0]
+    for found, stored in zip(result.refocus, read["refocus"], strict=True):
         assert (stored["name"], stored["disparity"]) == (found.focus.name, found.focus.disparity)
         assert stored["methods"]["fast"] == {"db": found.figures["fast"].db, "flip": found.figures["fast"].flip}
-    text = report.markdown_of([judgement], "x")
+    text = report.markdown_of([result], "x")
     assert "| refocused views of | near (" in text
-    page = report.page_of([judgement], "x")
+    page = report.page_of([result], "x")
     for name in ("near", "middle", "far"):
         assert all(f'alt="{name}, {kind}"' in page for kind in ("fast", "truth", "error"))
     assert all(f'alt="{name}"' in page for name in (LENS, f"{LENS}, fast", f"{LENS}, error"))
 
 
-def test_lpips_of_local_networks_is_reported(judgement: EvaluationResult) -> None:
-    lpips = {row.method: row.mean.lpips for row in judgement.rows}
+def test_lpips_of_local_networks_is_reported(result: EvaluationResult) -> None:
+    lpips = {row.method: row.mean.lpips for row in result.rows}
     assert 0 < lpips["fast"] < lpips["identity"]
-    assert "| LPIPS |" in report.markdown_of([judgement], "x")
+    assert "| LPIPS |" in report.markdown_of([result], "x")
 
 
 def test_a_lens_without_all_its_views_is_left_out_and_told() -> None:
