@@ -20,9 +20,12 @@ test: install
 	$(BIN)/lint-imports
 	$(BIN)/pytest
 
+# DATA: a folder of scenes as `iibr evaluate` takes them; without it, a made-up scene and the demo photo. OUT: for the report.
+OUT ?= out/bench
 bench: install
 	@.ci/system-libraries test
-	$(BIN)/python -m benchmarks.report
+	@mkdir -p "$(OUT)"
+	$(BIN)/python -m benchmarks.speed --out "$(OUT)" $(if $(DATA),--data "$(DATA)")
 
 fuzz: install
 	@.ci/system-libraries test

@@ -49,7 +49,7 @@ class Watch:
         self._threads.last = time.thread_time()
         return False
 
-    def told(self, count: int = 3) -> str:
+    def in_words(self, count: int = 3) -> str:
         """The longest pieces in words."""
         longest = sorted(self.longest_ms.items(), key=lambda item: -item[1])[:count]
         return ", ".join(f"{ms:.0f} ms before {place}" for place, ms in longest)
@@ -74,14 +74,14 @@ def main() -> None:
         watch = Watch()
         for _ in islice(field(photo, disparity, watch, quality), WATCHED_VIEWS):
             watch()
-        print(f"{'':9} longest pieces, processor time: {watch.told()}", flush=True)
+        print(f"{'':9} longest pieces, processor time: {watch.in_words()}", flush=True)
     for name, work in depth_work(photo, disparity).items():
         work(lambda: False)
         watch = Watch()
         watch()
         work(watch)
         watch()
-        print(f"{name:9} {size}: longest pieces, processor time: {watch.told()}", flush=True)
+        print(f"{name:9} {size}: longest pieces, processor time: {watch.in_words()}", flush=True)
 
 
 def scene(pixels: int) -> tuple[Photo, Disparity]:
@@ -117,10 +117,10 @@ def compile_all(quality: Quality) -> None:
 
 def wait_ms(photo: Photo, disparity: Disparity, quality: Quality, share: float) -> float:
     """Cancel at some moment of the first seconds; how long until the generator ends."""
-    stop, told = threading.Event(), []
+    stop, cancelled_at = threading.Event(), []
 
     def cancel() -> None:
-        told.append(time.perf_counter())
+        cancelled_at.append(time.perf_counter())
         stop.set()
 
     views = field(photo, disparity, stop.is_set, quality)
@@ -130,13 +130,13 @@ def wait_ms(photo: Photo, disparity: Disparity, quality: Quality, share: float) 
         pass
     end = time.perf_counter()
     timer.join()
-    return 1e3 * (end - told[0]) if told and end > told[0] else 0.0
+    return 1e3 * (end - cancelled_at[0]) if cancelled_at and end > cancelled_at[0] else 0.0
 
 
 def _asker() -> str:
     """Who asks whether to stop: a function of the core, or a thread about to begin its next band."""
     frame = sys._getframe(2)
-    while frame.f_back and (frame.f_code.co_filename.endswith("bands.py") or frame.f_code.co_name == "_should_stop"):
+    while frame.f_back and (frame.f_code.co_filename.endswith("tiling.py") or frame.f_code.co_name == "_should_stop"):
         frame = frame.f_back
     is_of_core = "iibr_core" in frame.f_code.co_filename
     return f"{frame.f_code.co_name}:{frame.f_lineno}" if is_of_core else "the next band of a thread"

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.provenance import made_by
 from benchmarks.speed.variants import bench_scenes
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.pictorial_cues import estimate_from_cues
@@ -42,7 +43,7 @@ FAULTS: dict[str, Callable[[FloatImage], FloatImage]] = {
     "by 2 px": lambda d: blur(d, 2.0),
     "by 4 px": lambda d: blur(d, 4.0),
 }
-ONE_MEGAPIXEL = 1000, 1000
+ONE_MEGAPIXEL = ImageSize(1000, 1000)
 REPEATS = 5
 NOTE = (
     "On antinous the fitted constant falls below the photo too: its -1.2 px follow the large wall, while most",
@@ -68,7 +69,7 @@ def report(data: Path, yardsticks: Path) -> Iterator[str]:
     yield from (
         "# Depth: refined edges, and the guess without a model",
         "",
-        "Made by `python -m benchmarks.depth`.",
+        f"{made_by('benchmarks.depth')}.",
         "",
     )
     yield from refinement(data, yardsticks)
@@ -78,13 +79,13 @@ def report(data: Path, yardsticks: Path) -> Iterator[str]:
 
 
 def refinement(data: Path, yardsticks: Path) -> Iterator[str]:
-    def judged(switch: str) -> dict[str, float]:
+    def psnr_with(switch: str) -> dict[str, float]:
         iibr = Path(sys.executable).parent / "iibr"
         command = [sys.executable, yardsticks / "judge_views.py", *SOFT, *EXACT, "--iibr", iibr, "--data", data]
         run = subprocess.run([*map(str, command), f"--extra=--refine {switch}"], capture_output=True, text=True)
         return {line.split()[0]: float(found[1]) for line in run.stdout.splitlines() if (found := FULL.search(line))}
 
-    off, on = judged("off"), judged("on")
+    off, on = psnr_with("off"), psnr_with("on")
     yield from ("## Refinement", "", "PSNR of views generated from one photo and its disparity (judge_views.py).", "")
     yield from ("| scene | `--refine off` | on | figure | holds |", "| --- | --- | --- | --- | --- |")
     for name in (*SOFT, *EXACT):
@@ -98,12 +99,12 @@ FULL = re.compile(r"iibr full ([\d.]+)")
 
 def procedural() -> Iterator[str]:
     """Scenes that nothing was chosen by: mean PSNR of two views each."""
-    size, offsets = (240, 320), (ViewOffset(-4.0, -4.0), ViewOffset(0.0, 4.0))
+    size, offsets = ImageSize(240, 320), (ViewOffset(-4.0, -4.0), ViewOffset(0.0, 4.0))
     rows: dict[str, list[tuple[float, float]]] = {name: [] for name in FAULTS}
     for seed in HELD_OUT:
-        scene = random_scene(np.random.default_rng(20_000 + seed), ImageSize(*size), 2.5)
-        colors, disparity = render(scene, ImageSize(*size), ViewOffset(0.0, 0.0))
-        truth = {offset: render(scene, ImageSize(*size), offset)[0] for offset in offsets}
+        scene = random_scene(np.random.default_rng(20_000 + seed), size, 2.5)
+        colors, disparity = render(scene, size, ViewOffset(0.0, 0.0))
+        truth = {offset: render(scene, size, offset)[0] for offset in offsets}
         for name, spoil in FAULTS.items():
             soft = spoil(disparity)
             rows[name].append((views_psnr(colors, soft, truth, 9), views_psnr(colors, refine(colors, soft), truth, 9)))

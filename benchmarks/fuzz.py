@@ -49,15 +49,15 @@ def main() -> None:
         return
     total = 0
     for name in given.reader or READERS:
-        findings, read = fuzzed(name, given.seed, given.count, given.out)
+        findings, read = fuzz_reader(name, given.seed, given.count, given.out)
         total += sum(findings.values())
-        told = "".join(f"\n    {count} x {what}" for what, count in findings.most_common())
-        print(f"{name}: {given.count} cases, {read} read in spite of damage, {sum(findings.values())} findings{told}")
+        kinds = "".join(f"\n    {count} x {what}" for what, count in findings.most_common())
+        print(f"{name}: {given.count} cases, {read} read in spite of damage, {sum(findings.values())} findings{kinds}")
         sys.stdout.flush()
     sys.exit(1 if total else 0)
 
 
-def fuzzed(name: str, seed: int, count: int, out: Path) -> tuple[Counter[str], int]:
+def fuzz_reader(name: str, seed: int, count: int, out: Path) -> tuple[Counter[str], int]:
     """What was found, by kind, and how many cases were read without complaint; a worker that ends is replaced."""
     findings: Counter[str] = Counter()
     read = next_case = 0
@@ -70,24 +70,24 @@ def fuzzed(name: str, seed: int, count: int, out: Path) -> tuple[Counter[str], i
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         )
-        begun = None
+        case_number = None
         for line in _lines(worker):
             number, outcome = line.split(" ", 1)
-            begun = int(number)
+            case_number = int(number)
             if outcome == "begin":
                 continue
             read += outcome == "read"
             if outcome not in ("read", "refused"):
-                _keep(findings, outcome, name, seed, begun, out)
-            next_case = begun + 1
+                _keep(findings, outcome, name, seed, case_number, out)
+            next_case = case_number + 1
         code = worker.wait()
         if next_case < count:
-            if begun is None:
+            if case_number is None:
                 raise SystemExit(f"{name}: the worker does not start (exit code {code}); run it with --work 0 1")
             what = "hang" if code == -9 else f"crash: exit code {code}"
-            if begun == next_case:
-                _keep(findings, what, name, seed, begun, out)
-                next_case = begun + 1
+            if case_number == next_case:
+                _keep(findings, what, name, seed, case_number, out)
+                next_case = case_number + 1
     return findings, read
 
 

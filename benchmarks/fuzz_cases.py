@@ -1,6 +1,6 @@
 """The cases of fuzzing: who reads which damaged files.
 
-A case is a pure function of (reader, seed, number), so that a finding is told by three words.
+A case is a pure function of (reader, seed, number), so that three words name a finding.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import fuzz_seeds as seeds
-from benchmarks.fuzz_damage import Seed, damaged, repair_png
+from benchmarks.fuzz_damage import Seed, damage, repair_png
 from iibr_core.types import InputError
 
 MAX_PIXELS = 100_000
@@ -30,7 +30,7 @@ class Reader:
 
 def case(name: str, seed: int, number: int) -> tuple[str, bytes]:
     """File name and bytes of a case."""
-    return damaged(_seeds_of(name), np.random.default_rng([seed, number, *name.encode()]))
+    return damage(_seeds_of(name), np.random.default_rng([seed, number, *name.encode()]))
 
 
 def _read_photo(path: Path) -> None:
@@ -120,7 +120,7 @@ def _read_preferences(path: Path) -> None:
     from viewer.model.state.app_state import AppState
 
     if load_preferences(AppState(), path.parent).notices:
-        raise InputError("told in a notice")
+        raise InputError("a notice says why")
 
 
 def _read_estimate(path: Path) -> None:
@@ -148,7 +148,7 @@ READERS: dict[str, Reader] = {
     "png": Reader(seeds.pngs, _read_photo),
     "tiff": Reader(seeds.tiffs, _read_photo),
     "exr": Reader(seeds.exrs, _read_photo),
-    "hdr": Reader(lambda: [Seed("a.hdr", seeds.written("hdr", seeds.sample(3, np.float32), "float"))], _read_photo),
+    "hdr": Reader(seeds.hdrs, _read_photo),
     "webp": Reader(lambda: [Seed("a.webp", seeds.by_pillow("WEBP", lossless=x)) for x in (True, False)], _read_photo),
     "pnm": Reader(seeds.pnms, _read_photo),
     "other": Reader(seeds.others, _read_photo),

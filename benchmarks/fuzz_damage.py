@@ -24,7 +24,7 @@ class Seed:
     file_of: Callable[[bytes], bytes] = bytes
 
 
-def damaged(seeds: list[Seed], rng: Rng) -> tuple[str, bytes]:
+def damage(seeds: list[Seed], rng: Rng) -> tuple[str, bytes]:
     """File name and bytes of one of the seeds, damaged in one way or in several."""
     chosen = seeds[rng.integers(len(seeds))]
     data = chosen.data

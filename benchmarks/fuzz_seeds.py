@@ -13,10 +13,10 @@ import OpenImageIO as oiio
 from PIL import Image, PngImagePlugin
 
 from benchmarks.fuzz_damage import Seed, repair_png
+from iibr_core.types import ImageSize
 from tests.iibr_core import embedded_files as embedded
 
-SIZE = 17, 23
-"""Height and width."""
+SIZE = ImageSize(17, 23)
 
 
 def sample(channels: int = 3, dtype: type = np.uint8) -> np.ndarray:
@@ -25,7 +25,7 @@ def sample(channels: int = 3, dtype: type = np.uint8) -> np.ndarray:
     return values / 255 if dtype == np.float32 else values
 
 
-def written(extension: str, pixels: np.ndarray, kind: str = "uint8", **attributes: object) -> bytes:
+def encode_image(extension: str, pixels: np.ndarray, kind: str = "uint8", **attributes: object) -> bytes:
     """A file's bytes as OpenImageIO writes them."""
     with tempfile.TemporaryDirectory() as folder:
         path = f"{folder}/a.{extension}"
@@ -61,15 +61,15 @@ def jpegs() -> list[Seed]:
 
 def pngs() -> list[Seed]:
     kinds = [by_pillow("PNG", mode) for mode in ("RGB", "RGBA", "L", "P", "1")]
-    kinds.append(written("png", sample(4, np.uint16) * np.uint16(257), "uint16"))
+    kinds.append(encode_image("png", sample(4, np.uint16) * np.uint16(257), "uint16"))
     return [Seed("a.png", data, file_of) for data in kinds for file_of in (bytes, repair_png)]
 
 
 def tiffs() -> list[Seed]:
     kinds = (
-        written("tif", sample(), compression="lzw"),
-        written("tif", sample(4, np.uint16), "uint16", compression="zip"),
-        written("tif", sample(3, np.float32), "float", compression="none"),
+        encode_image("tif", sample(), compression="lzw"),
+        encode_image("tif", sample(4, np.uint16), "uint16", compression="zip"),
+        encode_image("tif", sample(3, np.float32), "float", compression="none"),
         by_pillow("TIFF", "CMYK"),
         by_pillow("TIFF", "P", compression="packbits"),
         by_pillow("TIFF", "RGB", compression="jpeg"),
@@ -79,7 +79,11 @@ def tiffs() -> list[Seed]:
 
 def exrs() -> list[Seed]:
     compressions = ("none", "zip", "piz", "rle", "b44", "dwaa")
-    return [Seed("a.exr", written("exr", sample(3, np.float32), "half", compression=c)) for c in compressions]
+    return [Seed("a.exr", encode_image("exr", sample(3, np.float32), "half", compression=c)) for c in compressions]
+
+
+def hdrs() -> list[Seed]:
+    return [Seed("a.hdr", encode_image("hdr", sample(3, np.float32), "float"))]
 
 
 def pnms() -> list[Seed]:
@@ -100,7 +104,7 @@ def others() -> list[Seed]:
         channels, kind = (1, "float") if extension in ("zfile", "fits") else (3, "uint8")
         try:
             pixels = sample(channels, np.float32 if kind == "float" else np.uint8)
-            seeds.append(Seed(f"a.{extension}", written(extension, pixels, kind)))
+            seeds.append(Seed(f"a.{extension}", encode_image(extension, pixels, kind)))
         except ValueError:
             continue  # this build does not write it
     return seeds
@@ -121,11 +125,11 @@ def photos_with_depth() -> list[Seed]:
         embedded.samsung_jpeg(photo, depth_map()),
     ]
 
-    def with_gdepth(damaged: bytes) -> bytes:
-        return embedded.with_segments(photo, embedded.gdepth_segments(damaged, part_bytes=20_000))
+    def with_gdepth(depth_bytes: bytes) -> bytes:
+        return embedded.with_segments(photo, embedded.gdepth_segments(depth_bytes, part_bytes=20_000))
 
-    def with_packet(damaged: bytes) -> bytes:
-        return embedded.with_segments(photo, [damaged])
+    def with_packet(packet: bytes) -> bytes:
+        return embedded.with_segments(photo, [packet])
 
     inner = [Seed("a.jpg", data, with_gdepth) for data in (depth, embedded.picture(depth_map()))]
     packets = [Seed("a.jpg", embedded.gdepth_segments(depth)[0], with_packet)]
@@ -170,15 +174,15 @@ def saved_settings() -> list[Seed]:
     mask = ApertureShape("mask", mask=ApertureMask("m", 2, 2, b"\x01\xff\x00\x10"))
     text = settings_text(SavedSettings(Optics(aperture_shape=mask), 1.0, Source(""), (64, 48))).encode()
 
-    def in_png(damaged: bytes) -> bytes:
+    def in_png(settings: bytes) -> bytes:
         info = PngImagePlugin.PngInfo()
-        info.add_text("iibr:settings", damaged.decode("latin-1"))
+        info.add_text("iibr:settings", settings.decode("latin-1"))
         file = io.BytesIO()
         Image.fromarray(sample()).save(file, "PNG", pnginfo=info)
         return file.getvalue()
 
-    def in_exr(damaged: bytes) -> bytes:
-        return written("exr", sample(3, np.float32), "half", iibr__settings=damaged.decode("latin-1"))
+    def in_exr(settings: bytes) -> bytes:
+        return encode_image("exr", sample(3, np.float32), "half", iibr__settings=settings.decode("latin-1"))
 
     whole = [Seed("a.png", in_png(text), repair_png), Seed("a.exr", in_exr(text))]
     return [Seed("a.png", text, in_png), Seed("a.png", text, in_png), Seed("a.exr", text, in_exr), *whole]
@@ -235,5 +239,10 @@ def estimates() -> list[Seed]:
 
 def model_configs() -> list[Seed]:
     """How a depth model wants its pictures."""
-    told = {"size": {"height": 518, "width": 518}, "ensure_multiple_of": 14, "image_mean": [0.5] * 3, "image_std": 0.5}
-    return [Seed("preprocessor_config.json", json.dumps(told).encode())]
+    config = {
+        "size": {"height": 518, "width": 518},
+        "ensure_multiple_of": 14,
+        "image_mean": [0.5] * 3,
+        "image_std": 0.5,
+    }
+    return [Seed("preprocessor_config.json", json.dumps(config).encode())]

@@ -24,6 +24,7 @@ import psutil
 from numpy.typing import NDArray
 
 from benchmarks.light_fields import StoredField, read_field
+from benchmarks.provenance import made_by
 from benchmarks.refocus import plain_pass
 from benchmarks.speed.rendering import DrawVariant, draw, drawing_cost, shear_light
 from iibr_core.color import encoded_from_stored, srgb_from_linear
@@ -207,7 +208,7 @@ def report(gl: GLContext, data: Path, rounds: int, switches: int) -> Iterator[st
         shop.name: Optics(focus_disparity=4.8, aperture_diameter=4.0),
     }
     yield "# Optics: speed against error\n"
-    yield f"Made by `python -m benchmarks.optics`. {gl.renderer}, {CORES} cores.\n"
+    yield f"{made_by('benchmarks.optics')}. {gl.renderer}, {CORES} cores.\n"
     yield f"{shop.name} is drawn with {SIZE_PX[0]}x{SIZE_PX[1]} pixels, focus at 4.8 px. Times are medians; on software"
     yield "GL, processor time over the number of cores. Errors are against the converged picture of all 81 views."
     yield "Single switches are in [speed.md](speed.md)."

@@ -1,6 +1,6 @@
 """Time of a refocused picture, in alternation with the plainest shift-and-sum shader on the same views.
 
-    python benchmarks/refocus.py --data FOLDER [--radius 2] [--size 768x512] [--rounds 4] [--yardstick SCRIPT]
+    python -m benchmarks.refocus --data FOLDER [--radius 2] [--size 768x512] [--rounds 4] [--yardstick SCRIPT]
 
 FOLDER/views holds vVV_uUU.* and FOLDER may hold the centre view's disparity as *.npy. --yardstick: a script of its own
 that takes --data, --radius and --size and prints "min <milliseconds> ms"; it is run once a round.
@@ -68,11 +68,11 @@ def open_views(
     height, width = views.shape[1:3]
     renderer.open_field(grid, width, height, hdr=False, with_disparity=centre is not None)
     for row, column in np.ndindex(*grid):
-        disparity = None if centre is None else roughly_moved(centre, grid.offset(row, column))
+        disparity = None if centre is None else approximate_disparity(centre, grid.offset(row, column))
         renderer.upload_view(row, column, views[row * grid.columns + column], disparity)
 
 
-def roughly_moved(disparity: NDArray[np.float32], offset: ViewOffset) -> NDArray[np.float32]:
+def approximate_disparity(disparity: NDArray[np.float32], offset: ViewOffset) -> NDArray[np.float32]:
     """Disparity of another view, (H, W), near enough to time with: moved by its own value, looked up backwards."""
     y, x = np.indices(disparity.shape)
     moved = disparity
@@ -130,7 +130,7 @@ def yardstick_ms(script: Path, args: argparse.Namespace) -> float:
     return float(re.findall(r"min ([\d.]+) ms", output)[0])
 
 
-def parsed() -> argparse.Namespace:
+def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--radius", type=float, default=2.0, help="of the aperture, in view steps")
@@ -141,8 +141,9 @@ def parsed() -> argparse.Namespace:
 
 
 def main() -> None:
-    args = parsed()
-    size_px = tuple(map(int, args.size.split("x")))
+    args = parse_arguments()
+    width, height = map(int, args.size.split("x"))
+    size_px = width, height
     grid, views = read_views(args.data)
     disparity_file = next(iter(sorted(args.data.glob("*.npy"))), None)
     centre = None if disparity_file is None else np.nan_to_num(np.load(disparity_file)).astype(np.float32)

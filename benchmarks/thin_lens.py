@@ -177,12 +177,12 @@ def sensor_of(mi: Any, offset: ViewOffset, lens: ThinLens | None) -> Any:
     return mi.load_dict({"type": "thinlens", **camera, **opened})
 
 
-def rendered(mi: Any, lit: Sequence[Any], sensor: Any, samples: int) -> Image:
+def render_linear(mi: Any, lit: Sequence[Any], sensor: Any, samples: int) -> Image:
     """Linear light (H, W, 3), the sum over lights."""
     return np.asarray(sum(np.array(mi.render(scene, sensor=sensor, spp=samples)) for scene in lit), np.float32)
 
 
-def points_seen(mi: Any, scene: Any, sensor: Any, y: NDArray[Any], x: NDArray[Any]) -> NDArray[np.float64]:
+def visible_points(mi: Any, scene: Any, sensor: Any, y: NDArray[Any], x: NDArray[Any]) -> NDArray[np.float64]:
     """(N, 3): what the rays through these places of the picture hit; pixel centres are integers."""
     points = []
     for row, column in zip(y, x):
@@ -194,7 +194,7 @@ def points_seen(mi: Any, scene: Any, sensor: Any, y: NDArray[Any], x: NDArray[An
 def exact_disparity(mi: Any, scene: Any) -> Image:
     """(H, W) at the pixel centres of the centre view."""
     y, x = (grid.ravel() for grid in np.mgrid[0:HEIGHT, 0:WIDTH])
-    depth = -points_seen(mi, scene, sensor_of(mi, ViewOffset(0, 0), None), y, x)[:, 2]
+    depth = -visible_points(mi, scene, sensor_of(mi, ViewOffset(0, 0), None), y, x)[:, 2]
     return np.array([disparity_at(z) for z in depth], np.float32).reshape(HEIGHT, WIDTH)
 
 
@@ -203,8 +203,8 @@ def require_convention(mi: Any, scene: Any, disparity: Image) -> None:
     offset = ViewOffset(2.0, -1.0)
     y, x = (grid.ravel() for grid in np.mgrid[8 : HEIGHT - 8 : 4, 8 : WIDTH - 8 : 4])
     d = disparity[y, x]
-    here = points_seen(mi, scene, sensor_of(mi, ViewOffset(0, 0), None), y, x)
-    there = points_seen(mi, scene, sensor_of(mi, offset, None), y - d * offset.t, x - d * offset.s)
+    here = visible_points(mi, scene, sensor_of(mi, ViewOffset(0, 0), None), y, x)
+    there = visible_points(mi, scene, sensor_of(mi, offset, None), y - d * offset.t, x - d * offset.s)
     apart = np.linalg.norm(here - there, axis=1)
     if np.quantile(apart, 0.8) > 1e-3:
         raise ValueError(f"views do not follow the project's convention: points lie {np.median(apart):.4f} apart")
@@ -232,10 +232,10 @@ def make(mi: Any, scene: LensScene, folder: Path, view_samples: int, lens_sample
     np.save(folder / f"gt_disp_u{u:02d}_v{v:02d}.npy", disparity)
     brightest = 0.0
     for row, column in np.ndindex(*GRID):
-        picture = rendered(mi, lit, sensor_of(mi, GRID.offset(row, column), None), view_samples)
+        picture = render_linear(mi, lit, sensor_of(mi, GRID.offset(row, column), None), view_samples)
         brightest = max(brightest, float(picture.max()))
         write(mi, folder / "views" / f"v{row:02d}_u{column:02d}.png", picture, 8)
-    through = rendered(mi, lit, sensor_of(mi, ViewOffset(0, 0), scene.lens), lens_samples)
+    through = render_linear(mi, lit, sensor_of(mi, ViewOffset(0, 0), scene.lens), lens_samples)
     write(mi, folder / "lens.png", through, 16)
     about = {**asdict(scene.lens), "samples": lens_samples, "mitsuba": mi.__version__, "variant": mi.variant()}
     (folder / "lens.json").write_text(json.dumps(about, indent=1) + "\n")

@@ -18,6 +18,7 @@ import torch
 from numpy.typing import NDArray
 
 from benchmarks import plucker
+from benchmarks.provenance import made_by
 from benchmarks.speed.variants import BenchScene, bench_scenes
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import bounded_psnr
@@ -44,7 +45,7 @@ LAMBDAS = LossWeights(entropy=ENTROPY_WEIGHT)
 HELD_OUT = 40
 LEARNING_RATE = 3e-3
 COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
-"""The features of `ambiguous._describe` that know nothing of disparity."""
+"""The features of `ambiguous_rays._describe_hypotheses` that know nothing of disparity."""
 MASK_SIZE = ImageSize(160, 192)
 MASK_SCENES = 24
 THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
@@ -92,8 +93,8 @@ ABLATIONS = [
     Ablation("K = 5", RayChoice(hypotheses=5)),
     Ablation("K = 9", RayChoice(hypotheses=9)),
     Ablation("without inpainting", RayChoice(inpainted=False)),
-    Ablation("without disparity encoding", RayChoice(described=without_disparity)),
-    Ablation("raw Pluecker coordinates", RayChoice(described=raw_coordinates)),
+    Ablation("without disparity encoding", RayChoice(describe=without_disparity)),
+    Ablation("raw Pluecker coordinates", RayChoice(describe=raw_coordinates)),
     Ablation("without entropy loss", lambdas=replace(LAMBDAS, entropy=0.0)),
     Ablation("with the paper's entropy loss (1)", lambdas=replace(LAMBDAS, entropy=1.0)),
     Ablation("without EPI loss", lambdas=replace(LAMBDAS, epi=0.0)),
@@ -111,7 +112,7 @@ def main() -> None:
     lines = [
         "# The ray transformer, measured",
         "",
-        f"Made by `python -m benchmarks.transformer --scenes {options.scenes} --steps {options.steps}`.",
+        f"{made_by('benchmarks.transformer')}.",
         "",
         *ablations(truths, options.scenes, options.steps),
         *masks(),
@@ -210,7 +211,7 @@ def scene_psnr(truth: BenchScene, weigh: Weigh | None, choice: RayChoice) -> flo
     rays = rays_of_photo(truth.photo, truth.disparity, truth.reach, len(offsets))
     if choice.inpainted:
         complete_ray_set(rays, offsets)
-    described = None if weigh is None else lambda ambiguous: weigh(choice.described(rays, ambiguous))
+    described = None if weigh is None else lambda ambiguous: weigh(choice.describe(rays, ambiguous))
     with ViewSynthesis(transformer=described, hypotheses=choice.hypotheses) as synthesis:
         views = ((synthesis.render(rays, at).colors, image) for at, image in truth.truth.items())
         return float(np.mean([bounded_psnr(colors, image) for colors, image in views]))

@@ -1,12 +1,13 @@
 """Figures of the real window on a private X server: first frame, a new plan, all views, idling.
 
-python -m benchmarks.window
+python -m benchmarks.window, a part of `make bench`.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from typing import Any
 
 import psutil
 
@@ -25,8 +26,8 @@ def main() -> None:
     read_at: list[float] = []
     load = scene_worker.load_photo
 
-    def timed_load(source: Source) -> LoadedPhoto:
-        loaded = load(source)
+    def timed_load(*arguments: Any) -> LoadedPhoto:
+        loaded = load(*arguments)
         read_at.append(time.perf_counter())
         return loaded
 

@@ -1,47 +1,59 @@
-"""Times every switch, measures its error, writes tables and plots: speed.md, speed.svg, speed.png.
+"""Measures speed against error for every switch, and writes tables and plots: speed.md, speed.svg, speed.png.
 
-python -m benchmarks.speed --data DATA --out docs
+    python -m benchmarks.speed --out out/bench [--data DATA [--yardsticks BENCH]]          # make bench
+
+Without DATA, which holds scenes as `iibr evaluate` takes them, a made-up scene with known views and the demo photo are
+measured. BENCH holds scripts that judge from outside, judge_views.py and plain_refocus.py. Machines differ and are
+shared: quote medians and ratios.
 """
 
 from __future__ import annotations
 
 import os
 import platform
-import shlex
-import subprocess
 import sys
-import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.types import GridShape, ImageSize, InputError
+from iibr_core.types import ImageSize, InputError, Quality, ReportProgress, image_size
 from viewer.cli.options import MaxPixels
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
+    from benchmarks.speed.figures import SceneFigures
+    from benchmarks.speed.prediction import BenchInput, Prediction
     from benchmarks.speed.rendering_figures import DrawingFigures
     from benchmarks.speed.report import Bench
     from benchmarks.speed.targets import SpeedTarget
-    from benchmarks.speed.variants import BenchScene, Draw, Stored
-    from iibr_core.types import FloatImage, Quality, ViewOffset
+    from benchmarks.speed.variants import BenchScene
     from viewer.gpu.context import GLContext
 
-TARGET_SIZE = ImageSize(512, 512)
-FIRST_FRAME_S = 1.5
+TARGET_SIZE, TARGET_REACH = ImageSize(512, 512), 4
 
 
 def bench(
-    data: Annotated[
-        Path, typer.Option(metavar="DIR", help="A scene with true views and disparity, or a folder of such.")
-    ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for speed.md, speed.svg and speed.png.")],
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="A scene with true views and disparity, or a folder of such.",
+            show_default="a made-up scene, and the demo photo",
+        ),
+    ] = None,
     repeats: Annotated[int, typer.Option(min=1, help="Rounds; figures are their medians.")] = 3,
     max_pixels: MaxPixels = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Small series, no soft maps: to see that it works.")] = False,
+    yardsticks: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of judge_views.py and plain_refocus.py.", show_default=False),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Small series, no soft maps, no window: to see that it works.")
+    ] = False,
 ) -> None:
     """Measure speed against error for every switch, and how cost grows with what a scene asks for.
 
@@ -49,63 +61,91 @@ def bench(
     """
     if not out.is_dir():
         raise InputError(f"{out}: is no folder; --out names one that exists")
-    from iibr_core.evaluation.packages import require_packages
-
-    require_packages("scipy", "skimage", "matplotlib")
+    from benchmarks.speed.inputs import demo_input, made_up_scenes, scenes_of_folder
+    from benchmarks.speed.prediction import whole_field
+    from benchmarks.speed.processes import require_yardsticks
     from benchmarks.speed.report import write_bench
 
-    measured = _measured(data, repeats, max_pixels, quick)
-    for path in write_bench(out, measured):
+    require_yardsticks(yardsticks, data)
+    scenes = scenes_of_folder(data, max_pixels, not quick) if data else made_up_scenes(not quick)
+    inputs = [whole_field(scene) for scene in scenes if not scene.is_soft] + ([] if data else [demo_input()])
+    for path in write_bench(out, measure(scenes, inputs, repeats, quick, yardsticks, data)):
         print(path)
 
 
-def _measured(data: Path, repeats: int, max_pixels: int | None, quick: bool) -> Bench:
-    from benchmarks.speed.figures import measure_scene
-    from benchmarks.speed.prediction import predict, whole_field
+def measure(
+    scenes: list[BenchScene],
+    inputs: list[BenchInput],
+    repeats: int,
+    quick: bool,
+    yardsticks: Path | None,
+    data: Path | None,
+) -> Bench:
+    """Everything, with a bar on stderr. scenes: with true views. inputs: fields whose time and memory are measured."""
+    from benchmarks.provenance import made_by
+    from benchmarks.speed.checks import view_agreement
+    from benchmarks.speed.prediction import predict
+    from benchmarks.speed.processes import window_lines, yardstick_lines
     from benchmarks.speed.report import Bench
     from benchmarks.speed.scaling import growth, series
-    from benchmarks.speed.targets import field_targets, front_targets, prediction_targets
+
+    qualities: tuple[Quality, ...] = ("fast", "balanced") if quick else ("fast", "balanced", "exact")
+    with headless_gl() as gl, show_progress("measuring") as show:
+        figures, drawings = measure_scenes(scenes, repeats, gl, show)
+        predicted = tuple(f for one in inputs for f in predict([one], qualities, repeats, show))
+        growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
+        targets = tuple(all_targets(scenes, inputs, figures, predicted, 0 if quick else repeats, show))
+        show(0, 0, "whether views agree")
+        agreements = tuple((one.name, view_agreement(one)) for one in inputs)
+        window = () if quick else window_lines()
+        outside = yardstick_lines(yardsticks, data) if yardsticks and data else ()
+    machine = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}" + (f", {gl.renderer}" if gl else "")
+    words = made_by("benchmarks.speed")
+    return Bench(figures, drawings, predicted, growths, targets, machine, words, agreements, window, outside)
+
+
+def measure_scenes(
+    scenes: list[BenchScene], repeats: int, gl: GLContext | None, report_progress: ReportProgress
+) -> tuple[tuple[SceneFigures, ...], tuple[DrawingFigures, ...]]:
+    """Every variant of the core on each scene, and of the renderer on those with views enough to leave some out."""
+    from benchmarks.speed.figures import measure_scene
+    from benchmarks.speed.rendering import measure_drawing, pinhole_renderer
     from benchmarks.speed.variants import LEAST_STORED_SIDE, VARIANTS
 
-    scenes = _scenes(data, max_pixels, with_soft=not quick)
-    whole = [scene for scene in scenes if not scene.is_soft]
-    drawings: tuple[DrawingFigures, ...] = ()
-    with headless() as gl, show_progress("measuring") as show:
-        with drawing(gl) as draw:
-            figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
-        large = [scene for scene in whole if 2 * scene.reach + 1 >= LEAST_STORED_SIDE]
-        if gl is not None:
-            from benchmarks.speed.rendering import measure_drawing
-
-            drawings = tuple(f for scene in large for f in measure_drawing(gl, scene, repeats, show))
-        qualities: tuple[Quality, ...] = ("fast", "balanced") if quick else ("fast", "balanced", "exact")
-        predicted = tuple(f for scene in whole for f in predict([whole_field(scene)], qualities, repeats, show))
-        growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
-        targets = [*front_targets([f for f in figures if not f.is_soft]), *prediction_targets(predicted)]
-        judged = next((s for s in whole if s.photo.shape[:2] == TARGET_SIZE and s.reach == 4), None)
-        if judged is not None and not quick:
-            targets = [*field_targets(judged, repeats, show), first_frame(judged), *targets]
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}" + (f", {gl.renderer}" if gl else "")
-    command = shlex.join(["python", "-m", "benchmarks.speed", *sys.argv[1:]])
-    return Bench(figures, drawings, predicted, growths, tuple(targets), machine, command)
+    with nullcontext() if gl is None else pinhole_renderer(gl) as draw:
+        figures = tuple(measure_scene(scene, VARIANTS, repeats, report_progress, draw) for scene in scenes)
+    if gl is None:
+        return figures, ()
+    large = [scene for scene in scenes if not scene.is_soft and 2 * scene.reach + 1 >= LEAST_STORED_SIDE]
+    return figures, tuple(f for scene in large for f in measure_drawing(gl, scene, repeats, report_progress))
 
 
-def _scenes(data: Path, max_pixels: int | None, with_soft: bool) -> list[BenchScene]:
-    from benchmarks.speed.variants import bench_scenes
-    from iibr_core.evaluation.datasets import find_scenes
-    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+def all_targets(
+    scenes: list[BenchScene],
+    inputs: list[BenchInput],
+    figures: tuple[SceneFigures, ...],
+    predicted: tuple[Prediction, ...],
+    repeats: int,
+    report_progress: ReportProgress,
+) -> Iterator[SpeedTarget]:
+    """Figures that have a target. repeats: 0 leaves out those that take long."""
+    from benchmarks.speed.checks import invariance_targets
+    from benchmarks.speed.processes import first_picture_target
+    from benchmarks.speed.targets import field_targets, front_targets, prediction_targets
 
-    limit = max_pixels or DEFAULT_MAX_PIXELS
-    known = [scene for scene in find_scenes(data) if scene.disparity]
-    if not known:
-        raise InputError(
-            f"{data}: holds no scene with disparity; give one, such as views/v00_u00.png and gt_disp_*.npy"
-        )
-    return [made for scene in known for made in bench_scenes(scene, limit, with_soft)]
+    own = [scene for scene in scenes if not scene.is_soft]
+    usual = next((s for s in own if image_size(s.photo) == TARGET_SIZE and s.reach == TARGET_REACH), None)
+    if usual is not None and repeats:
+        yield from field_targets(usual, repeats, report_progress)
+        yield first_picture_target(usual)
+    yield from front_targets([one for one in figures if not one.is_soft])
+    yield from prediction_targets(predicted)
+    report_progress(0, 0, "other orders, other bands")
+    yield from invariance_targets(inputs[-1])
 
 
 @contextmanager
-def headless() -> Iterator[GLContext | None]:
+def headless_gl() -> Iterator[GLContext | None]:
     """What draws without a display; None where there is no OpenGL."""
     from viewer.gpu.headless_context import create_headless
 
@@ -119,66 +159,6 @@ def headless() -> Iterator[GLContext | None]:
         yield gl
     finally:
         gl.release()
-
-
-@contextmanager
-def drawing(gl: GLContext | None) -> Iterator[Draw | None]:
-    """What draws pinhole pictures from stored views."""
-    if gl is None:
-        yield None
-        return
-    from viewer.gpu.refocus.renderer import Renderer
-
-    renderer = Renderer(gl)
-    try:
-        yield lambda stored, offsets: _drawn(renderer, stored, offsets)
-    finally:
-        renderer.release()
-
-
-def _drawn(renderer: Any, stored: Stored, offsets: Iterable[ViewOffset]) -> list[FloatImage]:
-    import numpy as np
-
-    from viewer.model.state.app_state import Optics
-
-    reach = round(max(abs(part) for at in stored for part in at))
-    grid = GridShape(2 * reach + 1, 2 * reach + 1)
-    colors = next(iter(stored.values()))[0]
-    height, width = colors.shape[:2]
-    renderer.open_field(grid, width, height, hdr=colors.dtype != np.uint8, with_disparity=True)
-    for at, (pixels, disparity) in stored.items():
-        renderer.upload_view(round(at.t) + reach, round(at.s) + reach, pixels, disparity)
-    pictures = []
-    for at in offsets:
-        renderer.render(Optics(eye=at), (width, height))
-        renderer.refine()
-        pictures.append(renderer.read_image().astype(np.float32) / 255)
-    return pictures
-
-
-def first_frame(scene: BenchScene) -> SpeedTarget:
-    """From the start of a process to the first picture of the scene, drawn without a display."""
-    import time
-
-    import numpy as np
-
-    from benchmarks.speed.targets import SpeedTarget
-    from iibr_core.formats.images.photo import write_image
-
-    seconds = []
-    with tempfile.TemporaryDirectory() as folder:
-        photo = Path(folder) / "photo.png"
-        write_image(photo, scene.photo)
-        np.save(Path(folder) / "photo_disparity.npy", scene.disparity)
-        words = ["screenshot", str(photo), "--grid", "1", "-o", str(Path(folder) / "picture.png")]
-        for _ in range(3):
-            start = time.perf_counter()
-            subprocess.run([sys.executable, "-m", "viewer", *words], check=True, capture_output=True)
-            seconds.append(time.perf_counter() - start)
-    said = f"{min(seconds):.2f} s, the least of {len(seconds)}"
-    return SpeedTarget(
-        "photo and disparity: process start to first picture", "<= 1.5 s", said, min(seconds) <= FIRST_FRAME_S
-    )
 
 
 def main() -> None:

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.speed.measure import Cost, Tell, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
+from benchmarks.speed.measure import Cost, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
 from benchmarks.speed.prediction import whole_field
 from benchmarks.speed.variants import REFERENCE, BenchScene, Draw, Variant, evaluated_views, field_cost, is_possible
 from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, plan_for_viewing
-from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX
+from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, ReportProgress
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredVariant:
     """One variant on one scene. cost: of the whole field; ratio: of processor time to the reference; peak_bytes: beyond
     what was there before; psnr_db, flip: means over the judged views.
     """
@@ -37,7 +37,7 @@ class SceneFigures:
     size: tuple[int, int]
     views: int
     judged: int
-    measured: tuple[Measured, ...]
+    measured: tuple[MeasuredVariant, ...]
     planned: str
     is_soft: bool = False
 
@@ -54,7 +54,11 @@ class SceneFigures:
 
 
 def measure_scene(
-    scene: BenchScene, variants: Sequence[Variant], repeats: int, report_progress: Tell, draw: Draw | None = None
+    scene: BenchScene,
+    variants: Sequence[Variant],
+    repeats: int,
+    report_progress: ReportProgress,
+    draw: Draw | None = None,
 ) -> SceneFigures:
     """Every possible variant on one scene, timed in turns. draw: what fills in where views are left out."""
     possible = [variant for variant in variants if is_possible(variant, scene, draw is not None)]
@@ -64,19 +68,20 @@ def measure_scene(
     def way(variant: Variant) -> Callable[[], Cost]:
         return lambda: field_cost(variant, scene)
 
-    def told(done: int, total: int, doing: str) -> None:
+    def report(done: float, total: float, doing: str) -> None:
         report_progress(done, total, f"{scene.name}: {doing}")
 
     errors = {}
     for k, variant in enumerate(possible):
-        told(k, len(possible), f"error of {variant.name}")
+        report(k, len(possible), f"error of {variant.name}")
         errors[variant] = _errors(variant, scene, draw)
-    costs = in_turns({variant.name: way(variant) for variant in possible}, repeats, told)
+    costs = in_turns({variant.name: way(variant) for variant in possible}, repeats, report)
     measured = []
     for variant in possible:
         own, reference = costs[variant.name], costs[REFERENCE.name]
         memory = peak_bytes(field_cost, variant, scene)
-        measured.append(Measured(variant, median_cost(own), median_ratio(own, reference), memory, *errors[variant]))
+        ratio = median_ratio(own, reference)
+        measured.append(MeasuredVariant(variant, median_cost(own), ratio, memory, *errors[variant]))
     size = (scene.photo.shape[0], scene.photo.shape[1])
     planned = _plan_choice(scene, possible)
     return SceneFigures(scene.name, size, len(scene.field), len(scene.truth), tuple(measured), planned, scene.is_soft)

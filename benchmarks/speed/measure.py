@@ -20,8 +20,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-Tell = Callable[[int, int, str], None]
-"""Told what is done: (done, of, doing)."""
+from iibr_core.types import ReportProgress
 
 PEAK_RESET, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
 
@@ -48,8 +47,10 @@ def cost_of(work: Callable[[], object]) -> Cost:
     return Cost(time.perf_counter() - wall, time.process_time() - cpu)
 
 
-def in_turns(ways: Mapping[str, Callable[[], Cost]], repeats: int, report_progress: Tell) -> dict[str, list[Cost]]:
-    """The costs that each way tells of itself, one a round; every round goes through all ways."""
+def in_turns(
+    ways: Mapping[str, Callable[[], Cost]], repeats: int, report_progress: ReportProgress
+) -> dict[str, list[Cost]]:
+    """The costs that each way gives, one a round; every round goes through all ways."""
     found: dict[str, list[Cost]] = {name: [] for name in ways}
     for round_ in range(repeats):
         for k, (name, way) in enumerate(ways.items()):

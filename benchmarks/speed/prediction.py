@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.speed.measure import Cost, Tell, cost_of, in_turns, median_cost, peak_bytes
+from benchmarks.speed.measure import Cost, cost_of, in_turns, median_cost, peak_bytes
 from benchmarks.speed.variants import BenchScene
 from iibr_core.generation.cost_model import (
     CORES,
@@ -20,7 +20,7 @@ from iibr_core.generation.cost_model import (
 )
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
-from iibr_core.types import Disparity, FloatImage, GridShape, Photo, Quality, StoredColors
+from iibr_core.types import Disparity, FloatImage, GridShape, Photo, Quality, ReportProgress, StoredColors
 
 WITHIN = 0.25
 """A prediction is good if what was measured differs from it by no more than this share."""
@@ -81,7 +81,7 @@ def make_field(given: BenchInput, quality: Quality) -> list[tuple[StoredColors, 
 
 
 def predict(
-    scenes: Sequence[BenchInput], qualities: Sequence[Quality], repeats: int, report_progress: Tell
+    scenes: Sequence[BenchInput], qualities: Sequence[Quality], repeats: int, report_progress: ReportProgress
 ) -> list[Prediction]:
     """Make every field in each quality, in turns, beside what the plan says of it."""
     pairs = [(given, quality) for given in scenes for quality in qualities]
@@ -106,7 +106,7 @@ def _predict_one(given: BenchInput, quality: Quality, measured_s: float) -> Pred
 
 
 def fit_nanoseconds(predicted: Sequence[Prediction]) -> Workload:
-    """cost.NANOSECONDS as these measurements would set it: least squares of relative errors, none negative.
+    """cost_model.NANOSECONDS as these measurements would set it: least squares of relative errors, none negative.
 
     What no measurement contains keeps its value.
     """

@@ -5,21 +5,22 @@ The best picture, which errors are against, is a plain float sum in numpy over f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.speed.measure import Cost, Tell, cost_of, in_turns, median_cost, median_ratio
+from benchmarks.speed.measure import Cost, cost_of, in_turns, median_cost, median_ratio
 from benchmarks.speed.prediction import whole_field
-from benchmarks.speed.rendering_figures import DrawingFigures, Drawn
-from benchmarks.speed.variants import BenchScene
+from benchmarks.speed.rendering_figures import DrawingFigures, MeasuredDrawing
+from benchmarks.speed.variants import BenchScene, Draw, Stored
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.generation.cost_model import CORES
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
-from iibr_core.types import Disparity, FloatImage, GridShape, ViewOffset
+from iibr_core.types import Disparity, FloatImage, GridShape, ReportProgress, ViewOffset
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, stretch_image
 from viewer.gpu.refocus.renderer import Renderer, scale_size
@@ -109,7 +110,35 @@ def drawing_cost(gl: GLContext, draw_it: Callable[[], None]) -> Cost:
     return Cost(cost.wall_s, cost.cpu_s / CORES if gl.is_software else cost.wall_s)
 
 
-def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int, report_progress: Tell) -> list[DrawingFigures]:
+@contextmanager
+def pinhole_renderer(gl: GLContext) -> Iterator[Draw]:
+    """What draws pinhole pictures from stored views, as the viewer fills in views that are not stored."""
+    renderer = Renderer(gl)
+    try:
+        yield lambda stored, offsets: _draw_pinholes(renderer, stored, offsets)
+    finally:
+        renderer.release()
+
+
+def _draw_pinholes(renderer: Renderer, stored: Stored, offsets: Iterable[ViewOffset]) -> list[FloatImage]:
+    reach = round(max(abs(part) for at in stored for part in at))
+    grid = GridShape(2 * reach + 1, 2 * reach + 1)
+    colors = next(iter(stored.values()))[0]
+    height, width = colors.shape[:2]
+    renderer.open_field(grid, width, height, hdr=colors.dtype != np.uint8, with_disparity=True)
+    for at, (pixels, disparity) in stored.items():
+        renderer.upload_view(round(at.t) + reach, round(at.s) + reach, pixels, disparity)
+    pictures = []
+    for at in offsets:
+        renderer.render(Optics(eye=at), (width, height))
+        renderer.refine()
+        pictures.append(encoded_from_stored(renderer.read_image()))
+    return pictures
+
+
+def measure_drawing(
+    gl: GLContext, scene: BenchScene, repeats: int, report_progress: ReportProgress
+) -> list[DrawingFigures]:
     """A refocused picture, and one through a pinhole between the views, of a scene's field, drawn in every way."""
     focus, diameter = float(np.median(scene.disparity)), min(APERTURE_VIEWS, 2.0 * scene.reach)
     pictures = {
@@ -138,7 +167,7 @@ def _figures(
     variants: Iterable[DrawVariant],
     truth: FloatImage,
     repeats: int,
-    report_progress: Tell,
+    report_progress: ReportProgress,
 ) -> DrawingFigures:
     by_name = {variant.name: variant for variant in variants}
 
@@ -151,7 +180,7 @@ def _figures(
     drawn = []
     for name in by_name:
         ratio = median_ratio(costs[name], costs[REFERENCE.name])
-        drawn.append(Drawn(name, median_cost(costs[name]), ratio, *errors[name]))
+        drawn.append(MeasuredDrawing(name, median_cost(costs[name]), ratio, *errors[name]))
     return DrawingFigures(what, tuple(drawn))
 
 

@@ -1,4 +1,4 @@
-"""What the renderer's switches cost and bring: figures of one picture drawn in many ways. The viewer measures them."""
+"""What the renderer's switches cost and bring: figures of one picture drawn in many ways."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from benchmarks.speed.measure import Cost, on_the_front
 
 
 @dataclass(frozen=True)
-class Drawn:
+class MeasuredDrawing:
     """One way to draw a picture. ratio: of time to the reference's; samples: points of the lens that it is made of."""
 
     name: str
@@ -24,7 +24,7 @@ class DrawingFigures:
     """what: the picture, in words. drawn: the first is the reference."""
 
     what: str
-    drawn: tuple[Drawn, ...]
+    drawn: tuple[MeasuredDrawing, ...]
 
     @property
     def front(self) -> set[str]:

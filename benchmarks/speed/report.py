@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.speed.figures import Measured, SceneFigures
+from benchmarks.speed.figures import MeasuredVariant, SceneFigures
 from benchmarks.speed.measure import on_the_front
 from benchmarks.speed.plot import Panel, plot_panels
 from benchmarks.speed.prediction import WITHIN, Prediction, is_near
@@ -17,6 +17,7 @@ from benchmarks.speed.rendering_figures import DrawingFigures
 from benchmarks.speed.scaling import Growth
 from benchmarks.speed.targets import SpeedTarget
 from benchmarks.speed.variants import REFERENCE
+from iibr_core.evaluation.consistency import Consistency
 from iibr_core.evaluation.report import markdown_table
 from iibr_core.evaluation.tables import NO_FIGURE, Table, number
 from iibr_core.formats.files import atomic_write
@@ -27,7 +28,10 @@ FRONT_MARK = "●"
 
 @dataclass(frozen=True)
 class Bench:
-    """Everything that was measured. machine: in words. command: what made it."""
+    """Everything that was measured. machine: in words. made_by: the command and the commit, in words.
+
+    agreements: of the views of a field with each other, by scene. window, yardsticks: lines that other programs print.
+    """
 
     scenes: tuple[SceneFigures, ...]
     drawings: tuple[DrawingFigures, ...]
@@ -35,7 +39,10 @@ class Bench:
     growths: tuple[Growth, ...]
     targets: tuple[SpeedTarget, ...]
     machine: str
-    command: str
+    made_by: str
+    agreements: tuple[tuple[str, Consistency], ...] = ()
+    window: tuple[str, ...] = ()
+    yardsticks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,7 @@ def write_bench(folder: Path, bench: Bench) -> list[Path]:
 
 def means(scenes: Sequence[SceneFigures]) -> list[Mean]:
     """Every variant that all scenes have, over the scenes."""
-    by_name: dict[str, list[tuple[Measured, Measured]]] = {}
+    by_name: dict[str, list[tuple[MeasuredVariant, MeasuredVariant]]] = {}
     for scene in scenes:
         reference = next(m for m in scene.measured if m.variant.name == REFERENCE.name)
         for measured in scene.measured:
@@ -93,9 +100,14 @@ def markdown_of(bench: Bench) -> str:
         sections.append(("Growth", GROWTH, growth_table(bench.growths)))
     if bench.targets:
         sections.append(("Targets", "", targets_table(bench.targets)))
-    lines = ["# Speed against error", "", f"Made by `{bench.command}`. {bench.machine}.", "", *HEAD]
+    if bench.agreements:
+        sections.append(("Whether views agree with each other", ABOUT_AGREEMENT, agreement_table(bench.agreements)))
+    lines = ["# Speed against error", "", f"{bench.made_by}. {bench.machine}.", "", *HEAD]
     for title, words, table in sections:
         lines += ["", f"## {title}", "", *([words, ""] if words else []), *markdown_table(table)]
+    for title, said in (("The window", bench.window), ("Yardsticks", bench.yardsticks)):
+        if said:
+            lines += ["", f"## {title}", "", "```", *said, "```"]
     return "\n".join(lines) + "\n"
 
 
@@ -113,6 +125,10 @@ DRAWING = (
     "four times as many views in numpy. What a drag leaves out is in [optics.md](optics.md)."
 )
 PREDICTED = f"Predicted over measured; good is within {WITHIN:.0%}. Time is processor time over all cores."
+ABOUT_AGREEMENT = (
+    "What one view shows, carried by its disparity to another, against what that one shows: content inpainted in\n"
+    "both, and surfaces of the photo; and whether points of the photo lie on straight lines in EPIs. 0 = views agree."
+)
 GROWTH = "Seconds and bytes grow like the varied quantity to these powers."
 
 
@@ -224,6 +240,23 @@ def targets_table(targets: Sequence[SpeedTarget]) -> Table:
         ("figure", "target", "measured", ""),
         tuple((target.what, target.target, target.measured, words[target.is_met]) for target in targets),
     )
+
+
+def agreement_table(agreements: Sequence[tuple[str, Consistency]]) -> Table:
+    """One row a scene."""
+    head = ("scene", "holes, rms / 255", "their pixels", "surfaces, rms / 255", "EPI lines, rms / 255", "off, px")
+    rows = tuple(
+        (
+            name,
+            number(found.hole_rms, 2),
+            str(found.hole_pixels),
+            number(found.surface_rms, 2),
+            number(found.line_rms, 2),
+            number(found.line_off_px, 3),
+        )
+        for name, found in agreements
+    )
+    return Table(head, rows)
 
 
 def _kinds(scenes: Sequence[SceneFigures]) -> list[tuple[str, list[SceneFigures]]]:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.speed.measure import Cost, Tell, cost_of, exponent, in_turns, median_cost, peak_bytes
+from benchmarks.speed.measure import Cost, cost_of, exponent, in_turns, median_cost, peak_bytes
 from benchmarks.speed.prediction import BenchInput, make_field
 from iibr_core.generation.plan import plan_literal
 from iibr_core.training.degradation import blur
-from iibr_core.types import Disparity, GridShape, Photo, Quality
+from iibr_core.types import Disparity, GridShape, Photo, Quality, ReportProgress
 
 TEXTURE_PX = 1.5
 SQUARE_SHARE = 0.09
@@ -84,7 +84,7 @@ def edges_of(side: int, grid: int, squares: int) -> float:
     return plan_literal(given.photo, given.disparity, given.grid).edge_fraction
 
 
-def growth(name: str, points: list[Point], repeats: int, report_progress: Tell) -> Growth:
+def growth(name: str, points: list[Point], repeats: int, report_progress: ReportProgress) -> Growth:
     """Measure a series, its scenes in turns."""
     scenes = [made_up_field(point) for point in points]
     make_field(scenes[0], points[0].quality)  # compiles

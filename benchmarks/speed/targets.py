@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.speed.figures import SceneFigures
-from benchmarks.speed.measure import Cost, Tell, cost_of, in_turns, median_cost, peak_bytes
+from benchmarks.speed.measure import Cost, cost_of, in_turns, median_cost, peak_bytes
 from benchmarks.speed.prediction import WITHIN, BenchInput, Prediction, is_near, make_field, whole_field
 from benchmarks.speed.scaling import made_up_scene
 from benchmarks.speed.variants import BenchScene
 from iibr_core.generation.cost_model import CORES
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
-from iibr_core.types import Disparity, GridShape, Quality
+from iibr_core.types import Disparity, GridShape, Quality, ReportProgress
 
 MEGAPIXEL_SIDE = 1024
 SQUARES = 16
@@ -37,7 +37,7 @@ class SpeedTarget:
     is_met: bool | None
 
 
-def field_targets(scene: BenchScene, repeats: int, report_progress: Tell) -> Iterator[SpeedTarget]:
+def field_targets(scene: BenchScene, repeats: int, report_progress: ReportProgress) -> Iterator[SpeedTarget]:
     """Of a real field, which should be 9x9 of 512x512, of a made-up one of 1 MP, and of a flat photo."""
     real = whole_field(scene)
     large = BenchInput("9x9 of 1 MP", *made_up_scene(MEGAPIXEL_SIDE, 2.0, SQUARES), GridShape(9, 9))

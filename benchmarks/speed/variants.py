@@ -12,6 +12,7 @@ from PIL import Image
 
 from benchmarks.speed.measure import Cost, cost_of
 from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.datasets import read_view
 from iibr_core.evaluation.trials import Trial, trial_input, trials_of
@@ -93,8 +94,6 @@ class BenchScene:
 
 def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> list[BenchScene]:
     """The scene with its own disparity, and with that made soft. Raises InputError where it has none or is no grid."""
-    from iibr_core.depth.choice import DepthChoice
-
     trial = trials_of(scene, "auto", None)[0]
     given = trial_input(trial, "auto", DepthChoice(), max_pixels)
     offsets = {index: trial.offset(index) for index in trial.judged}
@@ -103,8 +102,12 @@ def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> l
     judged = _evenly_spaced(trial)
     truth = {offsets[k]: read_view(scene.views[k], max_pixels)[0] for k in judged}
     own = BenchScene(scene.name, given.photo, given.maps[0].values, truth, field)
-    soft = replace(own, name=f"{scene.name}, soft map", disparity=blur(own.disparity, SOFT_PX), is_soft=True)
-    return [own, soft] if with_soft else [own]
+    return [own, soften(own)] if with_soft else [own]
+
+
+def soften(scene: BenchScene) -> BenchScene:
+    """The scene with its disparity blurred."""
+    return replace(scene, name=f"{scene.name}, soft map", disparity=blur(scene.disparity, SOFT_PX), is_soft=True)
 
 
 def _evenly_spaced(trial: Trial) -> list[int]:

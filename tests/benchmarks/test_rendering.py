@@ -30,7 +30,7 @@ def scene() -> BenchScene:
     return BenchScene("square", view_of_square(ViewOffset(0.0, 0.0)), disparity_of_square(), {}, field)
 
 
-def quiet(done: int, total: int, doing: str) -> None:
+def quiet(done: float, total: float, doing: str) -> None:
     assert 0 <= done <= total
 
 

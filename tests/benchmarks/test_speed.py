@@ -15,7 +15,7 @@ from benchmarks.speed.figures import SceneFigures, measure_scene
 from benchmarks.speed.measure import Cost, exponent, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
 from benchmarks.speed.plot import plot_panels
 from benchmarks.speed.prediction import Prediction, fit_nanoseconds, is_near, make_field, predict, whole_field
-from benchmarks.speed.rendering_figures import DrawingFigures, Drawn
+from benchmarks.speed.rendering_figures import DrawingFigures, MeasuredDrawing
 from benchmarks.speed.report import Bench, markdown_of, means, panels, write_bench
 from benchmarks.speed.scaling import Point, growth, made_up_scene
 from benchmarks.speed.targets import SpeedTarget, front_targets, prediction_targets
@@ -50,7 +50,7 @@ def true_drawing(stored: Stored, offsets: object) -> list[FloatImage]:
     return [view_of_square(at) for at in offsets]  # type: ignore[attr-defined]
 
 
-def quiet(done: int, total: int, doing: str) -> None:
+def quiet(done: float, total: float, doing: str) -> None:
     assert 0 <= done <= total
     assert doing
 
@@ -220,11 +220,13 @@ def bench_of(figures: tuple[SceneFigures, ...]) -> Bench:
         SpeedTarget("b", ">= 1", "2", True),
         SpeedTarget("c", "d", "–", None),
     )
-    drawn = tuple(Drawn(name, Cost(1, ratio), ratio, 9, 40 + ratio, 0.01) for name, ratio in (("once", 1), ("all", 5)))
+    drawn = tuple(
+        MeasuredDrawing(name, Cost(1, ratio), ratio, 9, 40 + ratio, 0.01) for name, ratio in (("once", 1), ("all", 5))
+    )
     predicted = (Prediction("a scene", "fast", 1.0, 2.0, 3e6, math.nan, Workload(*7 * [0.0])),)
     growths = (growth("pixels", [Point(1.0, 16, 3, 1.0, 1)], 1, quiet),)
     drawings = (DrawingFigures("a picture", drawn),)
-    return Bench(figures, drawings, predicted, growths, targets, "a machine", "iibr bench")
+    return Bench(figures, drawings, predicted, growths, targets, "a machine", "Made by `make bench`")
 
 
 def test_tables_name_every_variant_and_mark_the_front(figures: tuple[SceneFigures, ...]) -> None:
