@@ -1,1 +1,1 @@
-"""Figures, not tests: `python -m benchmarks.report` prints all of them."""
+"""Figures, not tests: `make bench` writes those that the README quotes; every module says how it is called."""
