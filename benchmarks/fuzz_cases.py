@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks import fuzz_seeds as seeds
 from benchmarks.fuzz_damage import Seed, damage, repair_png
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 
 MAX_PIXELS = 100_000
 
@@ -46,7 +46,7 @@ def _read_photo(path: Path) -> None:
 def _read_map(path: Path) -> None:
     from iibr_core.formats.maps.disparity_file import read_disparity
 
-    assert np.isfinite(read_disparity(path, seeds.SIZE).values).all()
+    assert np.isfinite(read_disparity(path, ImageSize(*seeds.SIZE)).values).all()
 
 
 def _open_with_depth(path: Path) -> None:
@@ -58,20 +58,12 @@ def _open_with_depth(path: Path) -> None:
 
 
 def _read_field(path: Path) -> None:
-    from iibr_core.formats.light_fields.hci import read_light_field
-    from iibr_core.formats.light_fields.numbered_grid import read_numbered_grid
+    from iibr_core.formats.light_fields.registry import open_light_field
+    from iibr_core.formats.light_fields.views import read_views
 
-    refused = None
-    for read in (read_light_field, read_numbered_grid):
-        try:
-            found = read(path.parent)
-            if isinstance(found, tuple):
-                assert len(list(found[1])) == 4
-                assert 0 < found[0].focal_px < np.inf
-        except InputError as error:
-            refused = error
-    if refused:
-        raise refused
+    scene = open_light_field(path.parent)
+    assert scene.focal_px is None or 0 < scene.focal_px < np.inf
+    assert len(list(read_views(scene)[1])) == 4
 
 
 def _four_views(folder: Path) -> None:

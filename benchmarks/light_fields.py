@@ -48,7 +48,7 @@ class StoredField:
 
 
 def read_field(folder: Path) -> StoredField:
-    """Views from folder/views and the centre's disparity from folder/*.npy; what others hide is filled from behind."""
+    """Views of a folder and the centre's disparity from folder/*.npy; what others hide is filled from behind."""
     grid, flat = read_views(folder)
     height, width = flat.shape[1:3]
     views = flat.reshape(*grid, height, width, 3)

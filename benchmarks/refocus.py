@@ -2,8 +2,8 @@
 
     python -m benchmarks.refocus --data FOLDER [--radius 2] [--size 768x512] [--rounds 4] [--yardstick SCRIPT]
 
-FOLDER/views holds vVV_uUU.* and FOLDER may hold the centre view's disparity as *.npy. --yardstick: a script of its own
-that takes --data, --radius and --size and prints "min <milliseconds> ms"; it is run once a round.
+FOLDER is a light field of any layout; it may hold the centre view's disparity as *.npy. --yardstick: a script of its
+own that takes --data, --radius and --size and prints "min <milliseconds> ms"; it is run once a round.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from pathlib import Path
 
 import moderngl
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from iibr_core.formats.light_fields.registry import open_light_field
+from iibr_core.formats.light_fields.views import grid_of, read_stored_view
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.renderer import Renderer
@@ -55,10 +56,9 @@ void main() {
 
 def read_views(data: Path) -> tuple[GridShape, NDArray[np.uint8]]:
     """The grid, and the views as (V * U, H, W, 3)."""
-    files = sorted((data / "views").iterdir())
-    indices = [tuple(map(int, re.findall(r"\d+", file.stem)[:2])) for file in files]
-    grid = GridShape(*(max(axis) + 1 for axis in zip(*indices)))
-    return grid, np.stack([oiio.ImageBuf(str(file)).get_pixels(oiio.UINT8)[..., :3] for file in files])
+    scene = open_light_field(data)
+    grid = grid_of(scene)
+    return grid, np.stack([read_stored_view(scene, *at) for at in np.ndindex(*grid)])
 
 
 def open_views(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,27 +11,23 @@ from scipy.ndimage import map_coordinates
 
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.light_fields.llff import read_llff
-from iibr_core.formats.light_fields.middlebury import read_middlebury
-from iibr_core.formats.light_fields.numbered_grid import read_numbered_grid
-from iibr_core.formats.light_fields.scene import KnownDisparity, KnownView, MultiView, with_equal_sizes
-from iibr_core.formats.light_fields.stanford import read_stanford
+from iibr_core.formats.light_fields.registry import LAYOUTS, find_light_field
+from iibr_core.formats.light_fields.scene import KnownDisparity, KnownView, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError
 
-Reader = Callable[[Path], MultiView | None]
-"""Gives the scene of a folder, None where the folder is laid out otherwise; InputError where it is damaged."""
-READERS: tuple[Reader, ...] = (read_llff, read_stanford, read_middlebury, read_numbered_grid)
-LAYOUTS = "HCI, Stanford archive, Heber, LLFF, Middlebury, or views/v00_u00.png ..."
-
 
 def read_scene(folder: Path) -> MultiView | None:
-    """The scene of a folder, None where it is none that is known. Raises InputError where it is damaged."""
-    for read in READERS:
-        scene = read(folder)
-        if scene is not None:
-            return with_equal_sizes(scene)
-    return None
+    """The scene of a folder, None where it is none that is known. Raises InputError where it is damaged, has one view
+    only, or views of different sizes.
+    """
+    scene = find_light_field(folder)
+    if scene is None:
+        return None
+    if len(scene.views) < 2:
+        raise InputError(f"{scene.views[0].path}: is the only view; at least two are needed to compare")
+    common_size(scene.views)
+    return scene
 
 
 def find_scenes(folder: Path) -> Iterator[MultiView]:

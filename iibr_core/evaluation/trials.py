@@ -159,13 +159,16 @@ def warp_disparity(disparity: FloatImage, offset: ViewOffset) -> FloatImage:
 def _estimate_disparity(
     trial: Trial, choice: DepthChoice, max_pixels: int, should_stop: Callable[[], bool]
 ) -> Disparity:
-    """As the program estimates it from the given view alone; in the data set's range where that is stated."""
+    """As the program estimates it from the given view alone; in the range that the cameras' poses state, where they do.
+
+    A grid's stated range belongs to its truth, which an estimate does not know.
+    """
     reach = [round(2 * max(abs(trial.offset(k)[axis]) for k in trial.judged)) + 1 for axis in (0, 1)]
     path = trial.scene.views[trial.given].path
     unrefined = replace(choice, start="embedded" if choice.start == "auto" else choice.start, file=None, refine=0.0)
     found = open_with_depth(path, unrefined, max_pixels, GridShape(*reach), should_stop)
     values, words = found.disparity.values, f"estimate ({found.origin.words})"
-    if trial.scene.range_px is not None:
+    if trial.scene.grid is None and trial.scene.range_px is not None:
         values = _within(values, trial.scene.range_px)
     return Disparity(values, words, found.disparity.notes)
 

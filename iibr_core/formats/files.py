@@ -17,6 +17,20 @@ HARMLESS_BYTES = 256 * 2**20
 """Whatever the file's size, so much may be decoded from it."""
 
 
+MOST_REASON_CHARACTERS = 200
+
+
+def reason_of(failure: Exception | str) -> str:
+    """Why a file could not be read or written, for the brackets in an InputError: the first line of what a library
+    says, the start of it. Where it says nothing: the kind of the exception, else that no reason is given.
+    """
+    lines = [" ".join(line.split()) for line in str(failure).splitlines()]
+    said = next((line for line in lines if line), "")
+    if said:
+        return said[:MOST_REASON_CHARACTERS]
+    return type(failure).__name__ if isinstance(failure, Exception) else "no reason given"
+
+
 def temporary_sibling(path: Path) -> Path:
     """An unused name in the folder of `path`, with its extension (writers choose the format by it)."""
     return path.with_name(f".{path.stem}.{uuid4().hex[:12]}{path.suffix}")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 
-from iibr_core.formats.files import atomic_write, require_file
+from iibr_core.formats.files import atomic_write, reason_of, require_file
 from iibr_core.types import InputError
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def _read(path: Path, content: str) -> tuple[dict[str, NDArray[Any]], dict[str, 
             # Copied, because these may lie in the mapped file, which must be free to be replaced.
             arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
-        raise InputError(f"{path}: is no safetensors file, or is damaged ({_one_line(error)})") from error
+        raise InputError(f"{path}: is no safetensors file, or is damaged ({reason_of(error)})") from error
     for name, array in arrays.items():
         if not np.isfinite(array).all():
             raise InputError(f"{path}: {name} holds values that are not finite; train again or use another file")
@@ -113,7 +113,3 @@ def _require_content(path: Path, metadata: Mapping[str, str], content: str) -> N
         raise InputError(f"{path}: holds {there or 'tensors of unknown origin'}, not {content}; choose another file")
     if version != VERSION:
         raise InputError(f"{path}: is version {version} of {content}, this program reads version {VERSION}")
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())

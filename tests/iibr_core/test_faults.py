@@ -23,7 +23,9 @@ from iibr_core.depth.models import estimate_cache
 from iibr_core.formats import files
 from iibr_core.formats.images.oiio_reader import read_raster
 from iibr_core.formats.images.photo import read_photo, write_image
-from iibr_core.formats.light_fields.hci import HciWriter, read_light_field
+from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.light_fields.registry import open_light_field
+from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.maps.writer import write_map
@@ -136,7 +138,7 @@ def test_a_killed_process_leaves_nothing_under_the_name_it_was_to_write(tmp_path
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert {path.name: path.read_bytes() for path in (tmp_path / "field").iterdir()} == before
-    assert len(list(read_light_field(tmp_path / "field")[1])) == 1
+    assert len(list(read_views(open_light_field(tmp_path / "field"))[1])) == 1
     assert all(
         path.name.startswith(".field.")
         for path in set(tmp_path.iterdir()) - {tmp_path / "field", tmp_path / "photo.png"}
@@ -190,7 +192,7 @@ def test_a_damaged_cache_is_an_empty_one(tmp_path, monkeypatch):
 
 def test_a_view_deleted_while_the_light_field_is_read(tmp_path):
     write_field(tmp_path / "field", GridShape(2, 2))
-    _, views = read_light_field(tmp_path / "field")
+    _, views = read_views(open_light_field(tmp_path / "field"))
     next(views)
     (tmp_path / "field" / "input_Cam000.png").unlink()
     with pytest.raises(InputError, match=r"input_Cam000\.png: no such file"):
@@ -323,7 +325,7 @@ def test_parameters_that_make_no_sense(tmp_path):
     write_field(tmp_path / "field", GridShape(1, 1))
     path = tmp_path / "field" / "parameters.cfg"
     path.write_text(path.read_text().replace("sensor_size_mm = 36.0", "sensor_size_mm = 1e-320"))
-    assert 0 < read_light_field(tmp_path / "field")[0].focal_px < 1e6
+    assert open_light_field(tmp_path / "field").focal_px is None
     path.write_bytes(b"\n" * 2_000_000)
     with pytest.raises(InputError, match=r"parameters\.cfg: more than"):
-        read_light_field(tmp_path / "field")
+        open_light_field(tmp_path / "field")

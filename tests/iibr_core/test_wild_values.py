@@ -22,7 +22,7 @@ from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp, parse_packet
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.formats.images import photo
-from iibr_core.formats.light_fields import hci
+from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
 from iibr_core.generation import cost_model, plan
 from iibr_core.generation import light_field as generating
@@ -150,8 +150,7 @@ def photo_file(folder, value, kind=".exr"):
 def field_on_disk(folder, value):
     with hci.HciWriter(folder / "field", GridShape(1, 1), 10.0, "wild", True) as writer:
         writer.add(ViewUpdate(0, 0, np.zeros((*SIZE, 3), np.uint8), depths(value)))
-    header, views = hci.read_light_field(folder / "field")
-    return header, list(views)
+    return list(views.read_views(registry.open_light_field(folder / "field"))[1])
 
 
 FINITE = {
@@ -200,7 +199,7 @@ FINITE = {
     "depth.search.resize_estimate": lambda v, _: known_of(
         search.resize_estimate(DisparityMap(known(v)), ImageSize(7, 9))
     ),
-    "formats.light_fields.hci.read_light_field": lambda v, to: field_on_disk(to, v),
+    "formats.light_fields.views.read_views": lambda v, to: field_on_disk(to, v),
     "formats.images.photo.read_photo": lambda v, to: photo.read_photo(photo_file(to, v), max_pixels=90),
     "formats.images.photo.write_image": lambda v, to: [
         photo.read_photo(photo_file(to, v, kind)) for kind in (".png", ".exr")
@@ -290,13 +289,17 @@ READS_OR_TELLS = {
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
-    "formats.files": "temporary_sibling atomic_write require_file open_binary refuse_bomb",
+    "formats.files": "reason_of temporary_sibling atomic_write require_file open_binary refuse_bomb",
     "formats.light_fields.numbered_grid": "read_numbered_grid",
-    "formats.light_fields.hci": "is_light_field_folder read_view HciWriter",
+    "formats.light_fields.hci": "read_hci HciWriter",
     "formats.images.heic": "is_heic read_heic read_heic_depth",
     "formats.light_fields.llff": "read_llff",
     "formats.light_fields.middlebury": "read_middlebury",
-    "formats.light_fields.scene": "pictures_in with_equal_sizes first_existing numbers_in scene_folders",
+    "formats.light_fields.parameters": "read_parameters write_parameters stated_grid stated_focal_px stated_range_px",
+    "formats.light_fields.registry": "LightFieldWriter find_light_field open_light_field writer_for",
+    "formats.light_fields.scene": "pictures_in common_size on_grid maps_in first_map numbers_in",
+    "formats.light_fields.view_grid": "view_folder candidate_views set_view require_fitting missing_view grid_scene",
+    "formats.light_fields.views": "grid_of read_stored_view disparity_range step_length",
     "formats.maps.npy": "read_array",
     "formats.maps.pfm": "read_pfm",
     "formats.images.oiio_writer": "write_image_file",

@@ -82,7 +82,7 @@ class SideEffects:
             case ReadMaskTask(path):
                 self._submit(partial(_read_mask, path))
             case ReadTruthTask(path):
-                self._submit(partial(_read_truth, path))
+                self._submit(partial(read_truth, path))
             case SaveTask(what="map"):
                 return self._save_map(task, state)
             case SaveTask():
@@ -149,12 +149,15 @@ def _action_from(result: FileResult, state: AppState) -> Action:
     return Notify(Notice(str(result.value)))
 
 
-def _read_truth(path: str) -> GroundTruth:
-    """Raises InputError where there is no light field."""
-    from iibr_core.formats.light_fields.hci import read_light_field
+def read_truth(path: str) -> GroundTruth:
+    """The light field of a folder to compare with, as far as its size. Raises InputError where it is none."""
+    from iibr_core.formats.light_fields.registry import open_light_field
+    from iibr_core.formats.light_fields.scene import common_size
+    from iibr_core.formats.light_fields.views import grid_of
 
-    header, _ = read_light_field(Path(path).expanduser())
-    return GroundTruth(path, header.name, header.grid, header.width, header.height)
+    field = open_light_field(Path(path).expanduser())
+    grid, (height, width) = grid_of(field), common_size(field.views)
+    return GroundTruth(path, field.name, grid, width, height)
 
 
 def _read_mask(path: str) -> ApertureMask:

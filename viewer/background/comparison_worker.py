@@ -117,9 +117,10 @@ class ComparisonJob:
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
     ) -> tuple[Bytes, Bytes]:
         if request.truth is not None:
-            from iibr_core.formats.light_fields.hci import read_view
+            from iibr_core.formats.light_fields.registry import open_light_field
+            from iibr_core.formats.light_fields.views import read_stored_view
 
-            truth = read_view(Path(request.truth.path).expanduser(), *request.view)
+            truth = read_stored_view(open_light_field(Path(request.truth.path).expanduser()), *request.view)
             made = inputs.stored
             if made is None:
                 made = _bytes_of(self._make_view(request, inputs, inputs.quality, should_stop).colors)

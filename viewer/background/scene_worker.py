@@ -96,9 +96,7 @@ def results_of(
     report_progress: is told what it does until there is a scene. Raises InputError for a file that cannot be opened,
     Cancelled where should_stop says so while it is read.
     """
-    from iibr_core.formats.light_fields.hci import is_light_field_folder
-
-    if is_light_field_folder(Path(request.source.path)):
+    if Path(request.source.path).is_dir():
         yield from _results_of_folder(request, should_stop)
     else:
         yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
@@ -169,32 +167,29 @@ def _results_of_photo(
 
 
 def _results_of_folder(request: SceneRequest, should_stop: Callable[[], bool]) -> Iterator[SceneReady | ViewReady]:
-    """The light field of a folder. Its first two views tell whether each brings its disparity."""
-    from iibr_core.formats.light_fields.hci import read_light_field
+    """The light field of a folder, whatever its layout."""
+    from iibr_core.formats.light_fields.registry import open_light_field
+    from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
 
-    header, views = read_light_field(Path(request.source.path))
-    first = list(itertools.islice(views, 2))
+    field = open_light_field(Path(request.source.path))
+    grid, (size, views) = grid_of(field), read_views(field)
+    centre = next(views)
     scene = Scene(
         source=request.source,
-        name=header.name,
-        width=header.width,
-        height=header.height,
-        grid=header.grid,
-        disparity_range_px=header.disparity_range_px or _range_of(first[0].disparity),
-        depth_source="light field" if first[0].disparity is not None else "none",
-        is_hdr=header.is_hdr,
-        has_view_disparity=all(view.disparity is not None for view in first),
-        subject_disparity_px=_centre_first(first[0].disparity) if first[0].disparity is not None else 0.0,
+        name=field.name,
+        width=size.width,
+        height=size.height,
+        grid=grid,
+        disparity_range_px=disparity_range(field) or UNKNOWN_DISPARITY_RANGE_PX,
+        depth_source="light field" if centre.disparity is not None else "none",
+        is_hdr=field.is_hdr,
+        notes=field.notes,
+        has_view_disparity=len(field.disparity) == len(field.views),
+        subject_disparity_px=_centre_first(centre.disparity) if centre.disparity is not None else 0.0,
     )
-    yield SceneReady(request.generation, scene, None, first[0])
-    rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain(first, views))
-    yield from _count_views(request.generation, rest, header.grid.rows * header.grid.columns)
-
-
-def _range_of(disparity: FloatImage | None) -> tuple[float, float]:
-    if disparity is None:
-        return UNKNOWN_DISPARITY_RANGE_PX
-    return float(disparity.min()), float(disparity.max())
+    yield SceneReady(request.generation, scene, None, centre)
+    rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), views))
+    yield from _count_views(request.generation, rest, grid.rows * grid.columns)
 
 
 def _count_views(generation: int, views: Iterator[ViewUpdate], total: int) -> Iterator[ViewReady]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from contextlib import closing
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +17,7 @@ from viewer.cli.options import (
     DisparityFile,
     DisparityScale,
     Inpaint,
+    LightFieldFormat,
     MaxPixels,
     Memory,
     PhotoPath,
@@ -29,12 +29,6 @@ from viewer.cli.options import (
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
 
-class Format(StrEnum):
-    """Layouts of a light field on disk."""
-
-    hci = "hci"
-
-
 def generate(
     photo: PhotoPath,
     grid: Annotated[GridShape, typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.")],
@@ -44,7 +38,7 @@ def generate(
     depth: DepthFrom = "auto",
     depth_model: DepthModel = None,
     refine: Refine = 1.0,
-    format: Annotated[Format, typer.Option(help="Layout of the folder.")] = Format.hci,
+    format: LightFieldFormat = "hci",
     with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
@@ -55,7 +49,7 @@ def generate(
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
     """
-    from iibr_core.formats.light_fields.hci import HciWriter
+    from iibr_core.formats.light_fields.registry import writer_for
     from iibr_core.generation.light_field import generate as generated
     from iibr_core.generation.plan import plan_literal
     from viewer.background.loaded_photo import load_photo
@@ -70,7 +64,7 @@ def generate(
     total = grid.rows * grid.columns
     views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality, inpaint=inpaint)
     with (
-        HciWriter(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
+        writer_for(format)(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         show_progress("making views") as show,
         closing(views),
     ):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
 import typer
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
+from iibr_core.formats.light_fields.registry import WRITERS
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 
@@ -134,6 +135,13 @@ def refine_from_text(text: str) -> float:
     return strength
 
 
+def format_from_text(text: str) -> str:
+    """A layout that a light field can be written in, by name. Raises BadParameter."""
+    if text not in WRITERS:
+        raise typer.BadParameter(f"{text!r} is no layout that can be written: give {' or '.join(WRITERS)}")
+    return text
+
+
 def number_option(help_text: str) -> Any:
     """An option that is any finite number."""
     return typer.Option(parser=finite_from_text, metavar="X", help=help_text)
@@ -185,6 +193,10 @@ MaxPixels = Annotated[int | None, typer.Option(min=1, help="Larger photos are ma
 Memory = Annotated[
     int | None,
     typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
+]
+
+LightFieldFormat = Annotated[
+    str, typer.Option("--format", parser=format_from_text, metavar="|".join(WRITERS), help="Layout of the folder.")
 ]
 
 QualityChoice = Annotated[

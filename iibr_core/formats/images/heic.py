@@ -11,7 +11,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import open_binary, refuse_bomb, require_file
+from iibr_core.formats.files import open_binary, reason_of, refuse_bomb, require_file
 from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS
 from iibr_core.types import FloatImage, InputError
@@ -78,7 +78,7 @@ def _open(path: Path) -> Any:
         file = pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
         width, height = file.size
     except DECODE_ERRORS as error:
-        raise InputError(f"{path}: cannot be read as a HEIC picture ({_line(error)})") from error
+        raise InputError(f"{path}: cannot be read as a HEIC picture ({reason_of(error)})") from error
     if width < 1 or height < 1 or width * height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {width}x{height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
     refuse_bomb(path, width * height * 4)
@@ -89,7 +89,7 @@ def _pixels(path: Path, picture: Any) -> NDArray[Any]:
     try:
         pixels = np.asarray(picture)
     except DECODE_ERRORS as error:
-        raise InputError(f"{path}: damaged or cut off ({_line(error)}); get the whole file again") from error
+        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
     return pixels.reshape(*pixels.shape[:2], -1)
 
 
@@ -120,7 +120,3 @@ def _profile_name(profile: bytes) -> str:
         return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).strip()
     except (ImageCms.PyCMSError, *DECODE_ERRORS):
         return ""
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200] or type(error).__name__

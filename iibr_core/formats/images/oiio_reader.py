@@ -12,7 +12,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import open_binary, refuse_bomb, require_file
+from iibr_core.formats.files import open_binary, reason_of, refuse_bomb, require_file
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS, read_pfm
 from iibr_core.types import FloatImage, ImageSize, InputError
@@ -70,7 +70,7 @@ def read_raster(path: Path) -> Raster:
     pixels = source.read_image(0, 0, 0, max(color_count, alpha_index + 1), _reading_type(spec.format))
     message = complaint_of(source)
     if pixels is None or (message and HARMLESS_MESSAGE not in message):
-        raise InputError(f"{path}: damaged or cut off ({_first_line(message)}); get the whole file again")
+        raise InputError(f"{path}: damaged or cut off ({reason_of(message)}); get the whole file again")
     alpha = np.ascontiguousarray(pixels[..., alpha_index]) if alpha_index >= 0 else None
     if alpha is not None and (alpha >= (np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1)).all():
         alpha = None
@@ -113,7 +113,7 @@ def _open(path: Path) -> Any:
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), hints)
     if source is None:
-        raise InputError(f"{path}: cannot be read as a picture ({_first_line(complaint_of(oiio))})")
+        raise InputError(f"{path}: cannot be read as a picture ({reason_of(complaint_of(oiio))})")
     spec = source.spec()
     if spec.width * spec.height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {spec.width}x{spec.height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
@@ -170,7 +170,3 @@ def complaint_of(teller: Any) -> str:
         return str(teller.geterror())
     except UnicodeDecodeError:
         return "a name in it is no text"
-
-
-def _first_line(message: str) -> str:
-    return message.strip().partition("\n")[0] or "no reason given"

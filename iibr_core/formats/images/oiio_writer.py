@@ -4,24 +4,40 @@ file, so what was written is looked at.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import atomic_write
+from iibr_core.formats.files import atomic_write, reason_of
 from iibr_core.formats.images.oiio_reader import complaint_of, require_whole_png
 from iibr_core.types import InputError
 
 
-def write_image_file(path: Path, spec: Any, values: NDArray[Any]) -> None:
-    """Write values (H, W, C) with OpenImageIO's header. Raises InputError where that cannot be done."""
+def write_image_file(
+    path: Path,
+    values: NDArray[Any],
+    dtype: str,
+    attributes: Mapping[str, str | int | float] | None = None,
+    channels: tuple[str, ...] = (),
+) -> None:
+    """Write values (H, W, C), stored as `dtype` in OpenImageIO's words ("uint8", "half", "float").
+
+    attributes: of the file's header. channels: their names, where they are not those of grey, RGB or RGBA. Raises
+    InputError where that cannot be done.
+    """
+    spec = oiio.ImageSpec(values.shape[1], values.shape[0], values.shape[2], dtype)
+    for name, value in (attributes or {}).items():
+        spec.attribute(name, value)
+    if channels:
+        spec.channelnames = channels
     with atomic_write(path) as temporary:
         target = oiio.ImageOutput.create(str(temporary))
         # Writing to an output that did not open crashes OpenImageIO.
         if target is None or not (target.open(str(temporary), spec) and target.write_image(values) and target.close()):
-            reason = " ".join(complaint_of(oiio if target is None else target).split()) or "no reason given"
+            reason = reason_of(complaint_of(oiio if target is None else target))
             raise InputError(f"{path}: cannot be written ({reason}); choose another place")
         if not _is_whole(temporary, spec.height):
             raise InputError(f"{path}: cannot be written whole (is the disk full?); choose another place")

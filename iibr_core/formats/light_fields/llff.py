@@ -56,7 +56,8 @@ def read_llff(folder: Path) -> MultiView | None:
         f"Pictures from {inside.name}.",
     )
     reach = (focal_px * step / float(depths[1]), focal_px * step / float(depths[0]))
-    return MultiView(folder.resolve().name, f"LLFF, {len(views)} photos", views, {}, reach, notes, central)
+    layout = f"LLFF, {len(views)} photos"
+    return MultiView(folder.resolve().name, layout, views, {}, reach, notes, central, focal_px=focal_px)
 
 
 def _read_poses(path: Path, pictures: int) -> tuple[Doubles, Doubles, Doubles, Doubles]:

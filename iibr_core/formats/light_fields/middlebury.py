@@ -10,7 +10,15 @@ import re
 from pathlib import Path
 
 from iibr_core.formats.images.oiio_reader import read_size
-from iibr_core.formats.light_fields.scene import KnownDisparity, KnownView, MultiView, first_existing, pictures_in
+from iibr_core.formats.light_fields.scene import (
+    KnownDisparity,
+    KnownView,
+    MultiView,
+    first_map,
+    maps_in,
+    on_grid,
+    pictures_in,
+)
 from iibr_core.types import ViewOffset
 
 NAME = re.compile(r"(im|view)(\d)$")
@@ -37,7 +45,7 @@ def read_middlebury(folder: Path) -> MultiView | None:
     numbers = sorted(number for _, number in named)
     views = tuple(KnownView(f"{kind}{n}", ViewOffset(0.0, float(n)), named[kind, n]) for n in numbers)
     known = {numbers.index(n): disparity for n, disparity in maps.items() if n in numbers}
-    return MultiView(folder.resolve().name, layout, views, known)
+    return on_grid(MultiView(folder.resolve().name, layout, views, known), [(0, n) for n in numbers])
 
 
 def _float_maps(folder: Path) -> dict[int, KnownDisparity]:
@@ -47,7 +55,8 @@ def _float_maps(folder: Path) -> dict[int, KnownDisparity]:
 
 def _coded_maps(folder: Path, kind: str, picture: Path) -> dict[int, KnownDisparity]:
     """Maps of integers: disparity between the two views of TRUTH_AT, times a factor that follows from the size."""
-    found = {n: path for n in TRUTH_AT[kind] if (path := first_existing(folder, (f"disp{n}",))) is not None}
+    maps = maps_in(folder)
+    found = {n: path for n in TRUTH_AT[kind] if (path := first_map(maps, f"disp{n}")) is not None}
     if picture.suffix.lower() == ".ppm" and kind == "im" and read_size(picture)[1] < 440:
         factor = SCALE_2001
     else:

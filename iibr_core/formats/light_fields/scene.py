@@ -1,25 +1,29 @@
-"""Several pictures of one scene whose viewpoints are known, on disk: what evaluation compares with.
+"""Several pictures of one scene whose viewpoints are known, on disk: a light field, or photos that stand on no grid.
 
-Readers of the layouts give these records; pixels are read when they are asked for.
+Readers of the layouts give these records; pixels are read when they are asked for (`views.py`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.images.oiio_reader import read_size
-from iibr_core.types import InputError, ViewOffset
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 PICTURE_EXTENSIONS = (".png", ".jpg", ".jpeg", ".ppm", ".exr", ".tif", ".tiff", ".bmp", ".webp")
 MAP_EXTENSIONS = (".pfm", ".npy", ".exr", ".png", ".pgm")
 MOST_VIEWS = 10_000
 """A folder with more pictures is taken for something else."""
+
+GridIndex = tuple[int, int]
+"""Row and column of a view on a grid, (v, u): rows downwards, columns to the right, both from 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,13 +31,15 @@ class KnownView:
     """One picture. offset: its viewpoint (t, s) in view steps, from any origin.
 
     turned: (3, 3), takes a pixel (x, y, 1) of the given view's frame to this picture's where cameras are turned
-    against each other; None where all look the same way. name: for people ("v00 u08").
+    against each other; None where all look the same way. name: for people ("v00 u08"). place: on the scene's grid,
+    None where it has none.
     """
 
     name: str
     offset: ViewOffset
     path: Path
     turned: NDArray[np.float64] | None = None
+    place: GridIndex | None = None
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,9 @@ class MultiView:
 
     layout: what the folder was recognised as. disparity: maps by index into `views`. range_px: least and greatest
     disparity (px per view step) where the data set states them. notes: what a reader of figures should know.
-    stated_centre: index of the view in the middle, None where their viewpoints tell.
+    stated_centre: index of the view in the middle, None where their viewpoints tell. grid: the rows and columns that
+    the views fill, each in its `place`, None where they fill none. focal_px: focal length in pixels of a view, where
+    the data set states it.
     """
 
     name: str
@@ -61,6 +69,8 @@ class MultiView:
     range_px: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
     stated_centre: int | None = None
+    grid: GridShape | None = None
+    focal_px: float | None = None
 
     @property
     def centre(self) -> int:
@@ -68,6 +78,11 @@ class MultiView:
         if self.stated_centre is not None:
             return self.stated_centre
         return nearest_view(self.views, middle(self.views))
+
+    @property
+    def is_hdr(self) -> bool:
+        """Whether any view holds linear light, which may exceed white."""
+        return any(view.path.suffix.lower() == ".exr" for view in self.views)
 
 
 def middle(views: tuple[KnownView, ...]) -> ViewOffset:
@@ -101,22 +116,43 @@ def pictures_in(folder: Path) -> list[Path]:
     return found
 
 
-def with_equal_sizes(scene: MultiView) -> MultiView:
-    """The scene itself. Raises InputError where it has fewer than two views, or one of another size than the first."""
-    if len(scene.views) < 2:
-        raise InputError(f"{scene.views[0].path}: is the only view; at least two are needed to compare")
-    first = scene.views[0].path
+def common_size(views: Sequence[KnownView]) -> ImageSize:
+    """Of all views, from their headers. Raises InputError for one of another size than the first."""
+    first = views[0].path
     size = read_size(first)
-    for view in scene.views[1:]:
+    for view in views[1:]:
         if (found := read_size(view.path)) != size:
             raise InputError(f"{view.path}: is {found}, but {first.name} is {size}")
-    return scene
+    return size
 
 
-def first_existing(folder: Path, stems: tuple[str, ...]) -> Path | None:
-    """The first file of these names, with any extension that maps come in."""
-    candidates = (folder / f"{stem}{extension}" for stem in stems for extension in MAP_EXTENSIONS)
-    return next((path for path in candidates if path.is_file()), None)
+def on_grid(scene: MultiView, numbers: Sequence[GridIndex]) -> MultiView:
+    """The scene with its views in their places on a grid; unchanged where their numbers of row and column fill none.
+
+    Numbers may begin anywhere and go in steps, equal ones, as where every second view was kept.
+    """
+    rows, columns = (sorted(set(axis)) for axis in zip(*numbers))
+    is_even = all(len({b - a for a, b in pairwise(axis)}) <= 1 for axis in (rows, columns))
+    if not is_even or not len(rows) * len(columns) == len(set(numbers)) == len(numbers):
+        return scene
+    places = [(rows.index(row), columns.index(column)) for row, column in numbers]
+    views = tuple(replace(view, place=place) for view, place in zip(scene.views, places))
+    return replace(scene, views=views, grid=GridShape(len(rows), len(columns)))
+
+
+def maps_in(folder: Path) -> dict[str, Path]:
+    """What may be maps in a folder, by stem; of several kinds the one that comes first among MAP_EXTENSIONS.
+
+    One look at the folder: the maps of 81 views may have 1,600 names, and asking for each took longer than all else.
+    """
+    files = [path for path in folder.iterdir() if path.suffix.lower() in MAP_EXTENSIONS]
+    by_preference = sorted(files, key=lambda path: MAP_EXTENSIONS.index(path.suffix.lower()), reverse=True)
+    return {path.stem: path for path in by_preference}
+
+
+def first_map(maps: Mapping[str, Path], *stems: str) -> Path | None:
+    """The first file of these names, of what `maps_in` found."""
+    return next((maps[stem] for stem in stems if stem in maps and maps[stem].is_file()), None)
 
 
 def numbers_in(name: str) -> tuple[int, ...]:

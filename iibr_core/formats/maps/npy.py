@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import open_binary
+from iibr_core.formats.files import open_binary, reason_of
 from iibr_core.types import InputError
 
 HEADERS = {(1, 0): npy_format.read_array_header_1_0, (2, 0): npy_format.read_array_header_2_0}
@@ -51,6 +51,7 @@ def _header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]
         if min(shape, default=0) < 0:
             raise ValueError(f"shape {shape}")
     except MISREADINGS as error:
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise InputError(f"{path}: cannot be read as a NumPy array ({reason}); get the whole file again") from error
+        raise InputError(
+            f"{path}: cannot be read as a NumPy array ({reason_of(error)}); get the whole file again"
+        ) from error
     return shape, dtype

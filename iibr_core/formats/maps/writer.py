@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import atomic_write
@@ -37,7 +36,7 @@ def write_map(path: Path, values: FloatImage) -> str:
         with atomic_write(path) as temporary:
             np.save(temporary, np.asarray(values, np.float32))
     elif kind == ".exr":
-        _write_picture(path, np.asarray(values, np.float32), "float")
+        _write_plane(path, np.asarray(values, np.float32), "float")
     else:
         return _write_png(path, values)
     return ""
@@ -47,11 +46,9 @@ def _write_png(path: Path, values: FloatImage) -> str:
     low, high = float(values.min()), float(values.max())
     step = (high - low) / (PNG_MOST - 1) or 1.0
     stored = np.rint((values.astype(np.float64) - low) / step).astype(np.uint16) + np.uint16(1)
-    _write_picture(path, stored, "uint16")
+    _write_plane(path, stored, "uint16")
     return f"Its values are disparity in steps of {step:.6g} px (--disparity-scale), moved by {step - low:.6g} px."
 
 
-def _write_picture(path: Path, values: FloatImage | NDArray[np.uint16], dtype: str) -> None:
-    spec = oiio.ImageSpec(values.shape[1], values.shape[0], 1, dtype)
-    spec.channelnames = ("Y",)
-    write_image_file(path, spec, values[..., None])
+def _write_plane(path: Path, values: FloatImage | NDArray[np.uint16], dtype: str) -> None:
+    write_image_file(path, values[..., None], dtype, channels=("Y",))

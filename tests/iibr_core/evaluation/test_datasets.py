@@ -303,13 +303,17 @@ def test_damaged_poses_are_one_clear_line(tmp_path: Path, damage: Damage, named:
 def test_damaged_parameters_and_gaps_of_hci_are_told(tmp_path: Path) -> None:
     folder = write_hci(tmp_path / "dino")
     (folder / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 3\n")
-    with pytest.raises(InputError, match=r"9 views do not fill a grid of 4x3"):
+    with pytest.raises(InputError, match=r"input_Cam009\.png: this view is missing \(3 of 3x4"):
+        read_scene(folder)
+    (folder / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 2\n")
+    with pytest.raises(InputError, match=r"9 views do not fit a grid of 2x4"):
         read_scene(folder)
     (folder / "parameters.cfg").write_text("num_cams_x = many")
     with pytest.raises(InputError, match=r"parameters\.cfg"):
         read_scene(folder)
+    (folder / "parameters.cfg").unlink()
     (folder / "input_Cam004.png").unlink()
-    with pytest.raises(InputError, match="view 4 is missing"):
+    with pytest.raises(InputError, match=r"input_Cam004\.png: this view is missing \(1 of 9"):
         read_scene(folder)
 
 

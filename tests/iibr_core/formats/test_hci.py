@@ -7,8 +7,10 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.color import linear_from_srgb
-from iibr_core.formats.images.photo import focal_px_from_fov, write_image
-from iibr_core.formats.light_fields.hci import HciWriter, is_light_field_folder, read_light_field
+from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.light_fields.registry import find_light_field, open_light_field
+from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.pfm import read_pfm, write_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
 
@@ -32,6 +34,12 @@ def write(folder, views, grid=GRID, with_disparity=True):
             writer.add(view)
 
 
+def read_light_field(folder):
+    """The scene of a folder, and its views."""
+    scene = open_light_field(folder)
+    return scene, read_views(scene)[1]
+
+
 def edit_parameters(folder, section, **values):
     parser = configparser.ConfigParser()
     parser.read(folder / "parameters.cfg")
@@ -46,11 +54,11 @@ def edit_parameters(folder, section, **values):
 def test_round_trip(tmp_path, grid, dtype):
     views = list(updates(grid, dtype=dtype))
     write(tmp_path / "lf", reversed(views), grid)
-    header, found = read_light_field(tmp_path / "lf")
-    assert (header.grid, header.height, header.width, header.name) == (grid, 6, 9, "lf")
-    assert header.focal_px == pytest.approx(12.5)
-    assert header.is_hdr == (dtype == np.float16)
-    low, high = header.disparity_range_px
+    scene, found = read_light_field(tmp_path / "lf")
+    assert (scene.grid, read_views(scene)[0], scene.name) == (grid, (6, 9), "lf")
+    assert scene.focal_px == pytest.approx(12.5)
+    assert scene.is_hdr == (dtype == np.float16)
+    low, high = scene.range_px
     assert low == min(view.disparity.min() for view in views)
     assert high == max(view.disparity.max() for view in views)
     by_index = {(view.row, view.column): view for view in found}
@@ -95,8 +103,8 @@ def test_without_disparity_only_the_centre_has_one(tmp_path):
 
 def test_views_without_any_disparity(tmp_path):
     write(tmp_path / "lf", updates(with_disparity=False))
-    header, found = read_light_field(tmp_path / "lf")
-    assert header.disparity_range_px == (0, 0)
+    scene, found = read_light_field(tmp_path / "lf")
+    assert scene.range_px == (0, 0)
     assert all(view.disparity is None for view in found)
 
 
@@ -171,26 +179,24 @@ def test_foreign_folders_and_files_are_left_alone(tmp_path):
 def test_an_empty_folder_is_taken(tmp_path):
     (tmp_path / "lf").mkdir()
     write(tmp_path / "lf", updates())
-    assert is_light_field_folder(tmp_path / "lf")
+    assert find_light_field(tmp_path / "lf") is not None
 
 
-def test_is_light_field_folder(tmp_path):
-    assert not is_light_field_folder(tmp_path)
-    assert not is_light_field_folder(tmp_path / "none")
+def test_a_photo_makes_no_light_field_but_a_single_view_does(tmp_path):
+    assert find_light_field(tmp_path) is None
     write_image(tmp_path / "photo.png", np.zeros((2, 2, 3), np.uint8))
-    assert not is_light_field_folder(tmp_path)
-    assert not is_light_field_folder(tmp_path / "photo.png")
+    assert find_light_field(tmp_path) is None
     write_image(tmp_path / "v00_u00.png", np.zeros((2, 2, 3), np.uint8))
-    assert is_light_field_folder(tmp_path)
+    assert find_light_field(tmp_path).grid == (1, 1)
 
 
 def test_a_folder_without_parameters_is_a_square(tmp_path):
     for index in range(9):
         write_image(tmp_path / f"input_Cam{index:03d}.png", np.full((2, 3, 3), index, np.uint8))
     write_pfm(tmp_path / "gt_disp_lowres_Cam002.pfm", np.ones((2, 3), np.float32))
-    header, found = read_light_field(tmp_path)
-    assert (header.grid, header.disparity_range_px) == (GridShape(3, 3), None)
-    assert header.focal_px == pytest.approx(focal_px_from_fov(3))
+    scene, found = read_light_field(tmp_path)
+    assert (scene.grid, scene.range_px) == (GridShape(3, 3), None)
+    assert scene.focal_px is None
     by_index = {(view.row, view.column): view for view in found}
     assert all((view.colors == 3 * row + column).all() for (row, column), view in by_index.items())
     assert (by_index[0, 2].disparity == 1).all()
@@ -203,8 +209,8 @@ def test_a_folder_without_parameters_is_a_square(tmp_path):
 def test_grid_names(tmp_path):
     for row, column in np.ndindex(2, 3):
         write_image(tmp_path / f"v{row:02d}_u{column:02d}.png", np.full((2, 3, 3), 10 * row + column, np.uint8))
-    header, found = read_light_field(tmp_path)
-    assert header.grid == GridShape(2, 3)
+    scene, found = read_light_field(tmp_path)
+    assert scene.grid == GridShape(2, 3)
     assert all((view.colors == 10 * view.row + view.column).all() for view in found)
     (tmp_path / "v01_u01.png").unlink()
     with pytest.raises(InputError, match=r"v01_u01.png: this view is missing \(1 of 2x3"):
@@ -240,7 +246,7 @@ def test_parameters_that_do_not_fit(tmp_path, count):
 def test_parameters_that_are_none(tmp_path):
     write(tmp_path / "lf", updates())
     edit_parameters(tmp_path / "lf", "meta", disp_min="low", disp_max="nan", scene="100 % %(x)s".replace("%", "%%"))
-    assert read_light_field(tmp_path / "lf")[0].disparity_range_px is None
+    assert read_light_field(tmp_path / "lf")[0].range_px is None
     (tmp_path / "lf" / "parameters.cfg").write_bytes(b"\xff\xfe no sections")
     with pytest.raises(InputError, match=r"parameters\.cfg: cannot be read"):
         read_light_field(tmp_path / "lf")

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from iibr_core.types import GridShape, InputError, ViewOffset
+from tests.iibr_core.known_scenes import write_llff_row, write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.app.contact_sheet import GAP, TILE_WIDTH, contact_sheet
 from viewer.app.headless import HeadlessViewer
+from viewer.app.side_effects import read_truth
 from viewer.model.actions import MoveEye, ResetOptics, SetAperture
 from viewer.model.layout import layout_of
 from viewer.model.state.app_state import Source
@@ -95,3 +97,26 @@ def test_tiny_photos_open(tmp_path: Path, viewer: HeadlessViewer, pixels: np.nda
     viewer.open(Source(str(tmp_path / "tiny.png")), 1.0, lambda progress: None)
     np.testing.assert_array_equal(viewer.picture(), pixels)
     assert viewer.screen((800, 600)).shape == (600, 800, 3)
+
+
+def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: HeadlessViewer) -> None:
+    """Stanford's names, whose rows count upwards, and a stereo pair: what is seen are the views on disk."""
+    from iibr_core.formats.images.photo import read_photo
+
+    stanford = write_stanford(tmp_path / "stanford", 3, 3)
+    viewer.open(Source(str(stanford)), 1.0, lambda progress: None)
+    for eye, name in ((ViewOffset(0, 0), "out_01_01_-1.0_1.0"), (ViewOffset(-1, 1), "out_02_02_-2.0_2.0")):
+        viewer.do(MoveEye(eye))
+        assert np.abs(viewer.picture() / 255 - read_photo(stanford / f"{name}.png").pixels).max() < 1.5 / 255
+    viewer.open(Source(str(write_stereo_pair(tmp_path / "pair"))), 1.0, lambda progress: None)
+    assert viewer.state.scene is not None
+    assert viewer.state.scene.grid == (1, 2)
+    right = read_photo(tmp_path / "pair" / "im1.png").pixels
+    assert np.abs(viewer.picture() / 255 - right).max() < 1.5 / 255
+
+
+def test_light_fields_of_other_layouts_are_truth_to_compare_with(tmp_path: Path) -> None:
+    truth = read_truth(str(write_stanford(tmp_path / "stanford", 2, 3)))
+    assert (truth.name, truth.grid) == ("stanford", (2, 3))
+    with pytest.raises(InputError, match="`iibr evaluate` reads them"):
+        read_truth(str(write_llff_row(tmp_path / "fern")))

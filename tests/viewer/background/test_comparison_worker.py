@@ -13,7 +13,9 @@ import pytest
 
 from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.formats.images.photo import write_image
-from iibr_core.formats.light_fields.hci import HciWriter, read_light_field, read_view
+from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.light_fields.registry import open_light_field
+from iibr_core.formats.light_fields.views import read_stored_view, read_views
 from iibr_core.generation.light_field import generate, ray_set
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.registry import INPAINTERS
@@ -133,7 +135,7 @@ def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(
             InspectionRequest(1, "truth", view, truth, is_scored=True), inputs, never
         )
         assert isinstance(pair, PairReady)
-        np.testing.assert_array_equal(pair.right, read_view(Path(truth.path), *view))
+        np.testing.assert_array_equal(pair.right, read_stored_view(open_light_field(Path(truth.path)), *view))
         assert isinstance(scored, PairScored)
         assert (scored.psnr_db, scored.flip) == (math.inf, 0)
 
@@ -145,7 +147,7 @@ def test_a_stored_view_is_held_against_the_truth_as_it_is(truth: GroundTruth) ->
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)
     np.testing.assert_array_equal(pair.left, stored)
-    assert scored.psnr_db == psnr(stored, read_view(Path(truth.path), 2, 0))
+    assert scored.psnr_db == psnr(stored, read_stored_view(open_light_field(Path(truth.path)), 2, 0))
 
 
 def test_a_pair_is_made_once_and_scored_when_asked(inputs: ComparisonInputs, truth: GroundTruth) -> None:
@@ -178,13 +180,13 @@ def test_truth_that_changed_on_disk_is_an_input_error(inputs: ComparisonInputs, 
 
 
 def test_one_view_of_a_folder_is_the_one_read_with_all_others(truth: GroundTruth) -> None:
-    _, views = read_light_field(Path(truth.path))
-    for update in views:
-        np.testing.assert_array_equal(read_view(Path(truth.path), update.row, update.column), update.colors)
+    field = open_light_field(Path(truth.path))
+    for update in read_views(field)[1]:
+        np.testing.assert_array_equal(read_stored_view(field, update.row, update.column), update.colors)
     with pytest.raises(InputError, match="3x3"):
-        read_view(Path(truth.path), 3, 0)
+        read_stored_view(field, 3, 0)
     with pytest.raises(InputError, match="3x3"):
-        read_view(Path(truth.path), 0, -1)
+        read_stored_view(field, 0, -1)
 
 
 @pytest.fixture

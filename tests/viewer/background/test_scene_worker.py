@@ -12,8 +12,10 @@ import pytest
 
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewUpdate
+from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanford, write_stereo_pair
 from viewer.background.jobs import QUEUED_RESULTS, Failed
 from viewer.background.scene_worker import (
+    UNKNOWN_DISPARITY_RANGE_PX,
     SceneReady,
     SceneRequest,
     SceneResult,
@@ -151,6 +153,41 @@ def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path
     assert ready.scene.has_view_disparity == with_disparity
     assert ready.scene.disparity_range_px[0] < ready.scene.disparity_range_px[1]
     assert len(views) == 9
+
+
+@pytest.mark.parametrize(
+    ("write", "grid", "range_px", "depth_source"),
+    [
+        (lambda to: write_stanford(to, 2, 3), (2, 3), UNKNOWN_DISPARITY_RANGE_PX, "none"),
+        (write_stereo_pair, (1, 2), (7.5, 7.5), "none"),  # the map is the left view's, the middle is the right one
+        (write_grid, (3, 3), (0.5, 2.0), "light field"),
+    ],
+)
+def test_what_evaluation_reads_opens_here(
+    tmp_path: Path,
+    write: Callable[[Path], Path],
+    grid: tuple[int, int],
+    range_px: tuple[float, float],
+    depth_source: str,
+) -> None:
+    source = Source(str(write(tmp_path / "field")))
+    ready, *views = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)
+    assert isinstance(ready, SceneReady)
+    scene = ready.scene
+    assert (scene.name, scene.grid, scene.disparity_range_px) == ("field", grid, range_px)
+    assert (scene.depth_source, scene.has_view_disparity) == (depth_source, False)
+    assert [type(view) for view in views] == [ViewReady] * (grid[0] * grid[1])
+
+
+def test_views_that_stand_on_no_grid_are_refused_in_one_line(tmp_path: Path) -> None:
+    source = Source(str(write_llff_row(tmp_path / "fern")))
+    with pytest.raises(InputError, match=r"fern.*no regular grid.*`iibr evaluate` reads them"):
+        next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
+
+
+def test_a_folder_without_views_is_told_what_would_be_some(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no light field; laid out as HCI, Stanford"):
+        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: False, lambda: CENTRE))
 
 
 def test_generating_stops_between_row_bands(photo_path: Path) -> None:

@@ -219,7 +219,11 @@ GENERATE = ("--out", "{dir}/o", "--grid", "3")
         (("generate", "{photo}", "--grid", "x", "--out", "{dir}/o"), "--grid"),
         (("generate", "{photo}", "--grid", "3", "--out", "{dir}/file"), "file"),
         (("generate", "{photo}", "--grid", "3", "--out", "{dir}/file/o"), "file"),
-        (("generate", "{photo}", "--grid", "3", "--out", "{dir}/o", "--format", "mp4"), "--format"),
+        (
+            ("generate", "{photo}", "--grid", "3", "--out", "{dir}/o", "--format", "mp4"),
+            "'mp4' is no layout that can be written: give hci",
+        ),
+        (("screenshot", "{dir}", "-o", "{dir}/o.png"), "holds no light field"),
         (("generate", "{photo}", "--grid", "3"), "--out"),
         (("generate", "{photo}", *GENERATE, "--memory", "lots"), "--memory"),
         (("generate", "{photo}", *GENERATE, "--disparity-scale", "nan"), "--disparity-scale"),

@@ -1,0 +1,88 @@
+"""Every layout of a light field on disk: who reads it, who writes it. The viewer, `generate` and `evaluate` ask here.
+
+Entries are "module:name" in this folder, imported once they are used: the command line lists the writers without
+loading what they need. A new layout is a file of its own and one line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from pkgutil import resolve_name
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+from iibr_core.types import GridShape, InputError, ViewUpdate
+
+if TYPE_CHECKING:
+    from iibr_core.formats.light_fields.scene import MultiView
+
+READERS = (
+    "llff:read_llff",
+    "stanford:read_stanford",
+    "middlebury:read_middlebury",
+    "hci:read_hci",
+    "numbered_grid:read_numbered_grid",
+)
+"""In the order in which they are asked: `Reader`s."""
+
+WRITERS = {"hci": "hci:HciWriter"}
+"""By the name that people type: `WriterFactory`s."""
+
+LAYOUTS = "HCI, Stanford archive, Heber, LLFF, Middlebury, or views/v00_u00.png ..."
+"""What the readers know, for people."""
+
+
+class LightFieldWriter(Protocol):
+    """Writes a light field in a `with` block: it is there, whole, when the block ends well, else nothing is."""
+
+    def __enter__(self) -> Self:
+        """Raises InputError where nothing may be written."""
+
+    def add(self, update: ViewUpdate) -> None:
+        """Write one view, in any order. Raises InputError where an earlier one could not be written."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Raises InputError where views are missing or cannot be written."""
+
+
+Reader = Callable[[Path], "MultiView | None"]
+"""Gives the scene of a folder, None where the folder is laid out otherwise; InputError where it is damaged."""
+
+WriterFactory = Callable[[Path, GridShape, float, str, bool], LightFieldWriter]
+"""(where to write, grid, focal length in pixels of a view, the scene's name, whether every view's disparity is wanted)
+-> its writer."""
+
+
+def find_light_field(folder: Path) -> MultiView | None:
+    """The scene of a folder, None where it is laid out as no reader knows. Raises InputError where it is damaged."""
+    for entry in READERS:
+        read: Reader = _resolve(entry)
+        scene = read(folder)
+        if scene is not None:
+            return scene
+    return None
+
+
+def open_light_field(folder: Path) -> MultiView:
+    """The scene of a folder. Raises InputError where there is none, or it is damaged."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder")
+    scene = find_light_field(folder)
+    if scene is None:
+        raise InputError(f"{folder}: holds no light field; laid out as {LAYOUTS}")
+    return scene
+
+
+def writer_for(layout: str) -> WriterFactory:
+    """The writer of a layout, one of WRITERS. Raises InputError for others."""
+    if layout not in WRITERS:
+        raise InputError(f"{layout!r} is no layout that can be written: give {' or '.join(WRITERS)}")
+    factory: WriterFactory = _resolve(WRITERS[layout])
+    return factory
+
+
+def _resolve(entry: str) -> Any:
+    return resolve_name(f"{__package__}.{entry}")

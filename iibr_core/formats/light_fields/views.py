@@ -1,0 +1,100 @@
+"""The pixels of a light field on disk whose views fill a grid, in the order in which they are looked at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from iibr_core.color import stored_from_encoded
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.light_fields.scene import GridIndex, MultiView, common_size
+from iibr_core.formats.maps.disparity_file import read_disparity
+from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS
+from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
+
+
+def grid_of(scene: MultiView) -> GridShape:
+    """The grid that the views fill. Raises InputError where they fill none, telling what reads such a scene."""
+    if scene.grid is None:
+        raise InputError(
+            f"{scene.views[0].path.parent}: the views ({scene.layout}) fill no regular grid,"
+            " so they cannot be shown as a light field; `iibr evaluate` reads them"
+        )
+    return scene.grid
+
+
+def read_views(scene: MultiView) -> tuple[ImageSize, Iterator[ViewUpdate]]:
+    """The size of the views, and the views: the centre first, then the nearest to it.
+
+    Raises InputError, naming the file, where a view is unreadable or of another size (sizes are checked before
+    anything is yielded), and as `grid_of` does.
+    """
+    grid, size = grid_of(scene), common_size(scene.views)
+    return size, _iterate_views(scene, grid, size)
+
+
+def read_stored_view(scene: MultiView, row: int, column: int) -> StoredColors:
+    """Colours (H, W, 3) of one view, read alone. Raises InputError as `read_views` does, or for a bad row or column."""
+    grid = grid_of(scene)
+    if not (0 <= row < grid.rows and 0 <= column < grid.columns):
+        folder = scene.views[0].path.parent
+        raise InputError(f"{folder}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")
+    return _read_colors(scene, _indices(scene)[row, column])
+
+
+def disparity_range(scene: MultiView) -> tuple[float, float] | None:
+    """Least and greatest disparity (px per step of the grid): stated, else of the map nearest to the centre view.
+
+    None where nothing is known. Raises InputError where the map cannot be read.
+    """
+    grid, indices = grid_of(scene), _indices(scene)
+    if scene.range_px is not None:
+        low, high = scene.range_px
+        return low * step_length(scene), high * step_length(scene)
+    known = next((indices[at] for at in _nearest_to_centre(grid) if indices[at] in scene.disparity), None)
+    if known is None:
+        return None
+    values = _read_map(scene, known, common_size(scene.views[:1]))
+    return float(values.min()), float(values.max())
+
+
+def step_length(scene: MultiView) -> float:
+    """View steps of the scene from one column of its grid to the next; from row to row where it has one column."""
+    grid = grid_of(scene)
+    last = (0, grid.columns - 1) if grid.columns > 1 else (grid.rows - 1, 0)
+    if last == (0, 0):
+        return 1.0
+    start, end = (scene.views[_indices(scene)[at]].offset for at in ((0, 0), last))
+    return math.hypot(end.t - start.t, end.s - start.s) / max(last)
+
+
+def _nearest_to_centre(grid: GridShape) -> list[GridIndex]:
+    places = [(row, column) for row in range(grid.rows) for column in range(grid.columns)]
+    return sorted(places, key=lambda at: math.hypot(*grid.offset(*at)))
+
+
+def _indices(scene: MultiView) -> dict[GridIndex, int]:
+    """Where the view of each place is among the scene's views."""
+    return {view.place: index for index, view in enumerate(scene.views) if view.place is not None}
+
+
+def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize) -> Iterator[ViewUpdate]:
+    indices = _indices(scene)
+    for row, column in _nearest_to_centre(grid):
+        index = indices[row, column]
+        colors = _read_colors(scene, index)
+        if image_size(colors) != size:
+            path = scene.views[index].path
+            raise InputError(f"{path}: is rotated by its Exif orientation; views must be stored upright")
+        disparity = _read_map(scene, index, size) if index in scene.disparity else None
+        yield ViewUpdate(row, column, colors, disparity)
+
+
+def _read_colors(scene: MultiView, index: int) -> StoredColors:
+    return stored_from_encoded(read_photo(scene.views[index].path, MAX_FILE_PIXELS).pixels, scene.is_hdr)
+
+
+def _read_map(scene: MultiView, index: int, size: ImageSize) -> FloatImage:
+    """Disparity (H, W) of a view, px per step of the grid."""
+    known = scene.disparity[index]
+    return read_disparity(known.path, size, known.scale * step_length(scene)).values

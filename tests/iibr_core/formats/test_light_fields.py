@@ -1,0 +1,204 @@
+"""One way in and one way out for every layout: what one part of the program opens, all open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.evaluation.datasets import read_known_disparity, read_scene
+from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.light_fields.registry import (
+    READERS,
+    WRITERS,
+    WriterFactory,
+    find_light_field,
+    open_light_field,
+    writer_for,
+)
+from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_stored_view, read_views, step_length
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
+from tests.iibr_core.known_scenes import (
+    disparity_of_square,
+    offsets_of,
+    write_grid,
+    write_hci,
+    write_llff_row,
+    write_numbered,
+    write_stanford,
+    write_stereo_pair,
+)
+
+Write = Callable[[Path], Path]
+
+LAYOUTS: dict[str, tuple[Write, str, GridShape | None]] = {
+    "hci": (lambda to: write_hci(to, 3, 5), "HCI 4D light field, 5x3", GridShape(3, 5)),
+    "views": (write_grid, "grid folder, 3x3", GridShape(3, 3)),
+    "heber": (
+        lambda to: write_numbered(to, {f"lf_{v}_{u}.png": at for (v, u), at in offsets_of(11, 11).items()}),
+        "Pov-ray (Heber), 11x11",
+        GridShape(11, 11),
+    ),
+    "stanford": (lambda to: write_stanford(to, 2, 3), "Stanford archive, 3x2", GridShape(2, 3)),
+    "middlebury": (write_stereo_pair, "Middlebury pair", GridShape(1, 2)),
+    "llff": (write_llff_row, "LLFF, 3 photos", None),
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_every_layout_opens_through_one_function_for_viewer_and_evaluation(tmp_path: Path, name: str) -> None:
+    write, layout, grid = LAYOUTS[name]
+    folder = write(tmp_path / "scene")
+    scene, judged = open_light_field(folder), read_scene(folder)
+    assert judged is not None
+    assert (scene.name, scene.layout, scene.grid) == ("scene", layout, grid)
+    assert [view.path for view in scene.views] == [view.path for view in judged.views]
+    if grid is not None:
+        size, views = read_views(scene)
+        found = {(view.row, view.column): view for view in views}
+        assert sorted(found) == list(np.ndindex(*grid))
+        for (row, column), view in found.items():
+            assert view.colors.shape == (*size, 3)
+            np.testing.assert_array_equal(view.colors, read_stored_view(scene, row, column))
+        assert sum(view.disparity is not None for view in found.values()) == len(scene.disparity)
+
+
+@pytest.mark.parametrize("entry", [*READERS, *WRITERS.values()])
+def test_entries_name_files_of_the_folder(entry: str) -> None:
+    from iibr_core.formats.light_fields import registry
+
+    assert callable(registry._resolve(entry))
+
+
+def test_views_of_no_grid_are_refused_by_saying_what_reads_them(tmp_path: Path) -> None:
+    scene = open_light_field(write_llff_row(tmp_path / "fern"))
+    for refused in (grid_of, read_views, disparity_range, lambda scene: read_stored_view(scene, 0, 0)):
+        with pytest.raises(InputError, match=r"fern.*no regular grid.*`iibr evaluate` reads them") as caught:
+            refused(scene)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_folder_that_no_reader_knows(tmp_path: Path) -> None:
+    assert find_light_field(tmp_path) is None
+    with pytest.raises(InputError, match=r"holds no light field; laid out as HCI, Stanford"):
+        open_light_field(tmp_path)
+    (tmp_path / "photo.png").touch()
+    with pytest.raises(InputError, match="not a folder"):
+        open_light_field(tmp_path / "photo.png")
+
+
+def test_rows_of_stanford_count_upwards_on_disk_and_downwards_here(tmp_path: Path) -> None:
+    scene = open_light_field(write_stanford(tmp_path / "lego", 3, 4))
+    places = {view.path.stem[:9]: view.place for view in scene.views}
+    assert places["out_02_00"] == (0, 0)
+    assert places["out_00_03"] == (2, 3)
+    assert step_length(scene) == pytest.approx(1)
+    dark = {view.path.stem[:9]: read_stored_view(scene, *view.place).mean() for view in scene.views if view.place}
+    assert dark["out_00_00"] < dark["out_00_01"] < dark["out_02_00"]
+
+
+@pytest.mark.parametrize(
+    ("kept", "grid"),
+    [
+        ([(0, 0), (0, 2), (2, 0), (2, 2)], GridShape(2, 2)),  # every second view
+        ([(3, 7), (3, 8)], GridShape(1, 2)),
+        ([(0, 0), (0, 1), (1, 0)], None),  # a gap
+        ([(0, 0), (0, 1), (0, 5)], None),  # uneven
+    ],
+)
+def test_stanford_names_that_fill_a_grid_and_that_do_not(
+    tmp_path: Path, kept: list[tuple[int, int]], grid: GridShape | None
+) -> None:
+    folder = write_numbered(tmp_path, {f"out_{v:02d}_{u:02d}_{v}.0_{u}.0.png": ViewOffset(v, u) for v, u in kept})
+    scene = read_scene(folder)
+    assert scene is not None
+    assert scene.grid == grid
+    assert (scene.views[0].place is None) == (grid is None)
+
+
+def test_the_steps_of_the_grid_count_where_views_were_left_out(tmp_path: Path) -> None:
+    """Two views of seven: their maps hold px from one to the next, as many as four times a step of the data set."""
+    for n in (1, 5):
+        write_image(tmp_path / f"view{n}.png", np.full((4, 463, 3), n / 9, np.float32))
+        write_image(tmp_path / f"disp{n}.png", np.full((4, 463), 120, np.uint8))
+    scene = open_light_field(tmp_path)
+    assert (scene.grid, step_length(scene)) == ((1, 2), 4)
+    assert read_known_disparity(scene.disparity[0], ImageSize(4, 463)).values.max() == pytest.approx(10)
+    _, views = read_views(scene)
+    for view in views:
+        assert view.disparity is not None
+        np.testing.assert_allclose(view.disparity, 40, rtol=1e-5)
+    assert disparity_range(scene) == pytest.approx((40, 40))
+
+
+def test_the_range_is_stated_or_that_of_the_map_nearest_to_the_centre(tmp_path: Path) -> None:
+    folder = write_grid(tmp_path / "scene", 5)
+    truth = folder / "gt_disp_u02_v02.npy"
+    assert disparity_range(open_light_field(folder)) == (0.5, 2.0)
+    truth.unlink()
+    assert disparity_range(open_light_field(folder)) is None
+    np.save(folder / "gt_disp_u00_v00.npy", 2 * disparity_of_square())
+    np.save(folder / "gt_disp_u03_v02.npy", 3 * disparity_of_square())
+    assert disparity_range(open_light_field(folder)) == (1.5, 6.0)
+    (folder / "parameters.cfg").write_text("[meta]\ndisp_min = -1\ndisp_max = 7\n")
+    assert disparity_range(open_light_field(folder)) == (-1, 7)
+
+
+def test_of_a_view_in_two_kinds_one_is_taken(tmp_path: Path) -> None:
+    folder = write_hci(tmp_path / "field")
+    write_image(folder / "input_Cam003.exr", np.ones((5, 5, 3), np.float32))
+    scene = open_light_field(folder)
+    assert len(scene.views) == 9
+    assert not scene.is_hdr
+    write_image(folder / "input_Cam03.png", np.ones((5, 5, 3), np.float32))
+    with pytest.raises(InputError, match=r"shows the same view as input_Cam0"):
+        open_light_field(folder)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_hci_names_may_count_from_one_and_lie_in_a_subfolder(tmp_path: Path, first: int) -> None:
+    names = {f"input_Cam{k + first:03d}.png": at for k, at in enumerate(offsets_of(2, 2).values())}
+    write_numbered(tmp_path / "views", names)
+    scene = open_light_field(tmp_path)
+    assert (scene.grid, [view.path.name for view in scene.views]) == ((2, 2), list(names))
+
+
+def test_truth_goes_before_an_estimate(tmp_path: Path) -> None:
+    folder = write_hci(tmp_path / "field")
+    write_pfm(folder / "disp_Cam002.pfm", disparity_of_square())
+    assert [known.is_truth for _, known in sorted(open_light_field(folder).disparity.items())] == [False, True]
+    write_pfm(folder / "gt_disp_lowres_Cam002.pfm", disparity_of_square())
+    assert open_light_field(folder).disparity[2].is_truth
+
+
+def written(scene: MultiView) -> list[ViewUpdate]:
+    return sorted(read_views(scene)[1], key=lambda view: (view.row, view.column))
+
+
+@pytest.mark.parametrize("layout", WRITERS)
+def test_every_writer_is_read_again(tmp_path: Path, layout: str) -> None:
+    """Any order in, the same views out; whole or not at all."""
+    original = open_light_field(write_grid(tmp_path / "original"))
+    with writer_for(layout)(tmp_path / "copy", GridShape(3, 3), 60.0, "copy", True) as writer:
+        for view in read_views(original)[1]:
+            writer.add(view)
+    copy = open_light_field(tmp_path / "copy")
+    assert copy.focal_px == pytest.approx(60)
+    for ours, theirs in zip(written(copy), written(original)):
+        np.testing.assert_array_equal(ours.colors, theirs.colors)
+    assert disparity_range(copy) == disparity_range(original)
+    with pytest.raises(KeyboardInterrupt), writer_for(layout)(tmp_path / "half", GridShape(3, 3), 60.0, "", True):
+        raise KeyboardInterrupt
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["copy", "original"]
+
+
+def test_a_layout_that_none_writes_is_refused_by_those_there_are() -> None:
+    with pytest.raises(InputError, match=r"'mp4' is no layout that can be written: give hci"):
+        writer_for("mp4")
+    expected: WriterFactory = HciWriter
+    assert writer_for("hci") is expected
