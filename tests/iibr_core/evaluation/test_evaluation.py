@@ -139,6 +139,19 @@ def test_an_estimate_is_judged_as_it_is_and_aligned(folder: Path) -> None:
     assert plain.hole_share == aligned.hole_share
 
 
+def test_an_estimate_does_not_know_the_range_of_a_grids_truth(tmp_path: Path) -> None:
+    """HCI's parameters.cfg states it; photos on no grid (LLFF) state what their cameras' poses tell."""
+    folder = write_grid(tmp_path / "square")
+    told = {}
+    for text in ("", "[meta]\ndisp_min = 0.5\ndisp_max = 2.0\n"):
+        (folder / "parameters.cfg").write_text(text)
+        scene = scene_of(folder)
+        trial = trials_of(scene, "estimate")[0]
+        told[scene.range_px] = trial_input(trial, "estimate", replace(UNREFINED, start="rough"), 10**6).maps[0].values
+    assert list(told) == [None, (0.5, 2.0)]
+    np.testing.assert_array_equal(*told.values())
+
+
 def test_without_true_disparity_an_estimate_is_aligned_to_views(tmp_path: Path) -> None:
     folder = write_grid(tmp_path / "scene")
     (folder / "gt_disp_u01_v01.npy").unlink()
