@@ -19,7 +19,8 @@ from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
-from viewer.model.actions import OpenPath, SetAperture
+from viewer.model.actions import OpenPath
+from viewer.model.lens.optics import SetAperture
 from viewer.model.state.app_state import Source
 
 MOVES = 150

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import DismissNotice, MoveEye, SetAperture, SetApertureShape, SetFocus, SetHover
-from viewer.model.state.app_state import ApertureShape, Hover, Section, Source
+from viewer.model.actions import DismissNotice, SetHover
+from viewer.model.lens.optics import ApertureShape, MoveEye, SetAperture, SetApertureShape, SetFocus
+from viewer.model.state.app_state import Hover, Section, Source
 from viewer.model.state.inspection import SetOverlay, ShowEpis, ShowValues
 
 SIZE = 1200, 760

@@ -1,5 +1,5 @@
 """LPIPS (Zhang et al. 2018) on AlexNet, from local files: the network of torchvision, the weights of its layers' errors
-of LPIPS 0.1. Ours, because the lpips package and torchmetrics (same figures, to the last digit) both need torchvision.
+of LPIPS 0.1. Ours: the lpips package (same figures, to the last digit) and torchmetrics both need torchvision.
 """
 
 from __future__ import annotations

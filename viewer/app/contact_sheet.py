@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import MoveEye, ResetOptics, SetAperture, SetFocus
 from viewer.model.lens.limits import aperture_limit
+from viewer.model.lens.optics import MoveEye, ResetOptics, SetAperture, SetFocus
 
 TILE_WIDTH = 480
 GAP = 8

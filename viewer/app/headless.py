@@ -25,8 +25,9 @@ from viewer.model.inspection_request import (
     make_inspection_request,
 )
 from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterbox
+from viewer.model.lens.optics import CENTRE
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import CENTRE, AppState, Progress, Source
+from viewer.model.state.app_state import AppState, Progress, Source
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import Probed
 

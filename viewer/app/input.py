@@ -8,35 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from iibr_core.types import ViewOffset
-from viewer.model.actions import (
-    Action,
-    DoTask,
-    EndGesture,
-    FocusOn,
-    MoveEye,
-    MoveTiltHandle,
-    OpenPath,
-    Quit,
-    ReturnHome,
-    SetFocus,
-    SetHover,
-    ShowPrompt,
-)
+from viewer.model.actions import Action, DoTask, EndGesture, OpenPath, Quit, ReturnHome, SetHover, ShowPrompt
 from viewer.model.commands import BY_NAME, COMMANDS, Chord
 from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, Rect, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.lens.limits import focus_limits
-from viewer.model.state.app_state import (
-    CENTRE,
-    AppState,
-    Hover,
-    ReadTruthTask,
-    Scene,
-    Source,
-    source_beside,
-    source_with_map,
-)
+from viewer.model.lens.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, SetFocus
+from viewer.model.state.app_state import AppState, Hover, ReadTruthTask, Scene, Source, source_beside, source_with_map
 from viewer.model.state.depth_editing import DropStroke, Paint, SetBrush
 from viewer.model.state.inspection import MoveDivider, ShowGrid
 

@@ -16,10 +16,10 @@ from viewer.app.picture_saver import PictureSaver
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, AskForPath, Notify, SetApertureShape, ShowPrompt, TaskTaken
+from viewer.model.actions import Action, AskForPath, Notify, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
+from viewer.model.lens.optics import ApertureMask, SetApertureShape
 from viewer.model.state.app_state import (
-    ApertureMask,
     AppState,
     ChooseTask,
     Notice,

@@ -107,7 +107,7 @@ def screenshot(
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
-    from viewer.model.actions import MoveEye, SetAperture, SetFocus
+    from viewer.model.lens.optics import MoveEye, SetAperture, SetFocus
     from viewer.model.state.app_state import Source
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)

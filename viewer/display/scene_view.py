@@ -20,7 +20,8 @@ from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.state.app_state import CENTRE, AppState, DrawReport, Optics, Picture, Scene
+from viewer.model.lens.optics import CENTRE, Optics
+from viewer.model.state.app_state import AppState, DrawReport, Picture, Scene
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""

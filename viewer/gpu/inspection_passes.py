@@ -13,7 +13,7 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.types import ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
-from viewer.model.state.app_state import Optics
+from viewer.model.lens.optics import Optics
 
 MAX_VIEWS = 128
 """As in shaders/epi.frag: of one row or column of the grid."""

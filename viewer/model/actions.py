@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.types import ViewOffset
-from viewer.model.lens.presets import PresetName
+from viewer.model.lens.optics import LensAction
 from viewer.model.state.app_state import (
-    ApertureShape,
     ChoiceOf,
     DrawReport,
     Hover,
@@ -28,20 +26,6 @@ from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.saving import SavingChanged
 
 # The viewpoint
-
-
-@dataclass(frozen=True)
-class MoveEye:
-    """Put the viewpoint at this view offset (clamped to the grid and a margin beyond)."""
-
-    eye: ViewOffset
-
-
-@dataclass(frozen=True)
-class SetDolly:
-    """Step forward (positive) or back; see `Optics.dolly`."""
-
-    dolly: float
 
 
 @dataclass(frozen=True)
@@ -77,36 +61,7 @@ class Tick:
     now_s: float
 
 
-# Focus, aperture, light
-
-
-@dataclass(frozen=True)
-class SetFocus:
-    """Focus on this field disparity (px per view step), in the middle of the picture."""
-
-    disparity: float
-
-
-@dataclass(frozen=True)
-class FocusOn:
-    """What was clicked at this place (-1..1, see focal_plane) with this disparity becomes sharp."""
-
-    place: tuple[float, float]
-    disparity: float
-
-
-@dataclass(frozen=True)
-class SetFocusRange:
-    """Everything within this much disparity around the focus is sharp."""
-
-    disparity: float
-
-
-@dataclass(frozen=True)
-class SetTilt:
-    """Tilt the plane of focus; see `Optics.focus_tilt`."""
-
-    tilt: tuple[float, float]
+# The lens as a whole, and undo
 
 
 @dataclass(frozen=True)
@@ -117,60 +72,11 @@ class ShowTiltHandles:
 
 
 @dataclass(frozen=True)
-class MoveTiltHandle:
-    """Drag a handle (0 or 1) to this place, over this disparity; None where nothing is known there."""
-
-    index: int
-    place: tuple[float, float]
-    disparity: float | None
-
-
-@dataclass(frozen=True)
-class SetAperture:
-    """Open the aperture to this diameter in view steps."""
-
-    diameter: float
-
-
-@dataclass(frozen=True)
-class SetApertureShape:
-    """Give the opening this shape."""
-
-    shape: ApertureShape
-
-
-@dataclass(frozen=True)
-class SetHighlightRecovery:
-    """Let clipped pixels count for more: 0..1."""
-
-    amount: float
-
-
-@dataclass(frozen=True)
-class SetExposure:
-    """Brighten the picture by this many stops."""
-
-    stops: float
-
-
-@dataclass(frozen=True)
 class SetDepthStrength:
     """Multiply the planned parallax; the field is generated anew once the edit is finished."""
 
     strength: float
     is_finished: bool
-
-
-@dataclass(frozen=True)
-class ApplyPreset:
-    """Set focus and aperture for a purpose."""
-
-    name: PresetName
-
-
-@dataclass(frozen=True)
-class ResetOptics:
-    """Back to the centre viewpoint, the planned focus plane, a pinhole and the photo's exposure."""
 
 
 @dataclass(frozen=True)
@@ -343,23 +249,6 @@ class PlaceWindow:
 class Quit:
     """Close the window."""
 
-
-LensAction = (
-    MoveEye
-    | SetDolly
-    | SetFocus
-    | FocusOn
-    | SetFocusRange
-    | SetTilt
-    | MoveTiltHandle
-    | SetAperture
-    | SetApertureShape
-    | SetHighlightRecovery
-    | SetExposure
-    | ApplyPreset
-    | ResetOptics
-)
-"""Edits of the optics alone."""
 
 MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed

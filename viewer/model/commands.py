@@ -11,14 +11,12 @@ from dataclasses import dataclass, replace
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from viewer.model.actions import (
     Action,
-    ApplyPreset,
     AskToSave,
     DoTask,
     OpenPath,
     PauseMotion,
     Quit,
     Redo,
-    ResetOptics,
     ReturnHome,
     SetFontScale,
     SetLoop,
@@ -28,6 +26,7 @@ from viewer.model.actions import (
     StopWork,
     Undo,
 )
+from viewer.model.lens.optics import ApplyPreset, ResetOptics
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import (
     LOOPS,

@@ -17,7 +17,8 @@ import msgspec
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
 from iibr_core.types import GridShape, InputError, Quality
 from viewer.model.lens.limits import BLADES_LIMITS
-from viewer.model.state.app_state import ApertureShape, Optics, SavedSettings, Source
+from viewer.model.lens.optics import ApertureShape, Optics
+from viewer.model.state.app_state import SavedSettings, Source
 
 ATTRIBUTE = "iibr:settings"
 FORMAT = 1

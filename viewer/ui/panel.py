@@ -8,10 +8,11 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from iibr_core.types import DEFAULT_QUALITY
-from viewer.model.actions import Action, ApplyPreset, OpenPath, ResumeWork, StopWork, ToggleSection
+from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork, ToggleSection
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import aperture_limit
+from viewer.model.lens.optics import ApplyPreset
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source, source_beside
 from viewer.ui.sections.depth import depth_line, depth_section

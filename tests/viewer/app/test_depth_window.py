@@ -18,13 +18,13 @@ from viewer.model.actions import (
     AskForPath,
     AskToSave,
     EndGesture,
-    MoveEye,
     Notify,
     SetDepthStrength,
     SetFontScale,
     ShowPrompt,
     ToggleSection,
 )
+from viewer.model.lens.optics import MoveEye
 from viewer.model.state.app_state import Notice, PalettePrompt, PathPrompt, SavePrompt
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetOpacity, SetOverlay, ShowEpis

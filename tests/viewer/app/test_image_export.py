@@ -22,7 +22,7 @@ from viewer.app.image_export import (
     render_pixels,
     settings_of,
 )
-from viewer.model.actions import MoveEye, SetAperture, SetFocus
+from viewer.model.lens.optics import MoveEye, SetAperture, SetFocus
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import SaveTask, Source
 

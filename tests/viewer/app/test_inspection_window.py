@@ -19,9 +19,10 @@ from tests.viewer.conftest import Driver, write_scene
 from viewer.app.input import actions_from_drop
 from viewer.app.main_loop import App, initial_state
 from viewer.background.loaded_photo import load_photo
-from viewer.model.actions import MoveEye, OpenPath, SetLoop, ToggleSection
+from viewer.model.actions import OpenPath, SetLoop, ToggleSection
 from viewer.model.inspection_request import sheet_cells
-from viewer.model.state.app_state import AppState, Optics, ReadTruthTask, Source
+from viewer.model.lens.optics import MoveEye, Optics
+from viewer.model.state.app_state import AppState, ReadTruthTask, Source
 from viewer.model.state.inspection import Compare, SetOverlay, ShowEpis
 
 GRID = GridShape(5, 5)

@@ -14,9 +14,10 @@ from iibr_core.formats.images.photo import read_photo, write_image
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import AskForPath, DoTask, MoveEye, OpenPath, SetAperture, ShowPrompt, StopWork
+from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
+from viewer.model.lens.optics import MoveEye, Optics, SetAperture
 from viewer.model.saved_settings import ATTRIBUTE, read_settings
-from viewer.model.state.app_state import AppState, Optics, PalettePrompt, ReadMaskTask, SavePrompt, SaveTask, Source
+from viewer.model.state.app_state import AppState, PalettePrompt, ReadMaskTask, SavePrompt, SaveTask, Source
 
 Opener = Callable[..., Driver]
 

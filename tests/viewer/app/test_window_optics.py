@@ -10,25 +10,21 @@ import pytest
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
-from viewer.model.actions import (
-    Action,
-    ApplyPreset,
-    MoveEye,
-    Notify,
-    SetApertureShape,
-    SetDepthStrength,
-    SetDolly,
-    SetFocusRange,
-    SetFontScale,
-    SetHighlightRecovery,
-    SetTheme,
-    SetTilt,
-    ShowPrompt,
-    ShowTiltHandles,
-)
+from viewer.model.actions import Action, Notify, SetDepthStrength, SetFontScale, SetTheme, ShowPrompt, ShowTiltHandles
 from viewer.model.lens.focal_plane import handle_points, sharp_disparity
 from viewer.model.lens.limits import is_extrapolated
-from viewer.model.state.app_state import ApertureShape, Notice, Optics, TiltHandles
+from viewer.model.lens.optics import (
+    ApertureShape,
+    ApplyPreset,
+    MoveEye,
+    Optics,
+    SetApertureShape,
+    SetDolly,
+    SetFocusRange,
+    SetHighlightRecovery,
+    SetTilt,
+)
+from viewer.model.state.app_state import Notice, TiltHandles
 
 
 @pytest.fixture

@@ -116,8 +116,8 @@ def test_holes_are_filled_as_in_the_scene_s_own_views(
     assert loaded is not None
     assert plan is not None
     request = InspectionRequest(1, "quality", view)
-    (pair,) = ComparisonJob().seen(request, replace(inputs, inpaint="red"), never)
-    (usual,) = ComparisonJob().seen(request, inputs, never)
+    (pair,) = ComparisonJob().results_of(request, replace(inputs, inpaint="red"), never)
+    (usual,) = ComparisonJob().results_of(request, inputs, never)
     assert isinstance(pair, PairReady)
     assert isinstance(usual, PairReady)
     views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality="fast", inpaint="red")

@@ -20,9 +20,10 @@ from viewer.app.image_export import export_map, settings_of
 from viewer.app.input import Keys, Pointer, actions_from_drop, actions_from_keys, actions_from_pointer
 from viewer.background.loaded_photo import apply_depth_settings, load_photo, make_plan
 from viewer.background.scene_worker import SceneRequest, results_of
-from viewer.model.actions import AskToSave, EndGesture, MoveEye, OpenFailed, OpenPath, Redo, SceneOpened, SetFocus, Undo
+from viewer.model.actions import AskToSave, EndGesture, OpenFailed, OpenPath, Redo, SceneOpened, Undo
 from viewer.model.commands import BY_NAME, action_for_path
 from viewer.model.layout import layout_of
+from viewer.model.lens.optics import MoveEye, SetFocus
 from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.actions import EndGesture, FocusOn, MoveTiltHandle, ShowTiltHandles
+from viewer.model.actions import EndGesture, ShowTiltHandles
 from viewer.model.layout import Rect
 from viewer.model.lens.focal_plane import (
     CLOSEST_HANDLES,
@@ -20,8 +20,9 @@ from viewer.model.lens.focal_plane import (
     sharp_disparity,
     tilt_through,
 )
+from viewer.model.lens.optics import FocusOn, MoveTiltHandle, Optics
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import Optics, TiltHandles
+from viewer.model.state.app_state import TiltHandles
 
 shares = st.floats(-1, 1)
 places = st.tuples(shares, shares)

@@ -11,20 +11,16 @@ from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.model.actions import (
     Action,
     EndGesture,
-    FocusOn,
-    MoveEye,
     OpenPath,
     Redo,
     ReturnHome,
     SceneOpened,
-    SetAperture,
     SetDepthStrength,
-    SetExposure,
-    SetFocus,
     SetLoop,
     Tick,
     Undo,
 )
+from viewer.model.lens.optics import FocusOn, MoveEye, SetAperture, SetExposure, SetFocus
 from viewer.model.reducers.history import EDITS_KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Source

@@ -10,7 +10,7 @@ import pytest
 
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.actions import Action, EndGesture, MoveEye, SceneOpened, SetHover
+from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME
 from viewer.model.inspection_request import (
@@ -23,6 +23,7 @@ from viewer.model.inspection_request import (
     view_to_compare,
 )
 from viewer.model.layout import Beside, Rect, layout_of
+from viewer.model.lens.optics import MoveEye
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, ChooseTask, Hover, Scene, Source
 from viewer.model.state.inspection import (

@@ -12,35 +12,22 @@ from hypothesis import strategies as st
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import (
-    ApplyPreset,
     DismissNotice,
-    FocusOn,
-    MoveEye,
     Notify,
     OpenFailed,
     OpenPath,
     ProgressMade,
     Quit,
-    ResetOptics,
     SceneOpened,
-    SetAperture,
-    SetApertureShape,
     SetDepthStrength,
-    SetDolly,
-    SetExposure,
-    SetFocus,
-    SetFocusRange,
-    SetHighlightRecovery,
     SetHover,
     SetTheme,
-    SetTilt,
     StopWork,
     TakeSettings,
     Undo,
 )
 from viewer.model.lens.limits import (
     DEPTH_STRENGTH_LIMIT,
-    EXPOSURE_LIMIT_STOPS,
     STEEPEST_TILT,
     aperture_limit,
     dolly_limit,
@@ -50,23 +37,29 @@ from viewer.model.lens.limits import (
     is_extrapolated,
     is_finite,
 )
+from viewer.model.lens.optics import (
+    APERTURE_KINDS,
+    EXPOSURE_LIMIT_STOPS,
+    ApertureMask,
+    ApertureShape,
+    ApplyPreset,
+    FocusOn,
+    MoveEye,
+    Optics,
+    ResetOptics,
+    SetAperture,
+    SetApertureShape,
+    SetDolly,
+    SetExposure,
+    SetFocus,
+    SetFocusRange,
+    SetHighlightRecovery,
+    SetTilt,
+)
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.root import reduce
 from viewer.model.reducers.worker_events import NOTICES_KEPT
-from viewer.model.state.app_state import (
-    APERTURE_KINDS,
-    ApertureMask,
-    ApertureShape,
-    AppState,
-    Hover,
-    Notice,
-    Optics,
-    Picture,
-    Progress,
-    SavedSettings,
-    Scene,
-    Source,
-)
+from viewer.model.state.app_state import AppState, Hover, Notice, Picture, Progress, SavedSettings, Scene, Source
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)

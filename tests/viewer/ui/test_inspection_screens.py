@@ -11,9 +11,10 @@ import pytest
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import Action, MoveEye, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
+from viewer.model.actions import Action, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
 from viewer.model.inspection_request import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, Rect, layout_of
+from viewer.model.lens.optics import MoveEye
 from viewer.model.state.app_state import Hover, Notice, Theme
 from viewer.model.state.inspection import (
     OVERLAYS,

@@ -16,12 +16,9 @@ from viewer.model.actions import (
     AskForPath,
     AskToSave,
     DismissNotice,
-    MoveEye,
     Notify,
     PictureDrawn,
     ProgressMade,
-    SetAperture,
-    SetApertureShape,
     SetFontScale,
     SetHover,
     SetLoop,
@@ -31,12 +28,17 @@ from viewer.model.actions import (
     ToggleSection,
 )
 from viewer.model.layout import PANEL_WIDTH, layout_of
-from viewer.model.state.app_state import (
+from viewer.model.lens.optics import (
     APERTURE_KINDS,
-    SECTIONS,
     ApertureKind,
     ApertureMask,
     ApertureShape,
+    MoveEye,
+    SetAperture,
+    SetApertureShape,
+)
+from viewer.model.state.app_state import (
+    SECTIONS,
     AppState,
     DrawReport,
     Hover,

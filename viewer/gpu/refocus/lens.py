@@ -13,7 +13,7 @@ from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.view_sampling import UNMOVED, ApertureSample, aperture_samples
-from viewer.model.state.app_state import ApertureShape, Optics
+from viewer.model.lens.optics import Optics
 
 HIGHLIGHT_GAIN = 15.0
 """Full highlight recovery lets clipped pixels count for four stops more."""
@@ -61,7 +61,7 @@ WHOLE_PICTURE = TargetWindow(0.0, 0.0, 1.0, 1.0)
 
 @dataclass(frozen=True)
 class Lens:
-    """What the optics mean for one picture.
+    """What the optics mean for one picture. optics: as given; shaders take some of its numbers as they are.
 
     aperture_share: of the aperture sum in the picture, the rest is the pinhole pass. stride: view steps between
     samples. dolly: view steps (s, t) by which the ray crosses the grid elsewhere, per picture size. blur_px: output
@@ -70,13 +70,11 @@ class Lens:
     apart by defocus and smoothed. most_sources: stored views that a pinhole view is made of. part: what is drawn.
     """
 
+    optics: Optics
     eye: ViewOffset
     diameter: float
-    shape: ApertureShape
     stride: int
     dolly: tuple[float, float]
-    focus_disparity: float
-    focus_tilt: tuple[float, float]
     focus_range: float
     aperture_share: float
     blur_px: float
@@ -106,7 +104,7 @@ class Lens:
     def barrel(self, aspect: float) -> tuple[float, float, float]:
         """How far the barrel's opening moves across the picture (s, t), and its radius, view steps. aspect: H / W."""
         radius = self.diameter / 2
-        across = 2 * self.shape.cat_eye * radius / math.hypot(1.0, aspect)
+        across = 2 * self.optics.aperture_shape.cat_eye * radius / math.hypot(1.0, aspect)
         return across, across * aspect, radius
 
     def eye_at(self, u: float, v: float) -> ViewOffset:
@@ -126,7 +124,9 @@ class Lens:
         is_smoothed: whether these are to leave room for the smoothing, if there is any.
         """
         stride, leaves_room = self.stride * coarser, is_smoothed and self.keeps_layers
-        return aperture_samples(self.eye, self.diameter, grid, present, self.shape, stride, moved, leaves_room)
+        return aperture_samples(
+            self.eye, self.diameter, grid, present, self.optics.aperture_shape, stride, moved, leaves_room
+        )
 
 
 def lens_of(
@@ -143,13 +143,11 @@ def lens_of(
     knows_depth = bool(field.has_disparity[field.present].all())
     keeps = prefilter and knows_depth and max(blur_px, blur_px * samples_across / FADE_FROM_PX) * beside > 1.0
     return Lens(
+        optics=optics,
         eye=optics.eye,
         diameter=diameter,
-        shape=optics.aperture_shape,
         stride=stride,
         dolly=(-2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width),
-        focus_disparity=optics.focus_disparity,
-        focus_tilt=optics.focus_tilt,
         focus_range=max(optics.focus_range, 0.0),
         aperture_share=min(max(diameter - 1.0, 0.0), 1.0),
         blur_px=blur_px,

@@ -283,8 +283,8 @@ class Passes:
             view_size_px=(field.width, field.height),
             nearest=near,
             farthest=far,
-            focus_disparity=lens.focus_disparity,
-            focus_tilt=lens.focus_tilt,
+            focus_disparity=lens.optics.focus_disparity,
+            focus_tilt=lens.optics.focus_tilt,
             focus_range=lens.focus_range,
             dolly=lens.dolly,
             highlight_gain=lens.highlight_gain,
@@ -331,7 +331,7 @@ def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
     by_lens = (
         "RANGE" if lens.focus_range > 0 else "",
         "HIGHLIGHTS" if lens.highlight_gain > 0 else "",
-        "CAT_EYE" if lens.shape.kind == "cat_eye" else "",
+        "CAT_EYE" if lens.optics.aperture_shape.kind == "cat_eye" else "",
         "PART" if lens.part != WHOLE_PICTURE else "",
     )
     return tuple(str(name) for name in (*names, *by_lens) if name)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any, TypeVar
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.state.app_state import ApertureShape, Optics, Scene
+from viewer.model.lens.optics import LIMITS, ApertureShape, Optics
+from viewer.model.state.app_state import Scene
+
+Record = TypeVar("Record", Optics, ApertureShape)
 
 EYE_MARGIN_VIEWS = 0.5
 """The viewpoint may leave the grid by at least this much."""
 
-EXPOSURE_LIMIT_STOPS = 6.0
 DEPTH_STRENGTH_LIMIT = 4.0
 SPEED_LIMITS = (0.05, 1.0)
 BLADES_LIMITS = (3, 11)
-RING_INNER_LIMIT = 0.95
 STEEPEST_TILT = 4.0
 """In spans of the focus from the picture's middle to its border: for tilt handles that are close together."""
 
@@ -73,18 +75,21 @@ def aperture_limit(grid: GridShape) -> float:
 
 def is_finite(optics: Optics) -> bool:
     """Whether every number of the optics is."""
-    shape = optics.aperture_shape
-    of_optics = (optics.dolly, optics.focus_disparity, optics.focus_range, optics.aperture_diameter)
-    of_light = (optics.highlight_recovery, optics.exposure_stops)
-    of_shape = (shape.blades, shape.rotation_deg, shape.ring_inner, shape.cat_eye)
-    return all(map(math.isfinite, (*of_optics, *of_light, *of_shape, *optics.eye, *optics.focus_tilt)))
+    return all(map(math.isfinite, (*_numbers_of(optics), *_numbers_of(optics.aperture_shape))))
+
+
+def _numbers_of(record: Optics | ApertureShape) -> list[float]:
+    values = (getattr(record, field.name) for field in fields(record))
+    parts = (value if isinstance(value, tuple) else (value,) for value in values)
+    return [number for part in parts for number in part if isinstance(number, int | float)]
 
 
 def clamp_optics(optics: Optics, scene: Scene) -> Optics:
     """The nearest optics that this scene allows. All numbers must be finite."""
     span = focus_span(scene)
     tilt_x, tilt_y = (clamp(tilt, -STEEPEST_TILT * span, STEEPEST_TILT * span) for tilt in optics.focus_tilt)
-    return Optics(
+    return replace(
+        _within_limits(optics),
         eye=clamp_eye(optics.eye, scene.grid),
         dolly=clamp(optics.dolly, -dolly_limit(scene.grid), dolly_limit(scene.grid)),
         focus_disparity=clamp(optics.focus_disparity, *focus_limits(scene)),
@@ -92,17 +97,20 @@ def clamp_optics(optics: Optics, scene: Scene) -> Optics:
         focus_tilt=(tilt_x, tilt_y),
         aperture_diameter=clamp(optics.aperture_diameter, 0.0, aperture_limit(scene.grid)),
         aperture_shape=_clamp_shape(optics.aperture_shape),
-        highlight_recovery=clamp(optics.highlight_recovery, 0.0, 1.0),
-        exposure_stops=clamp(optics.exposure_stops, -EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS),
     )
 
 
 def _clamp_shape(shape: ApertureShape) -> ApertureShape:
     return replace(
-        shape,
+        _within_limits(shape),
         kind="disc" if shape.kind == "mask" and shape.mask is None else shape.kind,
         blades=round(clamp(shape.blades, *BLADES_LIMITS)),
         rotation_deg=shape.rotation_deg % 360.0 % 360.0,  # the first may round up to 360
-        ring_inner=clamp(shape.ring_inner, 0.0, RING_INNER_LIMIT),
-        cat_eye=clamp(shape.cat_eye, 0.0, 1.0),
     )
+
+
+def _within_limits(record: Record) -> Record:
+    """With every number clamped that states its limits, see `optics.within`."""
+    limited = [(field.name, field.metadata[LIMITS]) for field in fields(record) if LIMITS in field.metadata]
+    changes: dict[str, Any] = {name: clamp(getattr(record, name), *limits) for name, limits in limited}
+    return replace(record, **changes)

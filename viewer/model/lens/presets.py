@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 from viewer.model.lens.limits import aperture_limit, focus_span
-from viewer.model.state.app_state import ApertureShape, Optics, Scene
+from viewer.model.lens.optics import ApertureShape, Optics, PresetName
+from viewer.model.state.app_state import Scene
 
-PresetName = Literal["portrait", "macro", "everything sharp"]
 PRESETS: tuple[PresetName, ...] = ("portrait", "macro", "everything sharp")
 
 PORTRAIT_APERTURE = 0.6

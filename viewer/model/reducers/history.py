@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from viewer.model.state.app_state import AppState, Edit, History, Motion, Optics
+from viewer.model.lens.optics import Optics
+from viewer.model.state.app_state import AppState, Edit, History, Motion
 
 EDITS_KEPT = 200
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.types import ViewOffset
-from viewer.model.actions import (
+from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
+from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, is_finite
+from viewer.model.lens.optics import (
     ApplyPreset,
     FocusOn,
     LensAction,
     MoveEye,
     MoveTiltHandle,
+    Optics,
     ResetOptics,
     SetAperture,
     SetApertureShape,
@@ -21,10 +24,8 @@ from viewer.model.actions import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
-from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, is_finite
 from viewer.model.lens.presets import preset_optics
-from viewer.model.state.app_state import AppState, Optics, Scene, TiltHandles
+from viewer.model.state.app_state import AppState, Scene, TiltHandles
 
 
 def reduce_lens(state: AppState, action: LensAction) -> AppState:

@@ -13,10 +13,7 @@ from viewer.model.actions import (
     DismissNotice,
     DoTask,
     EndGesture,
-    FocusOn,
-    LensAction,
     MotionAction,
-    MoveEye,
     Notify,
     OpenPath,
     PauseMotion,
@@ -25,11 +22,9 @@ from viewer.model.actions import (
     PreferencesAction,
     Quit,
     Redo,
-    ResetOptics,
     ResumeWork,
     ReturnHome,
     SetDepthStrength,
-    SetDolly,
     SetFontScale,
     SetHover,
     SetLoop,
@@ -54,6 +49,7 @@ from viewer.model.lens.limits import (
     clamp_optics,
     is_finite,
 )
+from viewer.model.lens.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
 from viewer.model.reducers.camera_motion import advance_motion, glide_home, start_motion
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo

@@ -8,9 +8,15 @@ from typing import cast
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import (
-    Action,
-    DoTask,
+from viewer.model.actions import Action, DoTask, ShowTiltHandles
+from viewer.model.layout import Layout
+from viewer.model.lens.limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
+from viewer.model.lens.optics import (
+    APERTURE_KINDS,
+    EXPOSURE_LIMIT_STOPS,
+    RING_INNER_LIMIT,
+    ApertureKind,
+    ApertureShape,
     SetAperture,
     SetApertureShape,
     SetExposure,
@@ -18,16 +24,6 @@ from viewer.model.actions import (
     SetFocusRange,
     SetHighlightRecovery,
     SetTilt,
-    ShowTiltHandles,
-)
-from viewer.model.layout import Layout
-from viewer.model.lens.limits import (
-    BLADES_LIMITS,
-    EXPOSURE_LIMIT_STOPS,
-    RING_INNER_LIMIT,
-    aperture_limit,
-    focus_limits,
-    focus_span,
 )
 from viewer.model.lens.photographic_units import (
     ASSUMED_DISTANCE_M,
@@ -36,7 +32,7 @@ from viewer.model.lens.photographic_units import (
     f_number,
     relative_distance,
 )
-from viewer.model.state.app_state import APERTURE_KINDS, ApertureKind, ApertureShape, AppState, ChooseTask, Scene
+from viewer.model.state.app_state import AppState, ChooseTask, Scene
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette
 from viewer.ui.widgets import button, checkbox, choice, quiet, slider, whole_slider

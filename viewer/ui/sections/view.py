@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, PauseMotion, ReturnHome, SetDolly, SetLoop, SetSpeed
+from viewer.model.actions import Action, PauseMotion, ReturnHome, SetLoop, SetSpeed
 from viewer.model.commands import LOOP_WORDS
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import SPEED_LIMITS, dolly_limit, is_extrapolated
+from viewer.model.lens.optics import SetDolly
 from viewer.model.state.app_state import LOOPS, AppState, Scene
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
 from viewer.ui.style import Palette, pack_color

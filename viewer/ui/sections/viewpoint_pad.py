@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.actions import Action, MoveEye
+from viewer.model.actions import Action
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.limits import eye_limits, is_extrapolated
+from viewer.model.lens.optics import MoveEye
 from viewer.model.state.app_state import AppState, Scene
 from viewer.ui.style import Palette, pack_color
 
