@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
+from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
 from viewer.model.lens.optics import MoveEye, ResetOptics, SetAperture, SetFocus
 
@@ -18,7 +19,7 @@ def contact_sheet(viewer: HeadlessViewer) -> NDArray[np.uint8]:
     """Two rows of three: the viewpoint from left to right, and the focus from near to far with an open aperture."""
     scene = viewer.state.scene
     assert scene is not None
-    size = (TILE_WIDTH, max(round(TILE_WIDTH * scene.height / scene.width), 1))
+    size = ScreenSize(TILE_WIDTH, max(round(TILE_WIDTH * scene.height / scene.width), 1))
     reach = scene.grid.columns // 2
     far, near = scene.disparity_range_px
     viewpoints = [(MoveEye(ViewOffset(0, s)),) for s in (-reach, 0, reach)]

@@ -24,7 +24,7 @@ from viewer.model.inspection_request import (
     beside_of,
     make_inspection_request,
 )
-from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterbox
+from viewer.model.layout import BACKGROUND, Layout, Rect, ScreenSize, layout_of, letterbox
 from viewer.model.lens.optics import CENTRE
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Progress, Source
@@ -99,26 +99,26 @@ class HeadlessViewer:
         for action in actions:
             self.state = reduce(self.state, action)
 
-    def picture(self, size: tuple[int, int] | None = None, as_float: bool = False) -> NDArray[Any]:
+    def picture(self, size: ScreenSize | None = None, as_float: bool = False) -> NDArray[Any]:
         """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3).
 
         sRGB-encoded, uint8 or float32 with 1 = white. Raises InputError for absurd sizes.
         """
         scene = self.state.scene
         assert scene is not None
-        width, height = size or (scene.width, scene.height)
-        box = letterbox(Rect(0, 0, width, height), (scene.width, scene.height))
+        width, height = size or scene.size
+        box = letterbox(Rect(0, 0, width, height), scene.size)
         assert box is not None
         layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
         image = np.empty((height, width, 3), np.float32 if as_float else np.uint8)
         image[:] = BACKGROUND[:3] if as_float else np.round(np.array(BACKGROUND[:3]) * 255)
         assert layout.picture_px is not None
         x, y, box_width, box_height = layout.picture_px
-        pixels = render_pixels(self._scene_view, self.state, (box_width, box_height), as_float)
+        pixels = render_pixels(self._scene_view, self.state, layout.picture_px.size, as_float)
         image[y : y + box_height, x : x + box_width] = pixels
         return image
 
-    def screen(self, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
         """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
         from viewer.ui.host import UiHost  # pictures alone need no ImGui
         from viewer.ui.screen import build_screen
@@ -126,9 +126,9 @@ class HeadlessViewer:
 
         scene, preferences = self.state.scene, self.state.preferences
         look = Look(preferences.font_scale, preferences.theme)
-        picture_size = (scene.width, scene.height) if scene else None
+        picture_size = scene.size if scene else None
         layout = layout_of(size, picture_size, ui_scale=look.ui_scale, beside=beside_of(self.state))
-        has_picture = layout.picture_px and self._scene_view.converge(self.state, layout.picture_px[2:])
+        has_picture = layout.picture_px and self._scene_view.converge(self.state, layout.picture_px.size)
         texture = self._scene_view.texture if has_picture else None
         textures = self._inspected(layout) if has_picture else NO_INSPECTION_TEXTURES
         target = self._gl.ctx.simple_framebuffer(size, 4)

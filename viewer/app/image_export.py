@@ -12,6 +12,7 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.formats.files import require_folder_of
 from iibr_core.types import FloatImage, InputError
 from viewer.display.scene_view import SceneView
+from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState, SavedSettings, SaveTask
 
 SUFFIXES = (".png", ".exr")
@@ -47,7 +48,7 @@ def export_map(path: Path, values: FloatImage) -> str:
     return f"Saved {path}. {write_map(path, values)}".strip()
 
 
-def settings_of(state: AppState, size_px: tuple[int, int]) -> SavedSettings:
+def settings_of(state: AppState, size_px: ScreenSize) -> SavedSettings:
     """What it takes to take the present picture again. size_px: (width, height)."""
     assert state.source is not None
     source = replace(state.source, path="", depth=replace(state.source.depth, file=None, refine=state.depth.refine))
@@ -80,9 +81,7 @@ def is_float(path: Path) -> bool:
     return path.suffix.lower() == ".exr"
 
 
-def render_pixels(
-    scene_view: SceneView, state: AppState, size_px: tuple[int, int], as_float: bool = False
-) -> NDArray[Any]:
+def render_pixels(scene_view: SceneView, state: AppState, size_px: ScreenSize, as_float: bool = False) -> NDArray[Any]:
     """The picture with every sample it will get, (height, width, 3), sRGB-encoded: uint8, or float32 with 1 = white.
 
     Larger pictures than the graphics card can hold are drawn in parts. Raises InputError beyond MAX_PIXELS.
@@ -100,7 +99,7 @@ def _path_of(task: SaveTask, suffix: str) -> Path:
     return path if path.suffix else path.with_name(f"{path.name}{suffix}")
 
 
-def _require_size(size_px: tuple[int, int]) -> None:
+def _require_size(size_px: ScreenSize) -> None:
     width, height = size_px
     if min(size_px) < 1 or width * height > MAX_PIXELS:
         raise InputError(f"{width}x{height} px: a picture may have 1 to {MAX_PIXELS // 10**6} million pixels")

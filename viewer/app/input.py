@@ -94,7 +94,7 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
             return []
         if pointer.clicks > 1:
             return [ReturnHome()]
-        at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        at = pixel_at(picture, scene.size, pointer.x, pointer.y)
         picked = pick(*at)
         return [] if picked is None else [FocusOn(place_of(*at, scene), picked)]
     return []
@@ -120,7 +120,7 @@ def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: 
         and (is_brushing(state) or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
     )
     if scene is not None and picture is not None and is_pointing and picture.contains(pointer.x, pointer.y):
-        x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
         hover = Hover(x_px, y_px, pick(x_px, y_px))
     return [SetHover(hover)] if hover != state.hover else []
 
@@ -180,7 +180,7 @@ def _paint_actions(
     begins = pointer.is_pressed and picture.contains(pointer.pressed_x, pointer.pressed_y)
     if not pointer.is_down or not (begins or state.stroke is not None):
         return []
-    x_px, y_px = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+    x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
     disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
     x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
     return [Paint(((x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height))]
@@ -192,7 +192,7 @@ def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, pictu
         return [MoveDivider((pointer.x - picture.x) / picture.width)]
     index = _grabbed_handle(pointer, layout, state, picture)
     if index is not None:
-        at = pixel_at(picture, (scene.width, scene.height), pointer.x, pointer.y)
+        at = pixel_at(picture, scene.size, pointer.x, pointer.y)
         return [MoveTiltHandle(index, place_of(*at, scene), pick(*at))]
     return _eye_drag(pointer, layout, scene, state.optics.eye)
 

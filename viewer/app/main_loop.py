@@ -136,7 +136,7 @@ class App:
         self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
         self._preview_depth()
         layout, look = self.layout(), self.look()
-        picture = self.scene_view.draw(self.state, layout.picture_px[2:]) if layout.picture_px else None
+        picture = self.scene_view.draw(self.state, layout.picture_px.size) if layout.picture_px else None
         if picture and self.scene_view.report != self.state.report:
             self.do(PictureDrawn(self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
@@ -167,7 +167,7 @@ class App:
     def layout(self) -> Layout:
         """Where things lie in the window as it is now."""
         scene = self.state.scene
-        size = (scene.width, scene.height) if scene else None
+        size = scene.size if scene else None
         beside = beside_of(self.state)
         return layout_of(self.window.size, size, self.window.pixel_ratio, self.look().ui_scale, beside)
 

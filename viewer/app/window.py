@@ -14,6 +14,7 @@ import glfw
 
 # isort: on
 from iibr_core.types import InputError
+from viewer.model.layout import ScreenSize
 
 WINDOW_SIZE = (1280, 800)
 
@@ -50,10 +51,10 @@ class Window:
         glfw.swap_interval(1)
 
     @property
-    def size(self) -> tuple[int, int]:
+    def size(self) -> ScreenSize:
         """(width, height) in window units."""
         width, height = glfw.get_window_size(self.handle)
-        return width, height
+        return ScreenSize(width, height)
 
     @property
     def place(self) -> tuple[int, int, int, int] | None:
@@ -65,10 +66,10 @@ class Window:
         return (x, y, *self.size)
 
     @property
-    def framebuffer_size(self) -> tuple[int, int]:
+    def framebuffer_size(self) -> ScreenSize:
         """(width, height) in pixels; (0, 0) while minimised."""
         width, height = glfw.get_framebuffer_size(self.handle)
-        return width, height
+        return ScreenSize(width, height)
 
     @property
     def pixel_ratio(self) -> float:

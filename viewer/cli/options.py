@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
@@ -13,6 +13,7 @@ from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.light_fields.registry import WRITERS
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
+from viewer.model.layout import ScreenSize
 
 if TYPE_CHECKING:
     from viewer.model.state.app_state import Source
@@ -21,14 +22,7 @@ MAX_GRID = 99
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
 
-class Size(NamedTuple):
-    """Of an image, in pixels."""
-
-    width: int
-    height: int
-
-
-SCREEN_SIZE = Size(1280, 800)
+SCREEN_SIZE = ScreenSize(1280, 800)
 """Of the window in pictures, unless another is asked for."""
 
 
@@ -41,10 +35,10 @@ def grid_from_text(text: str) -> GridShape:
     return grid
 
 
-def size_from_text(text: str) -> Size:
+def size_from_text(text: str) -> ScreenSize:
     """A size from "1280x800". Raises BadParameter."""
     match = re.fullmatch(r"(\d+)x(\d+)", text.strip())
-    size = Size(int(match[1]), int(match[2])) if match else Size(0, 0)
+    size = ScreenSize(int(match[1]), int(match[2])) if match else ScreenSize(0, 0)
     if not all(1 <= side <= 16384 for side in size):
         raise typer.BadParameter(f"{text!r} is no size in pixels: give width x height, as 1280x800")
     return size

@@ -28,7 +28,6 @@ from viewer.cli.options import (
     QualityChoice,
     Refine,
     ScenePath,
-    Size,
     depth_choice,
     given_options,
     number_option,
@@ -37,6 +36,7 @@ from viewer.cli.options import (
     view_from_text,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.model.layout import ScreenSize
 
 if TYPE_CHECKING:
     from viewer.model.actions import Action
@@ -57,7 +57,7 @@ class _Shot:
 
     source: Source
     depth_strength: float
-    size: Size | None
+    size: ScreenSize | None
     edits: DepthEdits = UNEDITED
     actions: tuple[Action, ...] = ()
 
@@ -85,7 +85,7 @@ def screenshot(
     ] = None,
     aperture: Annotated[float | None, number_option("Aperture diameter in view steps.")] = None,
     size: Annotated[
-        Size | None,
+        ScreenSize | None,
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
     ] = None,
     ui: Annotated[bool, typer.Option("--ui", help="With the panels, as in the window.")] = False,
@@ -132,7 +132,7 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
     return _Shot(
         source_like(shot.source, saved, given),
         shot.depth_strength if "depth_strength" in given else saved.depth_strength,
-        shot.size or (None if ui else Size(*saved.size_px)),
+        shot.size or (None if ui else ScreenSize(*saved.size_px)),
         saved.depth_edits,
         (TakeSettings(saved),),
     )
@@ -154,4 +154,6 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> None:
             print_notes(viewer.state.scene.notes)
         viewer.do(*shot.actions)
         pixels = viewer.screen(shot.size or SCREEN_SIZE) if ui else viewer.picture(shot.size, is_float(output))
-    export_image(output, pixels, None if ui else settings_of(viewer.state, (pixels.shape[1], pixels.shape[0])))
+    export_image(
+        output, pixels, None if ui else settings_of(viewer.state, ScreenSize(pixels.shape[1], pixels.shape[0]))
+    )

@@ -35,7 +35,7 @@ from viewer.model.inspection_request import (
     sheet_cells,
     view_near,
 )
-from viewer.model.layout import Layout, Rect
+from viewer.model.layout import Layout, Rect, ScreenSize
 from viewer.model.state.app_state import AppState, Hover, Notice, Scene
 from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
 
@@ -88,11 +88,11 @@ class InspectionView:
             self._scene_view.generation, self._scene_view.views_present, exposure, self._scene_view.previews
         )
         if field.grid != scene.grid:  # only the photo's own view is there, or what is being done to its depth
-            overlay = self._overlay(state, scene, field, layout.picture_px[2:], base)
+            overlay = self._overlay(state, scene, field, layout.picture_px.size, base)
             return InspectionTextures(overlay=overlay, shown=(self._drawn["overlay"][0],) if overlay else ())
         names = self._strips(state, scene, field, layout, base)
         names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
-        names["overlay"] = self._overlay(state, scene, field, layout.picture_px[2:], base)
+        names["overlay"] = self._overlay(state, scene, field, layout.picture_px.size, base)
         names |= self._compared(state, scene, field, base)
         return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
 
@@ -167,7 +167,7 @@ class InspectionView:
         )
         for name, rect, line in lines:
             if rect is not None:
-                size_px = layout.in_pixels(rect)[2:]
+                size_px = layout.in_pixels(rect).size
                 draw = partial(self._passes.draw_epi, field, line, size_px, base.exposure)
                 names[name] = self._once(name, (base, line, size_px), draw)
         return names
@@ -175,7 +175,7 @@ class InspectionView:
     def _sheet(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int:
         """All views; those that came since the last time are added."""
         assert layout.picture is not None
-        size_px = layout.in_pixels(layout.picture)[2:]
+        size_px = layout.in_pixels(layout.picture).size
         record = base.generation, base.exposure, size_px, field.stride
         there = frozenset((int(row), int(column)) for row, column in np.argwhere(field.present))
         old = self._drawn.get("sheet")
@@ -191,7 +191,7 @@ class InspectionView:
         return name
 
     def _overlay(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, size_px: tuple[int, int], base: _ViewImage
+        self, state: AppState, scene: Scene, field: LightFieldTexture, size_px: ScreenSize, base: _ViewImage
     ) -> int | None:
         kind, optics = state.inspection.overlay, state.optics
         row, column = view_near(optics.eye, field.grid)

@@ -20,6 +20,7 @@ from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.layout import ScreenSize
 from viewer.model.lens.optics import CENTRE, Optics
 from viewer.model.state.app_state import AppState, DrawReport, Picture, Scene
 
@@ -142,7 +143,7 @@ class SceneView:
         """Disparity seen at a pixel of the picture; None where the scene has none."""
         return pick_disparity(self._disparities, eye, x_px, y_px)
 
-    def draw(self, state: AppState, size_px: tuple[int, int]) -> Picture | None:
+    def draw(self, state: AppState, size_px: ScreenSize) -> Picture | None:
         """Draw the picture this state asks for, unless it is there already; return its record, None without views."""
         if self.views_present == 0:
             return None
@@ -159,20 +160,20 @@ class SceneView:
             self._drawn = replace(wanted, samples=self._drawn.samples + 1)
         return self._drawn
 
-    def converge(self, state: AppState, size_px: tuple[int, int]) -> Picture | None:
+    def converge(self, state: AppState, size_px: ScreenSize) -> Picture | None:
         """Like `draw`, with every sample the picture will ever get, however long that takes."""
         if self.draw(state, size_px) is not None:
             self.renderer.refine()
         return self._drawn
 
-    def picture(self, state: AppState, size_px: tuple[int, int], is_linear: bool = False) -> NDArray[Any]:
+    def picture(self, state: AppState, size_px: ScreenSize, is_linear: bool = False) -> NDArray[Any]:
         """The converged picture of any size, (height, width, 3): uint8, sRGB-encoded, or float32 linear light.
 
         Before the first view it is black. The window's own picture stays.
         """
         return self.renderer.converged_picture(state.optics, size_px, is_linear)
 
-    def start_picture(self, optics: Optics, size_px: tuple[int, int], is_linear: bool) -> PictureDrawing:
+    def start_picture(self, optics: Optics, size_px: ScreenSize, is_linear: bool) -> PictureDrawing:
         """The same, to be drawn a step at a time; another one, or other views, stop it."""
         return self.renderer.start_picture(optics, size_px, is_linear)
 

@@ -13,6 +13,7 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.types import ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
+from viewer.model.layout import ScreenSize
 from viewer.model.lens.optics import Optics
 
 MAX_VIEWS = 128
@@ -71,7 +72,7 @@ class InspectionPasses:
             texture.release()
         self._textures.clear()
 
-    def draw_epi(self, field: LightFieldTexture, line: Line, size_px: tuple[int, int], exposure: float) -> int:
+    def draw_epi(self, field: LightFieldTexture, line: Line, size_px: ScreenSize, exposure: float) -> int:
         """One line of the picture in every view of a row or column. size_px: (width, height)."""
         name, switches = ("upright", ("UPRIGHT",)) if line.is_upright else ("across", ())
         program, quad = self._programs.get("epi.frag", switches)
@@ -85,7 +86,7 @@ class InspectionPasses:
         quad.render(moderngl.TRIANGLES, vertices=3)
         return texture
 
-    def start_sheet(self, size_px: tuple[int, int]) -> int:
+    def start_sheet(self, size_px: ScreenSize) -> int:
         """An empty sheet, to be filled by `draw_on_sheet`."""
         texture = self._use_image("sheet", size_px)
         self._ctx.clear(0.0, 0.0, 0.0, 1.0)
@@ -96,12 +97,12 @@ class InspectionPasses:
         _, framebuffer = self._images["sheet"]
         framebuffer.use()
         framebuffer.viewport = cell.x, cell.y, cell.width, cell.height
-        self._draw_stored(field, _layer(field, row, column), (cell.width, cell.height), exposure)
+        self._draw_stored(field, _layer(field, row, column), ScreenSize(cell.width, cell.height), exposure)
         framebuffer.viewport = (0, 0, *framebuffer.size)
 
     def draw_view(self, field: LightFieldTexture, row: int, column: int, name: str, exposure: float) -> int:
         """One stored view as it is, as the image `name`."""
-        size_px = field.width, field.height
+        size_px = ScreenSize(field.width, field.height)
         texture = self._use_image(name, size_px)
         self._draw_stored(field, _layer(field, row, column), size_px, exposure)
         return texture
@@ -114,7 +115,7 @@ class InspectionPasses:
         texture = self._ctx.texture((field.width, field.height), 3, dtype="f2" if field.hdr else "f1")
         framebuffer = self._ctx.framebuffer([texture])
         framebuffer.use()
-        self._draw_stored(field, layer, texture.size, 1.0, as_stored=True)
+        self._draw_stored(field, layer, ScreenSize(*texture.size), 1.0, as_stored=True)
         read = texture.read(alignment=1)
         self._release(texture, framebuffer)
         root = np.frombuffer(read, np.float16) if field.hdr else np.frombuffer(read, np.uint8)
@@ -125,7 +126,7 @@ class InspectionPasses:
         field: LightFieldTexture,
         optics: Optics,
         view: tuple[int, int],
-        size_px: tuple[int, int],
+        size_px: ScreenSize,
         style: OverlayStyle,
         values: NDArray[np.uint8] | None = None,
     ) -> int:
@@ -173,7 +174,7 @@ class InspectionPasses:
             point_px=(x_px, y_px),
             tolerance=SAME_SURFACE * (near - far) + SAME_SURFACE_PX,
         )
-        self._use_image("seen_in", (columns, rows))
+        self._use_image("seen_in", ScreenSize(columns, rows))
         quad.render(moderngl.TRIANGLES, vertices=3)
         read = self._images["seen_in"][1].read(components=1, alignment=1)
         return np.frombuffer(read, np.uint8).reshape(rows, columns) > 0
@@ -189,7 +190,7 @@ class InspectionPasses:
         return np.frombuffer(framebuffer.read(components=4, alignment=1), np.uint8).reshape(height, width, 4)
 
     def _draw_stored(
-        self, field: LightFieldTexture, layer: int, size_px: tuple[int, int], exposure: float, as_stored: bool = False
+        self, field: LightFieldTexture, layer: int, size_px: ScreenSize, exposure: float, as_stored: bool = False
     ) -> None:
         program, quad = self._programs.get("stored_view.frag", ("AS_STORED",) if as_stored else ())
         self._ctx.disable(moderngl.BLEND)
@@ -206,7 +207,7 @@ class InspectionPasses:
         field.colors.use(0)
         program.set_uniforms(colors=0, exposure=exposure)
 
-    def _use_image(self, name: str, size_px: tuple[int, int]) -> int:
+    def _use_image(self, name: str, size_px: ScreenSize) -> int:
         """Draw into this image from now on; a new size makes it anew."""
         if name not in self._images or self._images[name][0].size != size_px:
             self._drop(name)

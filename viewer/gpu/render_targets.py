@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import moderngl
 
+from viewer.model.layout import ScreenSize
+
 
 class RenderTarget:
     """Textures of one size that a pass draws into together."""
@@ -55,11 +57,11 @@ class RenderTargets:
     spans: where searches begin and end. image: the finished picture, RGBA8, rows bottom-up.
     """
 
-    def __init__(self, ctx: moderngl.Context, size_px: tuple[int, int], tile_px: int) -> None:
+    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, tile_px: int) -> None:
         self._ctx = ctx
         width, height = self.size_px = size_px
-        half = (width + 1) // 2, (height + 1) // 2
-        tiles = -(-width // tile_px), -(-height // tile_px)
+        half = ScreenSize((width + 1) // 2, (height + 1) // 2)
+        tiles = ScreenSize(-(-width // tile_px), -(-height // tile_px))
         self.image = RenderTarget(ctx, [ctx.texture(size_px, 4)])
         self.light = RenderTarget(ctx, [_light(ctx, size_px)])
         self.blurred = RenderTarget(ctx, [_light(ctx, half), _light(ctx, half), _light(ctx, half, 2)])
@@ -83,7 +85,7 @@ def unbind(ctx: moderngl.Context) -> None:
     ctx.detect_framebuffer(0).use()
 
 
-def _light(ctx: moderngl.Context, size_px: tuple[int, int], components: int = 4) -> moderngl.Texture:
+def _light(ctx: moderngl.Context, size_px: ScreenSize, components: int = 4) -> moderngl.Texture:
     texture = ctx.texture(size_px, components, dtype="f4")
     texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = False

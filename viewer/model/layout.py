@@ -6,11 +6,35 @@ Window units are GLFW's screen coordinates (ImGui's too), y down; a framebuffer 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0
 """Behind the picture, where the theme is dark."""
 PANEL_WIDTH = 300.0
 MARGIN = 12.0
+
+
+class ScreenSize(NamedTuple):
+    """Width and height in pixels: the order of GL, GLFW and ImGui. Images have an `ImageSize`; no type checker lets
+    one pass for the other.
+    """
+
+    width: int
+    height: int
+
+
+class PixelRect(NamedTuple):
+    """A part of the framebuffer; y down."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def size(self) -> ScreenSize:
+        """Of the part."""
+        return ScreenSize(self.width, self.height)
 
 
 @dataclass(frozen=True)
@@ -64,20 +88,20 @@ class Layout:
     status: Rect | None = None
 
     @property
-    def picture_px(self) -> tuple[int, int, int, int] | None:
-        """(x, y, width, height) of the picture in framebuffer pixels, y counted from the top."""
+    def picture_px(self) -> PixelRect | None:
+        """The picture in framebuffer pixels, y counted from the top."""
         return None if self.picture is None else self.in_pixels(self.picture)
 
-    def in_pixels(self, rect: Rect) -> tuple[int, int, int, int]:
-        """(x, y, width, height) of a rectangle in framebuffer pixels, at least one each way."""
+    def in_pixels(self, rect: Rect) -> PixelRect:
+        """A rectangle in framebuffer pixels, at least one each way."""
         x, y = round(rect.x * self.pixel_ratio), round(rect.y * self.pixel_ratio)
         width, height = round(rect.width * self.pixel_ratio), round(rect.height * self.pixel_ratio)
-        return x, y, max(width, 1), max(height, 1)
+        return PixelRect(x, y, max(width, 1), max(height, 1))
 
 
 def layout_of(
-    window_size: tuple[int, int],
-    picture_size: tuple[int, int] | None,
+    window_size: ScreenSize,
+    picture_size: ScreenSize | None,
     pixel_ratio: float = 1.0,
     ui_scale: float = 1.0,
     beside: Beside = NOTHING_BESIDE,
@@ -114,7 +138,7 @@ def _thickness(views: int, ui_scale: float) -> float:
     return min(max(views * STRIP_UNITS_PER_VIEW, LEAST_STRIP), MOST_STRIP) * ui_scale if views else 0.0
 
 
-def letterbox(room: Rect, picture_size: tuple[int, int]) -> Rect | None:
+def letterbox(room: Rect, picture_size: ScreenSize) -> Rect | None:
     """The largest rectangle of the picture's shape centred in the room; None where there is no room."""
     width, height = picture_size
     scale = min(room.width / width, room.height / height)
@@ -125,7 +149,7 @@ def letterbox(room: Rect, picture_size: tuple[int, int]) -> Rect | None:
     return Rect(x, y, width * scale, height * scale)
 
 
-def pixel_at(picture: Rect, picture_size: tuple[int, int], x: float, y: float) -> tuple[float, float]:
+def pixel_at(picture: Rect, picture_size: ScreenSize, x: float, y: float) -> tuple[float, float]:
     """Pixel coordinates in the picture (centres at integers) of a window position. picture_size is (width, height)."""
     width, height = picture_size
     return (x - picture.x) / picture.width * width - 0.5, (y - picture.y) / picture.height * height - 0.5

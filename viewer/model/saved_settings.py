@@ -16,6 +16,7 @@ import msgspec
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
 from iibr_core.types import GridShape, InputError, Quality
+from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import BLADES_LIMITS
 from viewer.model.lens.optics import ApertureShape, Optics
 from viewer.model.state.app_state import SavedSettings, Source
@@ -95,7 +96,7 @@ def settings_from_text(text: str, name: str) -> SavedSettings:
         ) from error
     unknown = tuple(dict.fromkeys(_unknown_fields(whole, msgspec.to_builtins(read))))
     source = _source_from_text(Source(""), read.source)
-    return SavedSettings(read.optics, read.depth_strength, source, read.size_px, read.depth_edits, unknown)
+    return SavedSettings(read.optics, read.depth_strength, source, ScreenSize(*read.size_px), read.depth_edits, unknown)
 
 
 def read_settings(path: Path) -> SavedSettings:

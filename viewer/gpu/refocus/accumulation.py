@@ -17,6 +17,7 @@ from viewer.gpu.refocus.lens import WHOLE, Lens, PictureCell
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
 from viewer.gpu.refocus.view_sampling import ApertureSample, clamp_to_grid, nearest_present
 from viewer.gpu.render_targets import RenderTarget, RenderTargets
+from viewer.model.layout import ScreenSize
 
 MAX_PASSES = 16
 """A still picture is the mean of at most so many passes, each with its samples elsewhere."""
@@ -40,7 +41,7 @@ class ProgressiveAccumulation:
     """
 
     lens: Lens
-    size_px: tuple[int, int]
+    size_px: ScreenSize
     places: tuple[ViewOffset, ...]
     samples: list[ApertureSample] = dataclass_field(default_factory=list)
     sparse: dict[ViewOffset, float] = dataclass_field(default_factory=dict)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.gpu.refocus.view_sampling import MAX_SOURCES
+from viewer.model.layout import ScreenSize
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ LATEST_COUNTS = 0.4
 """How much the latest measurement counts against those before."""
 
 
-def stretch_image(image: NDArray[np.uint8], size_px: tuple[int, int]) -> NDArray[np.uint8]:
+def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize) -> NDArray[np.uint8]:
     """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it."""
     rows, columns = (_taps(there, here) for there, here in zip(size_px[::-1], image.shape))
     light = image.astype(np.float32)

@@ -32,13 +32,12 @@ from viewer.gpu.refocus.lens import lens_of
 from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.refocus.picture_drawing import PictureDrawing, read_pixels
 from viewer.gpu.render_targets import RenderTargets
+from viewer.model.layout import ScreenSize
 from viewer.model.lens.optics import Optics
 from viewer.model.state.app_state import DrawReport
 
 KEPT_SIZES = 2
 """Of the picture: one drawn in a hurry is smaller than the one that follows it."""
-
-Size = tuple[int, int]
 
 
 class Renderer:
@@ -59,7 +58,7 @@ class Renderer:
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self.adaptive = adaptive
-        self._targets: dict[Size, RenderTargets] = {}
+        self._targets: dict[ScreenSize, RenderTargets] = {}
         self._shown: RenderTargets | None = None
         self._accumulation: ProgressiveAccumulation | None = None
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
@@ -101,7 +100,7 @@ class Renderer:
     def render(
         self,
         optics: Optics,
-        size_px: Size,
+        size_px: ScreenSize,
         framebuffer: moderngl.Framebuffer | None = None,
         level: QualityLevel = BEST_QUALITY,
     ) -> None:
@@ -116,7 +115,7 @@ class Renderer:
         self._finish(framebuffer)
         self._errors.begin(level)
 
-    def render_in_time(self, optics: Optics, size_px: Size, budget_s: float) -> None:
+    def render_in_time(self, optics: Optics, size_px: ScreenSize, budget_s: float) -> None:
         """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
 
         Its own image may then be smaller than size_px.
@@ -159,7 +158,7 @@ class Renderer:
             self._errors.add(self.read_image(), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
-    def start_picture(self, optics: Optics, size_px: Size, is_linear: bool) -> PictureDrawing:
+    def start_picture(self, optics: Optics, size_px: ScreenSize, is_linear: bool) -> PictureDrawing:
         """A picture with every sample it will get, of any size, to be drawn step by step; one at a time.
 
         is_linear: float32 linear light, not cut off at white; else sRGB-encoded uint8. What was drawn last stays as it
@@ -172,7 +171,7 @@ class Renderer:
         self._picture = PictureDrawing(self.gl, accumulator, self._open_field(), whole, is_linear)
         return self._picture
 
-    def converged_picture(self, optics: Optics, size_px: Size, is_linear: bool) -> NDArray[np.uint8 | np.float32]:
+    def converged_picture(self, optics: Optics, size_px: ScreenSize, is_linear: bool) -> NDArray[np.uint8 | np.float32]:
         """The picture of `start_picture`, (height, width, 3), at once."""
         drawing = self.start_picture(optics, size_px, is_linear)
         drawing.advance()
@@ -241,7 +240,7 @@ class Renderer:
             raise ValueError("no light field is open")
         return self.field
 
-    def _targets_of(self, size_px: Size) -> RenderTargets:
+    def _targets_of(self, size_px: ScreenSize) -> RenderTargets:
         """Those of this size; beside them only the ones that were asked for last are kept."""
         targets = self._targets.pop(size_px, None) or RenderTargets(self.ctx, size_px, TILE_PX)
         while len(self._targets) >= KEPT_SIZES:
@@ -251,7 +250,7 @@ class Renderer:
         self._targets[size_px] = targets
         return targets
 
-    def _accumulation_of(self, optics: Optics, size_px: Size, level: QualityLevel) -> ProgressiveAccumulation:
+    def _accumulation_of(self, optics: Optics, size_px: ScreenSize, level: QualityLevel) -> ProgressiveAccumulation:
         field = self._open_field()
         lens = lens_of(optics, field, size_px[0], self.prefilter, level)
         count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
@@ -273,7 +272,7 @@ class Renderer:
             self._picture.stop()
             self._picture = None
 
-    def _work(self, optics: Optics, size_px: Size, level: QualityLevel) -> DrawCost:
+    def _work(self, optics: Optics, size_px: ScreenSize, level: QualityLevel) -> DrawCost:
         field = self._open_field()
         lens = lens_of(optics, field, round(size_px[0] * level.scale), self.prefilter, level)
         samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []
@@ -290,9 +289,10 @@ class Renderer:
         self.report = DrawReport(samples, in_all, 1e3 * seconds, self._errors.estimate)
 
 
-def scale_size(size_px: Size, scale: float) -> Size:
+def scale_size(size_px: ScreenSize, scale: float) -> ScreenSize:
     """That size times scale, at least one pixel."""
-    return max(round(size_px[0] * scale), 1), max(round(size_px[1] * scale), 1)
+    width, height = size_px
+    return ScreenSize(max(round(width * scale), 1), max(round(height * scale), 1))
 
 
 def _field_that_fits(

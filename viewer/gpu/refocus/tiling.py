@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 
+from viewer.model.layout import ScreenSize
+
 PART_PX = 2048
 """A part is no larger than this: its targets take about 50 bytes a pixel."""
 
@@ -24,7 +26,7 @@ class PictureTile:
     """
 
     first_px: tuple[int, int]
-    size_px: tuple[int, int]
+    size_px: ScreenSize
     kept_from_px: tuple[int, int]
     kept_to_px: tuple[int, int]
     window: tuple[float, float, float, float]
@@ -41,7 +43,7 @@ class PictureTile:
         return slice(top - y, bottom - y), slice(left - x, right - x)
 
 
-def picture_tiles(size_px: tuple[int, int], largest_px: int) -> list[PictureTile]:
+def picture_tiles(size_px: ScreenSize, largest_px: int) -> list[PictureTile]:
     """Parts that together are kept as the whole picture, each at most largest_px wide and high.
 
     size_px: (width, height). A picture that can be drawn at once is one part, without margins.
@@ -53,7 +55,7 @@ def picture_tiles(size_px: tuple[int, int], largest_px: int) -> list[PictureTile
     return [
         PictureTile(
             (x, y),
-            (drawn_x, drawn_y),
+            ScreenSize(drawn_x, drawn_y),
             (from_x, from_y),
             (to_x, to_y),
             (x / width, y / height, drawn_x / width, drawn_y / height),

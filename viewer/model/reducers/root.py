@@ -134,8 +134,7 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case AskForPath(what):
             return replace(state, prompt=PathPrompt(what))
         case AskToSave(what) if state.scene is not None and (what == "picture" or state.scene.plan is not None):
-            size_px = state.scene.width, state.scene.height
-            return replace(state, prompt=SavePrompt(_path_beside(state, what), size_px, what=what))
+            return replace(state, prompt=SavePrompt(_path_beside(state, what), state.scene.size, what=what))
         case PictureDrawn(report):
             return replace(state, report=report)
         case SavingChanged(saving):

@@ -13,6 +13,7 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
+from viewer.model.layout import ScreenSize
 from viewer.model.lens.optics import CENTRE, Optics
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.inspection import Inspection
@@ -88,6 +89,11 @@ class Scene:
     levels: Levels | None = None
     depth_models: tuple[str, ...] = ()
 
+    @property
+    def size(self) -> ScreenSize:
+        """Of a view, as it is drawn."""
+        return ScreenSize(self.width, self.height)
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -109,7 +115,7 @@ class SavedSettings:
     optics: Optics
     depth_strength: float
     source: Source
-    size_px: tuple[int, int]
+    size_px: ScreenSize
     depth_edits: DepthEdits = UNEDITED
     unknown_fields: tuple[str, ...] = ()
 
@@ -213,7 +219,7 @@ class SavePrompt:
     """The question where to save the picture, and how large, or its disparity map. already_there: there is one."""
 
     path: str
-    size_px: tuple[int, int]
+    size_px: ScreenSize
     already_there: bool = False
     what: Saved = "picture"
 
@@ -240,7 +246,7 @@ class SaveTask:
     """Write the picture, or its disparity map. size_px: (width, height)."""
 
     path: str
-    size_px: tuple[int, int]
+    size_px: ScreenSize
     may_replace: bool = False
     what: Saved = "picture"
 
@@ -336,6 +342,6 @@ class Picture:
     generation: int
     views_present: int
     optics: Optics
-    size_px: tuple[int, int]
+    size_px: ScreenSize
     samples: int = 0
     previews: int = 0

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from viewer.model.actions import Action, DoTask, ShowPrompt
 from viewer.model.commands import COMMANDS, action_for_path, commands_matching
-from viewer.model.layout import Layout
+from viewer.model.layout import Layout, ScreenSize
 from viewer.model.state.app_state import AppState, PalettePrompt, PathPrompt, Prompt, SavePrompt, SaveTask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
@@ -106,7 +106,8 @@ def _size_rows(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePromp
     changed, width = imgui.input_int("##width", prompt.size_px[0], 0, 0)
     if changed and state.scene is not None:
         width = min(max(width, 1), LARGEST_SIDE)
-        prompt = replace(prompt, size_px=(width, max(round(width * state.scene.height / state.scene.width), 1)))
+        height = max(round(width * state.scene.height / state.scene.width), 1)
+        prompt = replace(prompt, size_px=ScreenSize(width, height))
     label("Height", layout)
     imgui.align_text_to_frame_padding()
     imgui.text(str(prompt.size_px[1]))
