@@ -138,5 +138,5 @@ class PictureSaver:
             return None
         drawn = float(self._is_writing)
         if self._drawing is not None:
-            drawn = int(100 * self._drawing.progress) / 100
+            drawn = min(int(100 * self._drawing.progress), 99) / 100
         return Saving(self._requests[0].path.name, drawn, len(self._requests) - 1)

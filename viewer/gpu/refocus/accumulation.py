@@ -89,7 +89,7 @@ def r2_sequence(count: int) -> list[ViewOffset]:
 HIGHLIGHT_SPREAD = 2.0
 """Samples of many passes lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""
 
-PINHOLE_SAMPLES = 8
+PINHOLE_SAMPLES = 24
 """What the pinhole view costs a pixel, in samples of the aperture, about: it searches."""
 
 LEAST_ROWS = 16

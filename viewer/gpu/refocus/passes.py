@@ -84,7 +84,7 @@ class Passes:
             target.framebuffer.scissor = _pixels_of(drawn, *size_px)
             target.add(keeps)
             for kind in kinds:
-                self._draw_pinhole_tiles(field, lens, cell, within_px, targets, layer, kind)
+                self._draw_pinhole_tiles(field, lens, cell, drawn, within_px, targets, layer, kind)
         target.framebuffer.scissor = 0, 0, *size_px
 
     def _draw_pinhole_tiles(
@@ -92,12 +92,13 @@ class Passes:
         field: LightFieldTexture,
         lens: Lens,
         cell: PictureCell,
+        drawn: PictureCell,
         within_px: ViewOffset,
         targets: RenderTargets,
         layer: str,
         kind: str,
     ) -> None:
-        """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES"."""
+        """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES". drawn: what of it is asked for."""
         program, quad = self._programs.get("pinhole.frag", _switches(lens, layer, lens.has_dolly and "DOLLY", kind))
         target = _target_of(layer, targets)
         width, height = target.framebuffer.size
@@ -111,8 +112,13 @@ class Passes:
             for unit, (name, texture) in enumerate(zip(SPANS, targets.spans.textures), start=len(UNITS)):
                 texture.use(unit)
                 program.set_uniform(name, unit)
-        tiles = math.prod(targets.spans.framebuffer.size)
-        quad.render(moderngl.TRIANGLES, vertices=6 * tiles if kind else 3)
+        if not kind:
+            quad.render(moderngl.TRIANGLES, vertices=3)
+            return
+        across, down = targets.spans.framebuffer.size
+        # A row of tiles more at either end: rounding must not decide which are there; the scissor cuts them off.
+        first, last = max(math.floor(drawn.top * down) - 1, 0), min(math.ceil(drawn.bottom * down) + 1, down)
+        quad.render(moderngl.TRIANGLES, vertices=6 * across * (last - first), first=6 * across * first)
 
     def _find_march_intervals(
         self, field: LightFieldTexture, lens: Lens, cell: PictureCell, drawn: PictureCell, targets: RenderTargets

@@ -19,7 +19,7 @@ from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.refocus.tiling import PictureTile, picture_tiles
 from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind
 
-STEP_S = 0.008
+STEP_S = 0.005
 """What a step is meant to take: a hand that drags waits for no more than one of them."""
 
 Pixels = NDArray[np.uint8 | np.float32]
