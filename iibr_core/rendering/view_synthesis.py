@@ -161,7 +161,7 @@ class ViewSynthesis:
         inner = slice(above, above + rows[1] - rows[0])
         raise_if_stopped(self._should_stop)
         if self._transformer:
-            colors, disparity, source = self._decided(rays, candidates, weights, inner)
+            colors, disparity, source = self._resample_with_transformer(rays, candidates, weights, inner)
         else:
             colors, disparity, source = resample_colors(rays, candidates, weights)
         shown = slice(*rows)
@@ -171,7 +171,7 @@ class ViewSynthesis:
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
 
-    def _decided(
+    def _resample_with_transformer(
         self, rays: RaySet, candidates: Candidates, weights: FloatImage, inner: slice
     ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
         """What `resample_colors` gives for the inner rows, but what ambiguous rays show is the transformer's choice."""

@@ -55,7 +55,7 @@ class LabelledRays(NamedTuple):
     truth: FloatImage
 
 
-def _as_found(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
+def _identity(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
     return ambiguous
 
 
@@ -69,7 +69,7 @@ class RayChoice:
 
     hypotheses: int = HYPOTHESES
     inpainted: bool = True
-    describe: Callable[[RaySet, AmbiguousRays], AmbiguousRays] = _as_found
+    describe: Callable[[RaySet, AmbiguousRays], AmbiguousRays] = _identity
 
 
 AS_RENDERED = RayChoice()

@@ -221,7 +221,7 @@ class _Run:
         values = torch.stack([*losses, norm]).tolist()
         for name, value in zip(LOG_COLUMNS[1:], values):
             if not isfinite(value):
-                raise self._diverged(name, step)
+                raise self._divergence(name, step)
         for group in self.optimizer.param_groups:
             group["lr"] = rate
         self.optimizer.step()
@@ -241,7 +241,7 @@ class _Run:
             tensors |= {f"optimizer.{index}.{name}": state[name] for name in ADAM_STATE}
         for name, tensor in tensors.items():
             if not torch.isfinite(tensor).all():
-                raise self._diverged(name, self.step)
+                raise self._divergence(name, self.step)
         about = {"step": str(self.step), "seconds": repr(self._seconds()), "config": json.dumps(asdict(self.config))}
         with _defer_interrupts():
             write_tensors(self.checkpoint, CHECKPOINT, tensors, about)
@@ -286,7 +286,7 @@ class _Run:
     def _seconds(self) -> float:
         return self.seconds_before + perf_counter() - self.started
 
-    def _diverged(self, what: str, step: int) -> TrainingDiverged:
+    def _divergence(self, what: str, step: int) -> TrainingDiverged:
         kept = f"{self.checkpoint} keeps step {self.saved_step}" if self.saved_step else "no checkpoint was written yet"
         return TrainingDiverged(what, step, kept)
 

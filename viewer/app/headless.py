@@ -1,4 +1,4 @@
-"""The viewer without a window: the same worker's job, state, scene_view and panels, drawn into an image."""
+"""The viewer without a window: the same worker's job, state, views and panels, drawn into an image."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class HeadlessViewer:
         layout = layout_of(size, picture_size, ui_scale=look.ui_scale, beside=beside_of(self.state))
         has_picture = layout.picture_px and self._scene_view.converge(self.state, layout.picture_px.size)
         texture = self._scene_view.texture if has_picture else None
-        textures = self._inspected(layout) if has_picture else NO_INSPECTION_TEXTURES
+        textures = self._draw_inspection(layout) if has_picture else NO_INSPECTION_TEXTURES
         target = self._gl.ctx.simple_framebuffer(size, 4)
         ui = UiHost(look)
         try:
@@ -146,7 +146,7 @@ class HeadlessViewer:
             target.release()
         return rows.reshape(size[1], size[0], 3)[::-1]
 
-    def _inspected(self, layout: Layout) -> InspectionTextures:
+    def _draw_inspection(self, layout: Layout) -> InspectionTextures:
         """What inspection shows, worked out to the end. The pointer is where the state says."""
         request = make_inspection_request(self.state, is_moving=False, before=None)
         inputs = self._inspection_view.inputs(request, self.state)

@@ -98,7 +98,7 @@ def apply_depth_settings(
         return loaded
     if loaded.depth_settings.refine != depth_settings.refine:
         loaded = _refine(loaded, depth_settings.refine, should_stop)
-    values = loaded.canvas.shown(depth_settings.edits)
+    values = loaded.canvas.apply(depth_settings.edits)
     return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
 
 
@@ -127,7 +127,7 @@ def prepare_brush() -> None:
     from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 
     strokes = tuple(Stroke(tool, ((0.5, 0.5),), 0.1, 0.5) for tool in BRUSH_TOOLS)
-    DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).shown(DepthEdits(strokes=strokes))
+    DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).apply(DepthEdits(strokes=strokes))
 
 
 def _prepare(

@@ -49,7 +49,7 @@ class DepthPreview:
 
         assert scene.plan is not None
         self._canvas = self._canvas or DepthCanvas(loaded.photo.pixels, loaded.refined.values)
-        values = self._canvas.shown(edits)
+        values = self._canvas.apply(edits)
         if self._still is None or self._still[0] != edits.tone:
             self._still = edits.tone, still_disparity(scene.source, self._canvas.before_strokes(edits))
         scale = scene.plan.disparity_scale or 1.0  # a flat scene that is being painted on has none yet

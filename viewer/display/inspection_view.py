@@ -93,7 +93,7 @@ class InspectionView:
         names = self._strips(state, scene, field, layout, base)
         names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
         names["overlay"] = self._overlay(state, scene, field, layout.picture_px.size, base)
-        names |= self._compared(state, scene, field, base)
+        names |= self._comparison_images(state, scene, field, base)
         return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
 
     def probe(self, state: AppState) -> Probe | None:
@@ -109,7 +109,7 @@ class InspectionView:
             self._scene_view.report,
         )
         if self._probed[0] != asked:
-            self._probed = asked, self._found_at(hover, state, scene, field)
+            self._probed = asked, self._probe_at(hover, state, scene, field)
         return self._probed[1]
 
     def inputs(self, request: InspectionRequest | None, state: AppState) -> ComparisonInputs | None:
@@ -226,7 +226,7 @@ class InspectionView:
             return np.zeros((field.height, field.width), np.uint8)
         return np.unpackbits(packed, axis=1, count=field.width) * np.uint8(255)
 
-    def _compared(
+    def _comparison_images(
         self, state: AppState, scene: Scene, field: LightFieldTexture, base: _ViewImage
     ) -> dict[str, int | None]:
         kind, pair = state.inspection.comparison, self._pair
@@ -239,7 +239,7 @@ class InspectionView:
         right = self._once("right", (pair.request, "right"), lambda: self._passes.show("right", pair.right))
         return {"left": left, "right": right}
 
-    def _found_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
+    def _probe_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
         seen = None
         if hover.disparity is not None and field.has_disparity.any():
             shows = self._passes.seen_in(field, state.optics.eye, hover.x_px, hover.y_px, hover.disparity)

@@ -159,7 +159,7 @@ class ProgramCache:
         """The program of a pass with these defines, and what to draw it with. Raises ShaderError."""
         key = fragment, switches
         if key not in self._programs:
-            self._programs[key] = self._compiled(fragment, switches)
+            self._programs[key] = self._compile(fragment, switches)
         return self._programs[key]
 
     def release(self) -> None:
@@ -169,6 +169,6 @@ class ProgramCache:
             program.release()
         self._programs.clear()
 
-    def _compiled(self, fragment: str, switches: tuple[str, ...]) -> tuple[Program, moderngl.VertexArray]:
+    def _compile(self, fragment: str, switches: tuple[str, ...]) -> tuple[Program, moderngl.VertexArray]:
         program = load_program(self._ctx, "fullscreen.vert", fragment, dict.fromkeys(switches, 1))
         return program, self._ctx.vertex_array(program.program, [])

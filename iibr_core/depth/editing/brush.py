@@ -48,7 +48,7 @@ def apply_edits(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> 
     photo: (H, W, 3), sRGB-encoded, guides the strokes. disparity: (H, W), any unit in which larger is closer.
     Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known.
     """
-    return DepthCanvas(photo, disparity).shown(edits)
+    return DepthCanvas(photo, disparity).apply(edits)
 
 
 class DepthCanvas:
@@ -71,7 +71,7 @@ class DepthCanvas:
         self._open: _OpenStroke | None = None
         self._trail: list[tuple[int, FloatImage]] = []  # (strokes, map) before the last ones, to go back to
 
-    def shown(self, edits: DepthEdits) -> FloatImage:
+    def apply(self, edits: DepthEdits) -> FloatImage:
         """The map with these edits, (H, W) float32; not to be written to. Raises InputError as `apply_edits` does."""
         if edits == UNEDITED and self._is_known:
             return self._given
@@ -87,7 +87,7 @@ class DepthCanvas:
 
     def before_strokes(self, edits: DepthEdits) -> FloatImage:
         """The map without the strokes of these edits: what stays as it is where the brush does not go."""
-        self.shown(edits)
+        self.apply(edits)
         return self._given if self._toned is None else self._toned
 
     def _forget(self, edits: DepthEdits) -> None:

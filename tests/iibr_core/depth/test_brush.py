@@ -177,10 +177,10 @@ def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdi
             DepthEdits(one.is_inverted, gamma=one.gamma, strokes=one.strokes[:-1]),
         ]
         for step in steps:
-            shown = canvas.shown(step)
+            shown = canvas.apply(step)
             before = shown.copy()
             np.testing.assert_array_equal(shown, apply_edits(photo, plane(), step))
-            canvas.shown(one)
+            canvas.apply(one)
             np.testing.assert_array_equal(shown, before, "what was handed out must not change")
 
 
@@ -188,7 +188,7 @@ def test_the_map_before_strokes_is_not_painted() -> None:
     photo, disparity = plain_photo(), plane()
     canvas = DepthCanvas(photo, disparity)
     np.testing.assert_array_equal(canvas.before_strokes(DepthEdits(strokes=(dab(),))), disparity)
-    assert canvas.shown(UNEDITED) is disparity
+    assert canvas.apply(UNEDITED) is disparity
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)

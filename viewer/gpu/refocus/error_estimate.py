@@ -22,7 +22,7 @@ class ErrorEstimate:
         self._by_level: dict[Hashable, float] = {}
 
     def begin(self, level: Hashable) -> None:
-        """A picture was drawn in this level."""
+        """A picture was drawn at this level."""
         self._level, self._hurried, self._latest = level, None, None
         self.estimate = self._by_level.get(level)
 

@@ -22,7 +22,7 @@ FADE_FROM_PX, FADE_TO_PX = 4.0, 6.0
 """Over these widths of the whole blur, light moves from the sharp layer to those of half the size."""
 
 LEAST_ACROSS = 2.0
-"""Samples across the aperture, at least, however great the level."""
+"""Samples across the aperture, at least, however low the quality."""
 
 SPARSE_UP_TO_PX = 1.2
 """As long as the whole blur of a tile is narrower, every other sample across and down shows the same."""
@@ -48,7 +48,7 @@ class TargetWindow(NamedTuple):
     width: float
     height: float
 
-    def seen(self, cell: PictureCell) -> PictureCell:
+    def in_target(self, cell: PictureCell) -> PictureCell:
         """A part of the picture in texture coordinates of the targets, as far as they hold it."""
         x = ((edge - self.left) / self.width for edge in (cell.left, cell.right))
         y = ((edge - self.top) / self.height for edge in (cell.top, cell.bottom))

@@ -76,7 +76,7 @@ class Passes:
         target = _target_of(layer, targets)
         size_px = target.framebuffer.size
         for cell in _cells(field, lens):
-            drawn = _rows_of(lens.part.seen(cell), rows)
+            drawn = _rows_of(lens.part.in_target(cell), rows)
             if drawn is None:
                 continue
             if "FLAT" in kinds:
