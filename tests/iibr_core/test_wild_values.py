@@ -289,7 +289,7 @@ READS_OR_TELLS = {
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
-    "formats.files": "reason_of temporary_sibling atomic_write require_file open_binary refuse_bomb",
+    "formats.files": "reason_of require_folder_of temporary_sibling atomic_write require_file open_binary refuse_bomb",
     "formats.light_fields.numbered_grid": "read_numbered_grid",
     "formats.light_fields.hci": "read_hci HciWriter",
     "formats.images.heic": "is_heic read_heic read_heic_depth",
@@ -319,7 +319,7 @@ READS_OR_TELLS = {
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "rendering.view_synthesis": "ViewSynthesis",
-    "types": "ViewOffset GridShape ImageSize image_size InputError",
+    "types": "ViewOffset GridShape ImageSize image_size ignore_progress InputError",
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 

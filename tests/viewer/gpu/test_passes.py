@@ -121,7 +121,9 @@ def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targ
         _, disparity = SCENE.view(sample.wanted)
         y, x = np.indices(disparity.shape) + 0.5
         shifted = looked_up(
-            disparity, x - wide.focus_disparity * sample.wanted.s, y - wide.focus_disparity * sample.wanted.t
+            disparity,
+            x - wide.optics.focus_disparity * sample.wanted.s,
+            y - wide.optics.focus_disparity * sample.wanted.t,
         )
         beside = (shifted - 1.0).reshape(rows, TILE_PX, columns, TILE_PX)
         widest[..., 0] = np.maximum(widest[..., 0], beside.max((1, 3)))
