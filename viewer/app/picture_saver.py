@@ -25,11 +25,11 @@ from viewer.model.state.saving import Saving, SavingChanged
 
 @dataclass(frozen=True, eq=False)
 class PictureRequest:
-    """A picture as it was asked for. generation: of the views that it is drawn from."""
+    """A picture as it was asked for. views: what it is drawn from, see `_views_of`."""
 
     path: Path
     settings: SavedSettings
-    generation: int
+    views: tuple[int, int]
 
 
 class PictureSaver:
@@ -62,7 +62,7 @@ class PictureSaver:
         except InputError as error:
             return [Notify(Notice(str(error), is_error=True))]
         settings = settings_of(state, task.size_px)
-        self._requests.append(PictureRequest(path, settings, self._scene_view.generation))
+        self._requests.append(PictureRequest(path, settings, _views_of(self._scene_view)))
         return []
 
     def cancel(self) -> None:
@@ -88,7 +88,7 @@ class PictureSaver:
         self._writer.close(cancels=False)
 
     def _draw(self, request: PictureRequest, budget_s: float) -> list[Action]:
-        if self._scene_view.generation != request.generation:
+        if _views_of(self._scene_view) != request.views:
             return self._fail(f"{request.path}: not saved, for what it shows was changed meanwhile; save it again")
         settings = request.settings
         try:
@@ -140,3 +140,8 @@ class PictureSaver:
         if self._drawing is not None:
             drawn = min(int(100 * self._drawing.progress), 99) / 100
         return Saving(self._requests[0].path.name, drawn, len(self._requests) - 1)
+
+
+def _views_of(scene_view: SceneView) -> tuple[int, int]:
+    """Which views there are: of which generation, and how often edited depth was shown in their place."""
+    return scene_view.generation, scene_view.previews

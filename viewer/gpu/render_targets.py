@@ -71,6 +71,10 @@ class RenderTargets:
         self.wide_tiles = RenderTarget(ctx, [_light(ctx, tiles)])
         self.spans = RenderTarget(ctx, [_light(ctx, tiles) for _ in range(2)])
 
+    def of_layer(self, layer: str) -> RenderTarget:
+        """Where a layer is summed up: "BLURRED", or "SHARP" or "" for all light."""
+        return self.blurred if layer == "BLURRED" else self.light
+
     def release(self) -> None:
         """Free framebuffers and textures."""
         unbind(self._ctx)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 from iibr_core.color import srgb_from_linear
 from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.conftest import HEIGHT, WIDTH
+from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import (
     AlreadyThereError,
@@ -22,9 +23,12 @@ from viewer.app.image_export import (
     render_pixels,
     settings_of,
 )
+from viewer.app.picture_saver import PictureSaver
+from viewer.model.actions import Notify
 from viewer.model.lens.optics import MoveEye, SetAperture, SetFocus
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.app_state import SaveTask, Source
+from viewer.model.state.app_state import Notice, SaveTask, Source
+from viewer.model.state.saving import Saving, SavingChanged
 
 
 @pytest.fixture(scope="module")
@@ -124,3 +128,36 @@ def test_places_that_cannot_be_written_are_told_before_anything_is_drawn(tmp_pat
 def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"missing-folder.* does not exist"):
         saved(opened, tmp_path / "missing-folder" / "a.png", (8, 8))
+
+
+def test_a_picture_starts_over_when_more_of_the_same_scene_is_there(tmp_path: Path) -> None:
+    """The photo alone is shown first; room for all views is made when the second comes, maybe while one is drawn."""
+    out = tmp_path / "out.png"
+    with headless_with_scene(tmp_path) as viewer:
+        scene_view, woken = viewer._scene_view, threading.Event()
+        saver = PictureSaver(scene_view, woken.set)
+        assert saver.add(SaveTask(str(out), (90, 60)), viewer.state) == []
+        assert saver.advance(0.0) == [SavingChanged(Saving("out.png"))]
+        scene_view.renderer.upload_view(1, 1, np.full((HEIGHT, WIDTH, 3), 90, np.uint8), None)
+        expected = render_pixels(scene_view, viewer.state, (90, 60))
+        while saver.is_drawing:
+            saver.advance(0.0)
+        assert woken.wait(60)
+        assert saver.advance(0.0) == [Notify(Notice(f"Saved {out}")), SavingChanged(None)]
+        saver.close()
+    np.testing.assert_array_equal(oiio.ImageBuf(str(out)).get_pixels(oiio.UINT8), expected)
+
+
+def test_a_picture_is_given_up_when_edited_depth_is_shown(tmp_path: Path) -> None:
+    before = set(tmp_path.iterdir())
+    with headless_with_scene(tmp_path) as viewer:
+        saver = PictureSaver(viewer._scene_view, lambda: None)
+        saver.add(SaveTask(str(tmp_path / "out.png"), (90, 60)), viewer.state)
+        saver.advance(0.0)
+        viewer._scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
+        notified, changed = saver.advance(0.0)
+        saver.close()
+    assert isinstance(notified, Notify)
+    assert "out.png: not saved" in notified.notice.text
+    assert changed == SavingChanged(None)
+    assert {path.name for path in set(tmp_path.iterdir()) - before} == {"scene.png", "scene_disparity.npy"}

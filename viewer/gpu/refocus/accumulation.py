@@ -186,8 +186,8 @@ class Accumulator:
             self._start_pass(field, accumulation, targets)
         batch = _first_batch(accumulation.samples[accumulation.at :][:count], field)
         has_pinhole = accumulation.at == 0 and lens.aperture_share < 1
-        layers = {"SHARP": targets.light, "BLURRED": targets.blurred} if lens.keeps_layers else {"": targets.light}
-        for layer, target in layers.items():
+        for layer in ("SHARP", "BLURRED") if lens.keeps_layers else ("",):
+            target = targets.of_layer(layer)
             keeps = target.holds_sum
             for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
                 self._disable_tests()

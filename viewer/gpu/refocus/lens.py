@@ -36,6 +36,11 @@ class PictureCell(NamedTuple):
     right: float
     bottom: float
 
+    def within(self, rows: PictureCell) -> PictureCell | None:
+        """What of it lies in these rows, None if nothing."""
+        top, bottom = max(self.top, rows.top), min(self.bottom, rows.bottom)
+        return PictureCell(self.left, top, self.right, bottom) if top < bottom else None
+
 
 WHOLE = PictureCell(0.0, 0.0, 1.0, 1.0)
 

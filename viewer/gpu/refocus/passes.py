@@ -73,10 +73,10 @@ class Passes:
         add to what is there; else it is replaced.
         """
         kinds = ("FLAT", "EDGES") if self.adaptive and field.has_disparity.any() else ("",)
-        target = _target_of(layer, targets)
+        target = targets.of_layer(layer)
         size_px = target.framebuffer.size
         for cell in _cells(field, lens):
-            drawn = _rows_of(lens.part.in_target(cell), rows)
+            drawn = lens.part.in_target(cell).within(rows)
             if drawn is None:
                 continue
             if "FLAT" in kinds:
@@ -100,7 +100,7 @@ class Passes:
     ) -> None:
         """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES". drawn: what of it is asked for."""
         program, quad = self._programs.get("pinhole.frag", _switches(lens, layer, lens.has_dolly and "DOLLY", kind))
-        target = _target_of(layer, targets)
+        target = targets.of_layer(layer)
         width, height = target.framebuffer.size
         self._set_field(program, field, lens)
         self._set_sources(program, field, lens, cell)
@@ -186,7 +186,7 @@ class Passes:
         )
         self._set_field(program, field, lens)
         self._set_samples(program, field, lens, samples, sparse)
-        target = _target_of(layer, targets)
+        target = targets.of_layer(layer)
         program.set_uniforms(share=lens.aperture_share, nudge=_nudge(target, layer))
         if tiles:
             self._bind(targets.tiles.textures[0], "tiles")
@@ -378,16 +378,6 @@ def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[PictureCell]:
     for top, bottom in pairwise(down):
         for left, right in pairwise(across):
             yield PictureCell(left, top, right, bottom)
-
-
-def _target_of(layer: str, targets: RenderTargets) -> RenderTarget:
-    return targets.blurred if layer == "BLURRED" else targets.light
-
-
-def _rows_of(cell: PictureCell, rows: PictureCell) -> PictureCell | None:
-    """What of a cell lies in these rows, None if nothing."""
-    top, bottom = max(cell.top, rows.top), min(cell.bottom, rows.bottom)
-    return PictureCell(cell.left, top, cell.right, bottom) if top < bottom else None
 
 
 def _pixels_of(cell: PictureCell, width: int, height: int) -> tuple[int, int, int, int]:
