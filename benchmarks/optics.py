@@ -36,7 +36,7 @@ from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.frame_budget import QUALITY_LEVELS, stretch_image
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 Image = NDArray[np.uint8]
 SIZE_PX = 768, 512

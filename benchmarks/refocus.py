@@ -26,7 +26,7 @@ from iibr_core.formats.light_fields.views import grid_of, read_stored_view
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 FRAMES = 12
 

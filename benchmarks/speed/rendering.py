@@ -25,7 +25,7 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, stretch_image
 from viewer.gpu.refocus.renderer import Renderer, scale_size
 from viewer.gpu.refocus.view_sampling import aperture_samples
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 APERTURE_VIEWS = 6.0
 BETWEEN = ViewOffset(-0.5, 1.5)

@@ -11,6 +11,8 @@ from uuid import uuid4
 
 from iibr_core.types import InputError
 
+MAX_FILE_PIXELS = 400_000_000
+"""No file may claim more pixels than this: a hostile header must not cost memory."""
 MOST_INFLATION = 500
 """Decoded bytes for each byte of a file: pictures reach some tens, zlib at most 1032 where all is of one colour."""
 HARMLESS_BYTES = 256 * 2**20

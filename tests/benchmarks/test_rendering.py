@@ -21,7 +21,7 @@ from iibr_core.evaluation.metrics import psnr
 from iibr_core.types import ViewOffset
 from tests.iibr_core.known_scenes import disparity_of_square, offsets_of, view_of_square
 from viewer.gpu.context import GLContext
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 
 @pytest.fixture(scope="module")

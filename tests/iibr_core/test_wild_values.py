@@ -302,8 +302,9 @@ READS_OR_TELLS = {
     "formats.light_fields.views": "grid_of read_stored_view disparity_range step_length",
     "formats.maps.npy": "read_array",
     "formats.maps.pfm": "read_pfm",
+    "formats.maps.reader": "read_map",
     "formats.images.oiio_writer": "write_image_file",
-    "formats.images.oiio_reader": "read_size read_orientation read_raster read_map require_whole_png text_attribute "
+    "formats.images.oiio_reader": "read_size read_orientation read_raster require_whole_png text_attribute "
     "complaint_of",
     "formats.light_fields.stanford": "read_stanford",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",

@@ -9,7 +9,7 @@ from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
-from viewer.model.lens.optics import MoveEye, ResetOptics, SetAperture, SetFocus
+from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetFocus
 
 TILE_WIDTH = 480
 GAP = 8

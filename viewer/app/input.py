@@ -14,10 +14,10 @@ from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, Rect, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.lens.limits import focus_limits
-from viewer.model.lens.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, SetFocus
 from viewer.model.state.app_state import AppState, Hover, ReadTruthTask, Scene, Source, source_beside, source_with_map
 from viewer.model.state.depth_editing import DropStroke, Paint, SetBrush
 from viewer.model.state.inspection import MoveDivider, ShowGrid
+from viewer.model.state.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, SetFocus
 
 DRAG_THRESHOLD = 4.0
 """A press that moved farther than this (window units) is a drag, not a click."""

@@ -18,7 +18,6 @@ from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, AskForPath, Notify, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
-from viewer.model.lens.optics import ApertureMask, SetApertureShape
 from viewer.model.state.app_state import (
     AppState,
     ChooseTask,
@@ -30,6 +29,7 @@ from viewer.model.state.app_state import (
     Task,
 )
 from viewer.model.state.inspection import GroundTruth, TruthRead
+from viewer.model.state.optics import ApertureMask, SetApertureShape
 from viewer.model.state.saving import CancelSaveTask
 
 

@@ -18,9 +18,9 @@ from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
-from viewer.model.lens.optics import CENTRE
 from viewer.model.state.app_state import Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
+from viewer.model.state.optics import CENTRE
 
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Where to look for the focus in a light field that says nothing about disparity."""

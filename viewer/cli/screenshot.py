@@ -107,8 +107,8 @@ def screenshot(
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
-    from viewer.model.lens.optics import MoveEye, SetAperture, SetFocus
     from viewer.model.state.app_state import Source
+    from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     shot = _Shot(Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint), depth_strength, size)

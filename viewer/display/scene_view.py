@@ -21,8 +21,8 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.layout import ScreenSize
-from viewer.model.lens.optics import CENTRE, Optics
 from viewer.model.state.app_state import AppState, DrawReport, Picture, Scene
+from viewer.model.state.optics import CENTRE, Optics
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""

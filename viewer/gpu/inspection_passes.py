@@ -14,7 +14,7 @@ from iibr_core.types import ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.model.layout import ScreenSize
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 MAX_VIEWS = 128
 """As in shaders/epi.frag: of one row or column of the grid."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from viewer.model.lens.optics import LensAction
 from viewer.model.state.app_state import (
     ChoiceOf,
     DrawReport,
@@ -23,6 +22,7 @@ from viewer.model.state.app_state import (
 )
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.optics import LensAction
 from viewer.model.state.saving import SavingChanged
 
 # The viewpoint

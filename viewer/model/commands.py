@@ -26,7 +26,6 @@ from viewer.model.actions import (
     StopWork,
     Undo,
 )
-from viewer.model.lens.optics import ApplyPreset, ResetOptics
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import (
     LOOPS,
@@ -53,6 +52,7 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
+from viewer.model.state.optics import ApplyPreset, ResetOptics
 
 FONT_STEP = 1.1
 COMPARE_WORDS: dict[Comparison, str] = {

@@ -18,8 +18,8 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
 from iibr_core.types import GridShape, InputError, Quality
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import BLADES_LIMITS
-from viewer.model.lens.optics import ApertureShape, Optics
 from viewer.model.state.app_state import SavedSettings, Source
+from viewer.model.state.optics import ApertureShape, Optics
 
 ATTRIBUTE = "iibr:settings"
 FORMAT = 1

@@ -12,9 +12,9 @@ from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork, ToggleS
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import aperture_limit
-from viewer.model.lens.optics import ApplyPreset
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source, source_beside
+from viewer.model.state.optics import ApplyPreset
 from viewer.ui.sections.depth import depth_line, depth_section
 from viewer.ui.sections.inspect import inspect_section
 from viewer.ui.sections.lens import aperture_section, focus_section, light_section

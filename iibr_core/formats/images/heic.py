@@ -11,9 +11,8 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import open_binary, reason_of, refuse_bomb, require_file
+from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, refuse_bomb, require_file
 from iibr_core.formats.images.oiio_reader import Raster
-from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS
 from iibr_core.types import FloatImage, InputError
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.formats.files import MAX_FILE_PIXELS
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.scene import GridIndex, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.formats.maps.pfm import MAX_FILE_PIXELS
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.images.oiio_reader import read_map
+from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size

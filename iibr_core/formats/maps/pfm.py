@@ -7,11 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import atomic_write, open_binary
+from iibr_core.formats.files import MAX_FILE_PIXELS, atomic_write, open_binary
 from iibr_core.types import FloatImage, InputError
-
-MAX_FILE_PIXELS = 400_000_000
-"""No file may claim more pixels than this: a hostile header must not cost memory."""
 
 # The header ends with exactly one white-space character (or CR LF); the next byte is data.
 HEADER = re.compile(rb"P([fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.0-9eE]{1,32})(?:\r\n|\s)")

@@ -1,4 +1,4 @@
-"""Writes disparity maps, one value per pixel, so that `raster.read_map` reads them again."""
+"""Writes disparity maps, one value per pixel, so that `reader.read_map` reads them again."""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.formats.images.oiio_reader import read_map
 from iibr_core.formats.maps.disparity_file import read_disparity
+from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.writer import MAP_SUFFIXES, PNG_MOST, write_map
 from iibr_core.types import InputError, image_size
 

@@ -25,9 +25,9 @@ from viewer.app.image_export import (
 )
 from viewer.app.picture_saver import PictureSaver
 from viewer.model.actions import Notify
-from viewer.model.lens.optics import MoveEye, SetAperture, SetFocus
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import Notice, SaveTask, Source
+from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 from viewer.model.state.saving import Saving, SavingChanged
 
 

@@ -13,9 +13,9 @@ from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.image_export import render_pixels
 from viewer.model.actions import Action, DoTask, OpenPath, SetDepthStrength
-from viewer.model.lens.optics import MoveEye, SetAperture
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import SavePrompt, SaveTask, Source
+from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.state.saving import CancelSaveTask
 
 SIZE = 300, 200

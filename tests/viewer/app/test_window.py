@@ -12,8 +12,8 @@ import pytest
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
 from viewer.display.scene_view import WAITING_VIEWS
-from viewer.model.lens.optics import Optics
 from viewer.model.state.app_state import Source
+from viewer.model.state.optics import Optics
 
 Opener = Callable[..., Driver]
 

@@ -15,9 +15,9 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
-from viewer.model.lens.optics import MoveEye, Optics, SetAperture
 from viewer.model.saved_settings import ATTRIBUTE, read_settings
 from viewer.model.state.app_state import AppState, PalettePrompt, ReadMaskTask, SavePrompt, SaveTask, Source
+from viewer.model.state.optics import MoveEye, Optics, SetAperture
 
 Opener = Callable[..., Driver]
 

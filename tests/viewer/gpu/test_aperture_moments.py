@@ -12,7 +12,7 @@ from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import ApertureSample, aperture_samples
-from viewer.model.lens.optics import CENTRE, ApertureMask, ApertureShape, Optics
+from viewer.model.state.optics import CENTRE, ApertureMask, ApertureShape, Optics
 
 GRID = GridShape(17, 17)
 FULL = np.ones(GRID, bool)

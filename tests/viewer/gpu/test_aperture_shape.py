@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from viewer.gpu.refocus.aperture_shape import opening
-from viewer.model.lens.optics import ApertureMask, ApertureShape
+from viewer.model.state.optics import ApertureMask, ApertureShape
 
 DIAMETER = 8.0
 WIDTH = 0.5

@@ -13,7 +13,7 @@ from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_p
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.headless_context import Backend, create_headless
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 GRID = GridShape(5, 5)

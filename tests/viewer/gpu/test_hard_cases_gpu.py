@@ -21,7 +21,7 @@ from tests.viewer.gpu.scenes import TwoPlanes, rms
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.lens.limits import eye_limits
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
 SIZE = SCENE.width, SCENE.height

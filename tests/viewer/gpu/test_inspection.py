@@ -15,7 +15,7 @@ from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, Inspecti
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.colormap import VIRIDIS, map_color
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 GRID = GridShape(5, 7)
 SCENE = TwoPlanes()

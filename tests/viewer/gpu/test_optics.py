@@ -16,7 +16,7 @@ from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.refocus.lens import HIGHLIGHT_GAIN
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
-from viewer.model.lens.optics import CENTRE, ApertureMask, ApertureShape, Optics
+from viewer.model.state.optics import CENTRE, ApertureMask, ApertureShape, Optics
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)

@@ -16,7 +16,7 @@ from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import pinhole_sources
 from viewer.gpu.render_targets import RenderTargets
-from viewer.model.lens.optics import CENTRE, Optics
+from viewer.model.state.optics import CENTRE, Optics
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=96, back=-4.0, front=5.0, radius_px=25.0)

@@ -16,7 +16,7 @@ from viewer.gpu.refocus.accumulation import EDGE_PASSES, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import QualityLevel
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.lens.optics import CENTRE, Optics
+from viewer.model.state.optics import CENTRE, Optics
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=0.0, radius_px=25.0)

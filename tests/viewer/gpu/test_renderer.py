@@ -15,7 +15,7 @@ from tests.image_compare import FILTERING, ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 GRID = GridShape(5, 5)
 CENTRE = ViewOffset(0.0, 0.0)

@@ -20,7 +20,7 @@ from iibr_core.types import Disparity, FloatImage, Quality, ViewUpdate
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
 from tests.iibr_core.scenes import by_index, literal_plan
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 LEAST_DB = {"shelf": 41.1, "fence": 38.0}
 Field = Mapping[tuple[int, int], ViewUpdate]

@@ -13,7 +13,7 @@ from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.tiling import MARGIN_PX, PART_PX, picture_tiles
-from viewer.model.lens.optics import ApertureShape, Optics
+from viewer.model.state.optics import ApertureShape, Optics
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=1.0, radius_px=25.0)

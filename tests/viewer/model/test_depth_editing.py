@@ -23,7 +23,6 @@ from viewer.background.scene_worker import SceneRequest, results_of
 from viewer.model.actions import AskToSave, EndGesture, OpenFailed, OpenPath, Redo, SceneOpened, Undo
 from viewer.model.commands import BY_NAME, action_for_path
 from viewer.model.layout import layout_of
-from viewer.model.lens.optics import MoveEye, SetFocus
 from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
@@ -38,6 +37,7 @@ from viewer.model.state.depth_editing import (
     SetRefine,
     SetTone,
 )
+from viewer.model.state.optics import MoveEye, SetFocus
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
 GRID = GridShape(3, 3)

@@ -20,9 +20,9 @@ from viewer.model.lens.focal_plane import (
     sharp_disparity,
     tilt_through,
 )
-from viewer.model.lens.optics import FocusOn, MoveTiltHandle, Optics
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import TiltHandles
+from viewer.model.state.optics import FocusOn, MoveTiltHandle, Optics
 
 shares = st.floats(-1, 1)
 places = st.tuples(shares, shares)

@@ -23,7 +23,6 @@ from viewer.model.inspection_request import (
     view_to_compare,
 )
 from viewer.model.layout import Beside, Rect, layout_of
-from viewer.model.lens.optics import MoveEye
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, ChooseTask, Hover, Scene, Source
 from viewer.model.state.inspection import (
@@ -44,6 +43,7 @@ from viewer.model.state.inspection import (
     ShowValues,
     TruthRead,
 )
+from viewer.model.state.optics import MoveEye
 from viewer.ui.overlays.inspection import status_text
 from viewer.ui.sections.inspect import pair_text, score_text
 

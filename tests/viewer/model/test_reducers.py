@@ -37,7 +37,11 @@ from viewer.model.lens.limits import (
     is_extrapolated,
     is_finite,
 )
-from viewer.model.lens.optics import (
+from viewer.model.lens.presets import PRESETS
+from viewer.model.reducers.root import reduce
+from viewer.model.reducers.worker_events import NOTICES_KEPT
+from viewer.model.state.app_state import AppState, Hover, Notice, Picture, Progress, SavedSettings, Scene, Source
+from viewer.model.state.optics import (
     APERTURE_KINDS,
     EXPOSURE_LIMIT_STOPS,
     ApertureMask,
@@ -56,10 +60,6 @@ from viewer.model.lens.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.lens.presets import PRESETS
-from viewer.model.reducers.root import reduce
-from viewer.model.reducers.worker_events import NOTICES_KEPT
-from viewer.model.state.app_state import AppState, Hover, Notice, Picture, Progress, SavedSettings, Scene, Source
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)

@@ -18,7 +18,6 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import SceneOpened
-from viewer.model.lens.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import (
     ATTRIBUTE,
@@ -29,6 +28,7 @@ from viewer.model.saved_settings import (
     source_like,
 )
 from viewer.model.state.app_state import SavedSettings, Source
+from viewer.model.state.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
 
 numbers = st.floats(-1e3, 1e3)
 masks = st.builds(lambda n: ApertureMask("ünïcode “mask”.png", 2, n, bytes([255] * 2 * n)), st.integers(1, 64))

@@ -14,7 +14,6 @@ from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import Action, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
 from viewer.model.inspection_request import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, Rect, layout_of
-from viewer.model.lens.optics import MoveEye
 from viewer.model.state.app_state import Hover, Notice, Theme
 from viewer.model.state.inspection import (
     OVERLAYS,
@@ -27,6 +26,7 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
+from viewer.model.state.optics import MoveEye
 
 SIZE = 640, 760
 GRID = GridShape(3, 3)

@@ -28,15 +28,6 @@ from viewer.model.actions import (
     ToggleSection,
 )
 from viewer.model.layout import PANEL_WIDTH, layout_of
-from viewer.model.lens.optics import (
-    APERTURE_KINDS,
-    ApertureKind,
-    ApertureMask,
-    ApertureShape,
-    MoveEye,
-    SetAperture,
-    SetApertureShape,
-)
 from viewer.model.state.app_state import (
     SECTIONS,
     AppState,
@@ -48,6 +39,15 @@ from viewer.model.state.app_state import (
     SavedSettings,
     Section,
     Source,
+)
+from viewer.model.state.optics import (
+    APERTURE_KINDS,
+    ApertureKind,
+    ApertureMask,
+    ApertureShape,
+    MoveEye,
+    SetAperture,
+    SetApertureShape,
 )
 from viewer.model.state.saving import Saving, SavingChanged
 from viewer.ui.overlays.notices import saving_text

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.gpu.refocus.aperture_shape import opening
-from viewer.model.lens.optics import ApertureShape
+from viewer.model.state.optics import ApertureShape
 
 LEAST_SCALE = 0.4
 """An opening still smaller would leave next to no sample."""

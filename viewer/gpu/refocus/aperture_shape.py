@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.model.lens.optics import ApertureMask, ApertureShape
+from viewer.model.state.optics import ApertureMask, ApertureShape
 
 
 def opening(

@@ -13,7 +13,7 @@ from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.view_sampling import UNMOVED, ApertureSample, aperture_samples
-from viewer.model.lens.optics import Optics
+from viewer.model.state.optics import Optics
 
 HIGHLIGHT_GAIN = 15.0
 """Full highlight recovery lets clipped pixels count for four stops more."""

@@ -33,8 +33,8 @@ from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.refocus.picture_drawing import PictureDrawing, read_pixels
 from viewer.gpu.render_targets import RenderTargets
 from viewer.model.layout import ScreenSize
-from viewer.model.lens.optics import Optics
 from viewer.model.state.app_state import DrawReport
+from viewer.model.state.optics import Optics
 
 KEPT_SIZES = 2
 """Of the picture: one drawn in a hurry is smaller than the one that follows it."""

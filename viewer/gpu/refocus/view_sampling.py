@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.aperture_moments import openness, scale_of
-from viewer.model.lens.optics import ApertureShape
+from viewer.model.state.optics import ApertureShape
 
 MAX_SOURCES = 4
 DISC = ApertureShape()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.types import InputError
-from viewer.model.lens.optics import ApertureMask
+from viewer.model.state.optics import ApertureMask
 
 LARGEST_SIDE = 64
 """Cells of the aperture; more than there are samples in it."""

@@ -10,8 +10,8 @@ import math
 from dataclasses import replace
 
 from viewer.model.layout import Rect
-from viewer.model.lens.optics import Optics
 from viewer.model.state.app_state import Scene, TiltHandles
+from viewer.model.state.optics import Optics
 
 Place = tuple[float, float]
 

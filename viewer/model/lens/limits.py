@@ -7,8 +7,8 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.lens.optics import LIMITS, ApertureShape, Optics
 from viewer.model.state.app_state import Scene
+from viewer.model.state.optics import LIMITS, ApertureShape, Optics
 
 Record = TypeVar("Record", Optics, ApertureShape)
 

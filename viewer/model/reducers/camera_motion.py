@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.lens.optics import CENTRE, Optics
 from viewer.model.state.app_state import LoopKind, Motion
+from viewer.model.state.optics import CENTRE, Optics
 
 HOME_S = 0.4
 LONGEST_STEP_S = 0.1

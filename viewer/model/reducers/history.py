@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from viewer.model.lens.optics import Optics
 from viewer.model.state.app_state import AppState, Edit, History, Motion
+from viewer.model.state.optics import Optics
 
 EDITS_KEPT = 200
 

@@ -7,7 +7,9 @@ from dataclasses import replace
 from iibr_core.types import ViewOffset
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
 from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, is_finite
-from viewer.model.lens.optics import (
+from viewer.model.lens.presets import preset_optics
+from viewer.model.state.app_state import AppState, Scene, TiltHandles
+from viewer.model.state.optics import (
     ApplyPreset,
     FocusOn,
     LensAction,
@@ -24,8 +26,6 @@ from viewer.model.lens.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.lens.presets import preset_optics
-from viewer.model.state.app_state import AppState, Scene, TiltHandles
 
 
 def reduce_lens(state: AppState, action: LensAction) -> AppState:

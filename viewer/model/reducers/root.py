@@ -49,7 +49,6 @@ from viewer.model.lens.limits import (
     clamp_optics,
     is_finite,
 )
-from viewer.model.lens.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
 from viewer.model.reducers.camera_motion import advance_motion, glide_home, start_motion
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
@@ -71,6 +70,7 @@ from viewer.model.state.app_state import (
 )
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
 from viewer.model.state.saving import SavingChanged
 
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."

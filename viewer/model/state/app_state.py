@@ -14,9 +14,9 @@ from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
 from viewer.model.layout import ScreenSize
-from viewer.model.lens.optics import CENTRE, Optics
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.inspection import Inspection
+from viewer.model.state.optics import CENTRE, Optics
 from viewer.model.state.saving import CancelSaveTask, Saving
 
 AS_FOUND = DepthSettings()

@@ -6,9 +6,9 @@ from imgui_bundle import imgui
 
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
-from viewer.model.lens.optics import Optics
 from viewer.model.lens.photographic_units import relative_distance
 from viewer.model.state.app_state import AppState, Hover, Scene, TiltHandles
+from viewer.model.state.optics import Optics
 from viewer.ui.style import DARK, pack_color
 
 RETICLE_RADIUS = 11.0

@@ -11,7 +11,15 @@ from imgui_bundle import imgui
 from viewer.model.actions import Action, DoTask, ShowTiltHandles
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
-from viewer.model.lens.optics import (
+from viewer.model.lens.photographic_units import (
+    ASSUMED_DISTANCE_M,
+    disparity_at,
+    distance_limits,
+    f_number,
+    relative_distance,
+)
+from viewer.model.state.app_state import AppState, ChooseTask, Scene
+from viewer.model.state.optics import (
     APERTURE_KINDS,
     EXPOSURE_LIMIT_STOPS,
     RING_INNER_LIMIT,
@@ -25,14 +33,6 @@ from viewer.model.lens.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.lens.photographic_units import (
-    ASSUMED_DISTANCE_M,
-    disparity_at,
-    distance_limits,
-    f_number,
-    relative_distance,
-)
-from viewer.model.state.app_state import AppState, ChooseTask, Scene
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette
 from viewer.ui.widgets import button, checkbox, choice, quiet, slider, whole_slider
