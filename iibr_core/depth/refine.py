@@ -157,7 +157,7 @@ def _at(values, x, y):
 
 
 @kernel
-def _steepest_direction(values, x, y):
+def _gradient(values, x, y):
     """Gradient (x, y) of the map about a pixel, over 5 x 5."""
     height, width = values.shape
     across = down = 0.0
@@ -209,7 +209,7 @@ def _measure_edges(values, least_edge, reach, step, first, last, sigmas, heights
     for row in range(first, last):
         y = row * step
         for x in range(width):
-            across, down = _steepest_direction(values, x, y)
+            across, down = _gradient(values, x, y)
             slope = sqrt(across * across + down * down)
             # Even this slope, kept up over the whole search, makes no edge.
             if not slope * 2 * reach > least_edge:
@@ -270,7 +270,7 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
         for x in range(width):
             here = values[y, x]
             refined[y, x] = here
-            across, down = _steepest_direction(values, x, y)
+            across, down = _gradient(values, x, y)
             slope = sqrt(across * across + down * down)
             # Too flat to belong to an edge: most pixels end here.
             if not slope * 4 * reach * pace > least_edge:

@@ -10,9 +10,9 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from PIL import Image
 
+from iibr_core.color import bytes_from_encoded
 from iibr_core.evaluation.metrics import flip_picture
 from iibr_core.evaluation.protocol import TRUTH, Bytes, EvaluationResult
 from iibr_core.evaluation.refocus import LENS
@@ -116,7 +116,7 @@ def _refocused_pictures(result: EvaluationResult) -> Iterator[PagePicture]:
 
 
 def _error(image: Bytes, truth: Bytes) -> Bytes:
-    return (np.clip(flip_picture(image, truth), 0, 1) * 255 + 0.5).astype(np.uint8)
+    return bytes_from_encoded(flip_picture(image, truth))
 
 
 def _webp(image: Bytes) -> str:

@@ -112,7 +112,7 @@ def _sample_ambiguous(
     """Ambiguous rays of a view, also those whose true surface the photo does not show: background is right there."""
     ambiguous = ambiguous_rays_of_view(rays, offset, (0, SIZE[0]), False, choice.hypotheses)
     ambiguous = _subset(ambiguous, rng.permutation(len(ambiguous.pixel))[:RAYS_A_VIEW])
-    return _keep_visible(scene, rays, ambiguous, choice)
+    return _label(scene, rays, ambiguous, choice)
 
 
 def ambiguous_rays_of_view(
@@ -128,7 +128,7 @@ def ambiguous_rays_of_view(
     )
 
 
-def _keep_visible(scene: RaycastScene, rays: RaySet, ambiguous: AmbiguousRays, choice: RayChoice) -> LabelledRays:
+def _label(scene: RaycastScene, rays: RaySet, ambiguous: AmbiguousRays, choice: RayChoice) -> LabelledRays:
     y, x = ambiguous.pixel.T
     return LabelledRays(
         choice.describe(rays, ambiguous), hypothesis_colors(rays, ambiguous), cast(scene, x, y, ambiguous.offset)[0]
@@ -148,7 +148,7 @@ def _epi(
         chosen = np.flatnonzero(np.isin(ambiguous.pixel[:, 1], columns))
         if len(chosen) < EPI_WIDTH:
             return None
-        parts.append(_keep_visible(scene, rays, _subset(ambiguous, chosen), choice))
+        parts.append(_label(scene, rays, _subset(ambiguous, chosen), choice))
     return parts
 
 

@@ -30,9 +30,13 @@ def export_image(path: Path, pixels: NDArray[Any], settings: SavedSettings | Non
     settings: what it takes to take the picture again, put inside. Raises InputError where it cannot be written.
     """
     from iibr_core.formats.images.photo import write_image
+
+    if settings is None:
+        write_image(path, pixels)
+        return
     from viewer.model.saved_settings import ATTRIBUTE, settings_text
 
-    write_image(path, pixels, {ATTRIBUTE: settings_text(settings)} if settings is not None else None)
+    write_image(path, pixels, {ATTRIBUTE: settings_text(settings)})
 
 
 def export_picture(path: Path, drawn: NDArray[Any], settings: SavedSettings) -> Path:

@@ -118,7 +118,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         plan=plan,
         notes=loaded.photo.notes + loaded.disparity.notes,
         focal_px=_known_focal_px(loaded.photo),
-        subject_disparity_px=_centre_first(plan.field_disparity(loaded.disparity).values),
+        subject_disparity_px=_median_of_middle(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
         depth_origin=loaded.origin,
         levels=loaded.levels,
@@ -130,10 +130,10 @@ def _known_focal_px(photo: Photo) -> float | None:
     """None where the photo did not tell, and a usual field of view stands in."""
     from iibr_core.formats.images.photo import focal_px_from_fov
 
-    return None if photo.focal_px == focal_px_from_fov(photo.size[1]) else photo.focal_px
+    return None if photo.focal_px == focal_px_from_fov(photo.size.width) else photo.focal_px
 
 
-def _centre_first(disparity: FloatImage) -> float:
+def _median_of_middle(disparity: FloatImage) -> float:
     """The median of the middle ninth of the picture."""
     height, width = disparity.shape
     part = disparity[height // 3 : height - height // 3, width // 3 : width - width // 3]
@@ -186,7 +186,7 @@ def _results_of_folder(request: SceneRequest, should_stop: Callable[[], bool]) -
         is_hdr=field.is_hdr,
         notes=field.notes,
         has_view_disparity=len(field.disparity) == len(field.views),
-        subject_disparity_px=_centre_first(centre.disparity) if centre.disparity is not None else 0.0,
+        subject_disparity_px=_median_of_middle(centre.disparity) if centre.disparity is not None else 0.0,
     )
     yield SceneReady(request.generation, scene, None, centre)
     rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), views))

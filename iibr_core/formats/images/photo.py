@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file
 from iibr_core.formats.images.heic import is_heic, read_heic
 from iibr_core.formats.images.oiio_reader import Raster, read_raster, text_attribute
@@ -221,7 +221,7 @@ def _number(spec: Any, name: str) -> float:
 def _png_values(pixels: NDArray[Any]) -> tuple[NDArray[Any], str]:
     stored = np.atleast_3d(pixels)
     if stored.dtype != np.uint8:
-        stored = (np.clip(np.nan_to_num(stored), 0, 1) * 255 + 0.5).astype(np.uint8)
+        stored = bytes_from_encoded(np.nan_to_num(stored))
     return np.ascontiguousarray(stored), "uint8"
 
 

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.view_sampling import aperture_samples, clamp_to_grid, nearest_present, pinhole_sources
+from viewer.gpu.refocus.view_sampling import aperture_samples, nearest_present, pinhole_sources
+from viewer.model.lens.limits import clamp_to_grid
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)

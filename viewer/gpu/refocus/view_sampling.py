@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.aperture_moments import openness, scale_of
+from viewer.model.lens.limits import clamp_to_grid
 from viewer.model.state.optics import ApertureShape
 
 MAX_SOURCES = 4
@@ -38,12 +39,6 @@ class ApertureSample(NamedTuple):
     row: int
     column: int
     weight: float
-
-
-def clamp_to_grid(eye: ViewOffset, grid: GridShape) -> ViewOffset:
-    """The point of the grid's rectangle nearest to the eye."""
-    first, last = grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)
-    return ViewOffset(min(max(eye.t, first.t), last.t), min(max(eye.s, first.s), last.s))
 
 
 def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:

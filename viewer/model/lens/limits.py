@@ -45,6 +45,12 @@ def clamp_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:
     return ViewOffset(*(clamp(x, *eye_limits(views)) for x, views in zip(eye, grid)))
 
 
+def clamp_to_grid(eye: ViewOffset, grid: GridShape) -> ViewOffset:
+    """The point of the grid's rectangle nearest to the eye."""
+    first, last = grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)
+    return ViewOffset(min(max(eye.t, first.t), last.t), min(max(eye.s, first.s), last.s))
+
+
 def is_extrapolated(eye: ViewOffset, grid: GridShape) -> bool:
     """Whether the viewpoint lies outside the stored views."""
     return any(not -(views // 2) <= x <= views - 1 - views // 2 for x, views in zip(eye, grid))

@@ -14,7 +14,6 @@ CENTRE = ViewOffset(0.0, 0.0)
 EXPOSURE_LIMIT_STOPS = 6.0
 RING_INNER_LIMIT = 0.95
 
-
 LIMITS = "limits"
 """The key of a field's limits, where they are the same for every scene."""
 
@@ -26,8 +25,6 @@ def within(low: float, high: float, default: float) -> Any:
 
 PresetName = Literal["portrait", "macro", "everything sharp"]
 ApertureKind = Literal["disc", "polygon", "ring", "cat_eye", "mask"]
-
-
 APERTURE_KINDS: tuple[ApertureKind, ...] = ("disc", "polygon", "ring", "cat_eye", "mask")
 
 

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action
 from viewer.model.layout import Layout, Rect
-from viewer.model.lens.limits import eye_limits, is_extrapolated
+from viewer.model.lens.limits import clamp_to_grid, eye_limits, is_extrapolated
 from viewer.model.state.app_state import AppState, Scene
 from viewer.model.state.optics import MoveEye
 from viewer.ui.style import Palette, pack_color
@@ -70,7 +70,7 @@ def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float, palette
     outside = is_extrapolated(state.optics.eye, grid)
     color = palette.warning if outside else palette.accent
     if outside:
-        inside = ViewOffset(*(_snap(value, views) for value, views in zip(state.optics.eye, grid)))
+        inside = clamp_to_grid(state.optics.eye, grid)
         draw.add_line(imgui.ImVec2(*chart.point(inside)), imgui.ImVec2(x, y), pack_color(color, 0.7), 1.5 * scale)
     draw.add_circle_filled(imgui.ImVec2(x, y), 6 * scale, pack_color(color))
     draw.add_circle(imgui.ImVec2(x, y), 6 * scale, pack_color(palette.panel), 0, 1.5 * scale)
@@ -106,7 +106,3 @@ def _draw_views(
                 draw.add_circle_filled(imgui.ImVec2(x, y), radius, color, 8)
             else:
                 draw.add_rect_filled(imgui.ImVec2(x - radius, y - radius), imgui.ImVec2(x + radius, y + radius), color)
-
-
-def _snap(value: float, views: int) -> float:
-    return min(max(value, -(views // 2)), views - 1 - views // 2)
