@@ -11,7 +11,7 @@ one, none.
 """
 
 DepthStart = Literal["auto", "embedded", "model", "rough", "flat"]
-"""With what kind the search begins; "auto" is with a file. What fails is followed by the next."""
+"""With what kind the search begins; "auto" is with a file. What fails is followed by the next, but for a model."""
 
 BETTER_WAYS = (
     "Better: give a depth map with --disparity FILE, or a trained model with --depth-model "
@@ -54,3 +54,8 @@ class DepthChoice:
     model: str | None = None
     refine: float = 1.0
     memory_bytes: int | None = None
+
+    @property
+    def asks_for_model(self) -> bool:
+        """Whether nothing will do in its place where it cannot be used."""
+        return self.start == "model" or self.model is not None

@@ -1,5 +1,5 @@
 """Decides where a photo's disparity comes from: a file, the photo itself, a trained model, a rough estimate; in this
-order, and says so. What fails is followed by the next; only a file that the user named must be good.
+order, and says so. What fails is followed by the next; only a file or a model that the user asked for must be good.
 """
 
 from __future__ import annotations
@@ -78,7 +78,8 @@ def open_with_depth(
     """Read a photo and find its disparity; every photo gets one.
 
     A photo that the camera blurred is replaced by the sharp picture beside it, where its own depth comes with one.
-    Raises InputError for a bad photo and for a bad file that `choice` names, Cancelled where should_stop says so.
+    Raises InputError for a bad photo, for a bad file or model that `choice` names, and where it asks for a model and
+    there is none; Cancelled where should_stop says so.
     """
     choice, path = choice or DepthChoice(), Path(path)
     photo = read_photo(path, max_pixels)
@@ -93,6 +94,8 @@ def open_with_depth(
                 found = replace(found, origin=replace(found.origin, failures=failures))
                 return _finish(found, choice, grid, should_stop)
         except InputError as error:
+            if kind == "model" and choice.asks_for_model:
+                raise
             failures += (f"{NOT_USED[kind]}: {error}",)
     return _flat(photo, failures)
 
@@ -146,7 +149,7 @@ class _DepthSearch:
     def model(self) -> _FoundDepth | None:
         from iibr_core.depth.models.catalog import model_to_use
 
-        model = model_to_use(self.choice.model)
+        model = model_to_use(self.choice)
         if model is None:
             return None
         from iibr_core.depth.models.transformers_models import estimate_with

@@ -26,7 +26,7 @@ from viewer.model.inspection_request import (
 )
 from viewer.model.layout import BACKGROUND, Layout, Rect, ScreenSize, layout_of, letterbox
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Progress, Source
+from viewer.model.state.app_state import AppState, Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import Probed
 from viewer.model.state.optics import CENTRE
@@ -67,10 +67,11 @@ class HeadlessViewer:
         depth_strength: float,
         on_progress: Callable[[Progress], None],
         edits: DepthEdits = UNEDITED,
+        on_ready: Callable[[Scene], None] = lambda scene: None,
     ) -> None:
         """Read and plan the scene, its depth edited so, and make all its views, telling how far it is.
 
-        Raises InputError.
+        on_ready: is told the scene before any of its views is made; what it raises ends the opening. Raises InputError.
         """
         self.state = AppState(depth_strength=depth_strength)
         self.do(OpenPath(source))
@@ -79,6 +80,7 @@ class HeadlessViewer:
         request = SceneRequest(self.state.generation, source, depth_strength, depth_settings=depth_settings)
         for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
             if isinstance(result, SceneReady):
+                on_ready(result.scene)
                 self._scene_view.open(result)
                 self._inspection_view.open()
                 self.do(SceneOpened(result.generation, result.scene))

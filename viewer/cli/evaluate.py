@@ -12,7 +12,7 @@ import typer
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.types import InputError, Quality
-from viewer.cli.options import DepthModel, MaxPixels, Refine, quality_from_text
+from viewer.cli.options import DepthModel, MaxPixels, Refine, quality_from_text, require_model
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
@@ -73,10 +73,9 @@ def evaluate(
 
     require_report_folder(out)
     chosen: tuple[Quality, ...] = tuple(dict.fromkeys(quality)) if quality else QUALITIES
-    options = Options(
-        _disparity_source(disparity), DepthChoice(model=depth_model, refine=refine), chosen,
-        max_pixels or DEFAULT_MAX_PIXELS, views, lpips,
-    )  # fmt: skip
+    choice = DepthChoice(model=depth_model, refine=refine)
+    require_model(choice)
+    options = Options(_disparity_source(disparity), choice, chosen, max_pixels or DEFAULT_MAX_PIXELS, views, lpips)
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
     results = []
     with show_progress("reading") as show:

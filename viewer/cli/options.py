@@ -19,8 +19,16 @@ if TYPE_CHECKING:
     from viewer.model.state.app_state import Source
 
 MAX_GRID = 99
+MOST = 2**62
+"""Of bytes and pixels: what adds a few to it still fits into 64 bits."""
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
+
+NOT_FOR_LIGHT_FIELDS = {
+    "disparity", "disparity_scale", "depth", "depth_model", "refine", "depth_strength", "focus_disparity", "grid",
+    "max_pixels", "quality", "inpaint",
+}  # fmt: skip
+"""Parameters about how views are made: a light field brings its own."""
 
 SCREEN_SIZE = ScreenSize(1280, 800)
 """Of the window in pictures, unless another is asked for."""
@@ -28,7 +36,7 @@ SCREEN_SIZE = ScreenSize(1280, 800)
 
 def grid_from_text(text: str) -> GridShape:
     """A grid of views: "9" is 9x9, "3x9" is 3 rows of 9. Raises BadParameter."""
-    match = re.fullmatch(r"(\d+)(?:x(\d+))?", text.strip())
+    match = re.fullmatch(r"(\d{1,4})(?:x(\d{1,4}))?", text.strip())
     grid = GridShape(int(match[1]), int(match[2] or match[1])) if match else GridShape(0, 0)
     if not (1 <= grid.rows <= MAX_GRID and 1 <= grid.columns <= MAX_GRID):
         raise typer.BadParameter(f"{text!r} is no grid of views: give 1 to {MAX_GRID}, as 9 or 3x9")
@@ -37,7 +45,7 @@ def grid_from_text(text: str) -> GridShape:
 
 def size_from_text(text: str) -> ScreenSize:
     """A size from "1280x800". Raises BadParameter."""
-    match = re.fullmatch(r"(\d+)x(\d+)", text.strip())
+    match = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.strip())
     size = ScreenSize(int(match[1]), int(match[2])) if match else ScreenSize(0, 0)
     if not all(1 <= side <= 16384 for side in size):
         raise typer.BadParameter(f"{text!r} is no size in pixels: give width x height, as 1280x800")
@@ -81,6 +89,14 @@ def finite_from_text(text: str) -> float:
     return value
 
 
+def not_negative_from_text(text: str) -> float:
+    """A finite number from 0 up. Raises BadParameter."""
+    value = finite_from_text(text)
+    if value < 0:
+        raise typer.BadParameter(f"{text!r} is less than 0")
+    return value
+
+
 def given_options(context: typer.Context) -> set[str]:
     """Names of the options that were given, not left at their defaults; as fields of `SourceText` where they are."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
@@ -91,8 +107,25 @@ def given_options(context: typer.Context) -> set[str]:
 def depth_choice(
     file: Path | None, file_scale: float, start: DepthStart, model: str | None, refine: float, memory_bytes: int | None
 ) -> DepthChoice:
-    """What the options about depth say, in the order of their declarations below."""
+    """What the options about depth say, in the order of their declarations below; a model that is named is asked first.
+
+    Raises InputError where they contradict each other.
+    """
+    if file is not None and (start != "auto" or model is not None):
+        raise InputError("--disparity names the depth already: leave out --depth and --depth-model")
+    if model is not None and start not in ("auto", "model"):
+        raise InputError(f"--depth {start} asks no model: leave out --depth-model")
+    start = start if model is None else "model"
     return DepthChoice(start, str(file) if file else None, file_scale, model, refine, memory_bytes)
+
+
+def require_heeded(context: typer.Context, path: Path) -> None:
+    """Raise InputError for options given that a light field at `path` would not heed."""
+    given = given_options(context) & NOT_FOR_LIGHT_FIELDS
+    if not given or not path.is_dir():
+        return
+    options = [parameter.opts[0] for parameter in context.command.params if parameter.name in given]
+    raise InputError(f"{' and '.join(options)}: {path} is a folder, and its views are taken as they are; leave it out")
 
 
 def require_existing(source: Source) -> None:
@@ -100,15 +133,24 @@ def require_existing(source: Source) -> None:
     for path in (source.path, source.depth.file):
         if path is not None and not Path(path).exists():
             raise InputError(f"{path}: no such file")
+    require_model(source.depth)
+
+
+def require_model(choice: DepthChoice) -> None:
+    """Raise InputError where a depth model is asked for that cannot be used."""
+    if choice.asks_for_model:
+        from iibr_core.depth.models.catalog import model_to_use
+
+        model_to_use(choice)
 
 
 def memory_from_text(text: str) -> int:
     """Bytes from "2G", "500M" or "1000000". Raises BadParameter."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)
-    memory = int(float(match[1]) * _UNITS[match[2].upper()]) if match else 0
-    if memory < 1:
+    memory = float(match[1]) * _UNITS[match[2].upper()] if match else 0.0
+    if not 1 <= memory <= MOST:
         raise typer.BadParameter(f"{text!r} is no amount of memory: give bytes, or as 500M or 2G")
-    return memory
+    return int(memory)
 
 
 def depth_start_from_text(text: str) -> DepthStart:
@@ -183,7 +225,9 @@ Grid = Annotated[
     GridShape | None,
     typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.", show_default="the plan's"),
 ]
-MaxPixels = Annotated[int | None, typer.Option(min=1, help="Larger photos are made smaller.", show_default="2000000")]
+MaxPixels = Annotated[
+    int | None, typer.Option(min=1, max=MOST, help="Larger photos are made smaller.", show_default="2000000")
+]
 Memory = Annotated[
     int | None,
     typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),

@@ -30,8 +30,10 @@ from viewer.cli.options import (
     ScenePath,
     depth_choice,
     given_options,
+    not_negative_from_text,
     number_option,
     require_existing,
+    require_heeded,
     size_from_text,
     view_from_text,
 )
@@ -40,7 +42,10 @@ from viewer.model.layout import ScreenSize
 
 if TYPE_CHECKING:
     from viewer.model.actions import Action
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.app_state import Scene, Source
+
+TOLD_ROUNDED = 1e-3
+"""Limits are told with a few digits; who types one may be off by this share of the range."""
 
 
 class Backend(StrEnum):
@@ -52,6 +57,38 @@ class Backend(StrEnum):
 
 
 @dataclass(frozen=True)
+class _LensOptions:
+    """What the options say about the lens, None where they say nothing."""
+
+    view: ViewOffset | None = None
+    focus: float | None = None
+    aperture: float | None = None
+
+    def actions(self) -> list[Action]:
+        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+
+        actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
+        actions += [] if self.focus is None else [SetFocus(self.focus)]
+        return actions + ([] if self.aperture is None else [SetAperture(self.aperture)])
+
+    def require_within(self, scene: Scene) -> None:
+        """Raise InputError for what this scene does not reach, rather than show the nearest that it does."""
+        from viewer.model.lens.limits import aperture_limit, eye_limits, focus_limits
+
+        asked: list[tuple[str, float | None, tuple[float, float]]] = [
+            ("--focus", self.focus, focus_limits(scene)),
+            ("--aperture", self.aperture, (0.0, aperture_limit(scene.grid))),
+        ]
+        if self.view is not None:
+            asked += [("--view, S", self.view.s, eye_limits(scene.grid.columns))]
+            asked += [("--view, T", self.view.t, eye_limits(scene.grid.rows))]
+        for option, value, (low, high) in asked:
+            slack = TOLD_ROUNDED * (high - low)
+            if value is not None and not low - slack <= value <= high + slack:
+                raise InputError(f"{option} {value:g}: for {scene.name} it goes from {low:g} to {high:g}")
+
+
+@dataclass(frozen=True)
 class _Shot:
     """What is opened, and what is done to it before the picture is taken. size: None for the usual one."""
 
@@ -60,6 +97,7 @@ class _Shot:
     size: ScreenSize | None
     edits: DepthEdits = UNEDITED
     actions: tuple[Action, ...] = ()
+    lens: _LensOptions = _LensOptions()
 
 
 def screenshot(
@@ -83,7 +121,10 @@ def screenshot(
     focus: Annotated[
         float | None, number_option("Disparity that is sharp, px per view step (the panel's Focus).")
     ] = None,
-    aperture: Annotated[float | None, number_option("Aperture diameter in view steps.")] = None,
+    aperture: Annotated[
+        float | None,
+        typer.Option(parser=not_negative_from_text, metavar="X", help="Aperture diameter in view steps."),
+    ] = None,
     size: Annotated[
         ScreenSize | None,
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
@@ -108,17 +149,14 @@ def screenshot(
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
     from viewer.model.state.app_state import Source
-    from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     shot = _Shot(Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint), depth_strength, size)
     require_existing(shot.source)
+    require_heeded(context, path)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
-    actions: list[Action] = [] if view is None else [MoveEye(view)]
-    actions += [] if focus is None else [SetFocus(focus)]
-    actions += [] if aperture is None else [SetAperture(aperture)]
-    _write(replace(shot, actions=(*shot.actions, *actions)), output, ui, backend)
+    _write(replace(shot, lens=_LensOptions(view, focus, aperture)), output, ui, backend)
     print(output)
 
 
@@ -147,12 +185,16 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> None:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
         with show_progress("reading") as show:
             viewer.open(
-                shot.source, shot.depth_strength, lambda made: show(made.done, made.total, made.doing), shot.edits
+                shot.source,
+                shot.depth_strength,
+                lambda made: show(made.done, made.total, made.doing),
+                shot.edits,
+                on_ready=shot.lens.require_within,
             )
         if viewer.state.scene is not None:
             print_depth(viewer.state.scene.depth_origin)
             print_notes(viewer.state.scene.notes)
-        viewer.do(*shot.actions)
+        viewer.do(*shot.actions, *shot.lens.actions())
         pixels = viewer.screen(shot.size or SCREEN_SIZE) if ui else viewer.picture(shot.size, is_float(output))
     export_image(
         output, pixels, None if ui else settings_of(viewer.state, ScreenSize(pixels.shape[1], pixels.shape[0]))

@@ -25,10 +25,12 @@ from viewer.cli.options import (
     Refine,
     depth_choice,
     require_existing,
+    require_heeded,
 )
 
 
 def view(
+    context: typer.Context,
     path: Annotated[Path | None, typer.Argument(help="A photo or a light-field folder.", show_default="a demo")] = None,
     disparity: DisparityFile = None,
     disparity_scale: DisparityScale = 1.0,
@@ -57,6 +59,7 @@ def view(
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     source = Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint)
     require_existing(source)
+    require_heeded(context, path)
     if ground_truth is not None and not ground_truth.is_dir():
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
     from viewer.app.main_loop import initial_state, run

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.types import InputError
 
 TRANSFORMERS = "transformers"
@@ -117,14 +118,17 @@ def known_model(name: str) -> KnownModel:
     raise InputError(f"{name}: no depth model of this name is known; there are {names}")
 
 
-def model_to_use(wanted: str | None) -> LocalModel | None:
+def model_to_use(choice: DepthChoice) -> LocalModel | None:
     """The model that the user wants (a folder or a known name), else the usual one if it is ready, else None.
 
     Raises InputError where what is wanted is not here, or the package that runs it is not installed.
     """
+    wanted = choice.model
     if wanted is None:
         usual = known_model(USUAL_MODEL)
         folder = cached_folder(usual) if is_installed(usual.package) else None
+        if folder is None and choice.asks_for_model:
+            raise InputError(f"--depth model: none is on this machine; get one with: iibr models get {USUAL_MODEL}")
         return LocalModel(usual.title, folder, usual.package) if folder is not None else None
     path = Path(wanted).expanduser()
     if path.is_dir():

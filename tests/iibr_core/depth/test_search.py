@@ -10,6 +10,7 @@ import pytest
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
+from iibr_core.depth.models.catalog import USUAL_MODEL, known_model
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resize_estimate
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError
@@ -63,7 +64,7 @@ def test_the_order_file_embedded_rough(tmp_path: Path) -> None:
     found = open_with_depth(path, start_from("embedded"))
     assert (found.origin.kind, found.origin.line) == ("embedded", "Depth: the photo itself (Google GDepth).")
     assert is_nearer_inside(found)
-    found = open_with_depth(path, start_from("model"))  # none is here, and none was asked for
+    found = open_with_depth(path, start_from("rough"))
     assert (found.origin.kind, found.origin.failures) == ("rough", ())
     assert "--disparity" in found.origin.advice
     assert "--depth-model" in found.origin.advice
@@ -118,13 +119,31 @@ def test_damaged_depth_is_told_and_followed_by_the_next(
     assert found.origin.failures[0] in found.disparity.notes
 
 
-@pytest.mark.parametrize("files_there", [(), ("model.safetensors",), ("config.json", "pytorch_model.bin")])
-def test_a_model_that_is_none_is_told_and_followed_by_the_next(files_there: tuple[str, ...], tmp_path: Path) -> None:
-    model = tmp_path / "model"
-    model.mkdir()
+def damaged_model(folder: Path, files_there: tuple[str, ...]) -> Path:
+    folder.mkdir(parents=True)
     for name in files_there:
-        (model / name).write_text('{"model_type": "depth_anything"}')
-    found = open_with_depth(photo_file(tmp_path, None), DepthChoice(model=str(model)))
+        (folder / name).write_text('{"model_type": "depth_anything"}')
+    return folder
+
+
+@pytest.mark.parametrize("files_there", [(), ("model.safetensors",), ("config.json", "pytorch_model.bin")])
+def test_a_model_that_was_asked_for_must_be_good(files_there: tuple[str, ...], tmp_path: Path) -> None:
+    model = damaged_model(tmp_path / "model", files_there)
+    with pytest.raises(InputError, match="model"):
+        open_with_depth(photo_file(tmp_path, None), DepthChoice(model=str(model)))
+
+
+def test_a_model_is_asked_for_where_there_is_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="--depth model: none is on this machine"):
+        open_with_depth(photo_file(tmp_path), start_from("model"))
+
+
+def test_a_damaged_usual_model_is_told_and_followed_by_the_next(tmp_path: Path) -> None:
+    repository = tmp_path / "hub" / f"models--{known_model(USUAL_MODEL).repository.replace('/', '--')}"
+    damaged_model(repository / "snapshots" / "abc", ("config.json", "model.safetensors"))
+    (repository / "refs").mkdir()
+    (repository / "refs" / "main").write_text("abc")
+    found = open_with_depth(photo_file(tmp_path, None))
     assert found.origin.kind == "rough"
     assert found.origin.failures[0].startswith("The depth model was not used: ")
 

@@ -15,6 +15,7 @@ import pytest
 import torch
 import transformers
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import KNOWN_MODELS, LocalModel, cached_folder, fetch, known_model, model_to_use
@@ -409,10 +410,10 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, own_cach
 def test_models_are_found_by_folder_by_name_and_by_default(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
     folder = depth_anything(tmp_path / "model").folder
-    assert model_to_use(str(folder)) == LocalModel("the model in model", folder)
-    assert model_to_use(None) is None
+    assert model_to_use(DepthChoice(model=str(folder))) == LocalModel("the model in model", folder)
+    assert model_to_use(DepthChoice(model=None)) is None
     with pytest.raises(InputError, match="iibr models get depth-pro"):
-        model_to_use("depth-pro")
+        model_to_use(DepthChoice(model="depth-pro"))
     usual = known_model("depth-anything-v2-small")
     snapshot = tmp_path / "hub" / f"models--{usual.repository.replace('/', '--')}" / "snapshots" / "abc"
     snapshot.parent.mkdir(parents=True)
@@ -421,7 +422,7 @@ def test_models_are_found_by_folder_by_name_and_by_default(monkeypatch: pytest.M
     (snapshot.parent.parent / "refs" / "main").write_text("abc")
     monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
     for wanted in (None, usual.name):
-        found = model_to_use(wanted)
+        found = model_to_use(DepthChoice(model=wanted))
         assert found is not None
         assert (found.title, found.folder) == (usual.title, snapshot)
     (snapshot / "model.safetensors").unlink()
@@ -433,20 +434,20 @@ def test_models_that_are_none(wanted: str) -> None:
     if wanted == "":
         wanted = "no name"
     with pytest.raises(InputError):
-        model_to_use(wanted)
+        model_to_use(DepthChoice(model=wanted))
 
 
 def test_a_file_is_no_model(tmp_path: Path) -> None:
     (tmp_path / "a.safetensors").touch()
     with pytest.raises(InputError, match="takes the model's folder"):
-        model_to_use(str(tmp_path / "a.safetensors"))
+        model_to_use(DepthChoice(model=str(tmp_path / "a.safetensors")))
 
 
 @pytest.mark.parametrize("package", ["depth_anything_3", "unidepth", "moge"])
 def test_models_of_packages_that_are_not_installed(package: str) -> None:
     model = next(model for model in KNOWN_MODELS if model.package == package)
     with pytest.raises(InputError, match=f"package {package}.*not installed"):
-        model_to_use(model.name)
+        model_to_use(DepthChoice(model=model.name))
 
 
 UNIDEPTH = """
@@ -473,7 +474,7 @@ def test_a_package_is_called_as_it_documents(monkeypatch: pytest.MonkeyPatch, tm
     folder.mkdir()
     (folder / "config.json").write_text('{"model": {"name": "UniDepthV2"}}')
     (folder / "model.safetensors").touch()
-    model = model_to_use(str(folder))
+    model = model_to_use(DepthChoice(model=str(folder)))
     assert model is not None
     found = estimate_with(model, PHOTO)
     assert isinstance(found, MetricDepth)

@@ -144,11 +144,11 @@ def test_generate_says_where_depth_came_from(
     said = capsys.readouterr().err
     assert said.count("Depth: rough") == 1
     assert "iibr models" in said
-    # A bad model is told in a line, and the next source is taken.
-    assert run_command(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", tmp_path) == 0
-    notes = [line for line in capsys.readouterr().err.splitlines() if line.startswith("note: ")]
-    assert any("The depth model was not used" in note and "config.json" in note for note in notes)
-    assert any("Depth: rough" in note for note in notes)
+    # A bad model that was asked for is an error, and nothing is made.
+    assert run_command(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", tmp_path) == 2
+    (line,) = filter(None, capsys.readouterr().err.splitlines())
+    assert "config.json" in line
+    assert not (tmp_path / "c").exists()
 
 
 def test_a_bad_map_beside_the_photo_is_told_and_done_without(

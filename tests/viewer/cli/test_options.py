@@ -14,6 +14,7 @@ from viewer.cli.options import (
     grid_from_text,
     inpainter_from_text,
     memory_from_text,
+    not_negative_from_text,
     quality_from_text,
     size_from_text,
     view_from_text,
@@ -43,11 +44,12 @@ def test_values(parse: Callable[[str], object], text: str, value: object) -> Non
 @pytest.mark.parametrize(
     ("parse", "texts"),
     [
-        (grid_from_text, ["", "0", "-3", "3x0", "2.5", "3x3x3", str(MAX_GRID + 1), "x"]),
-        (size_from_text, ["", "12", "0x5", "axb", "99999x1", "3x-3"]),
+        (grid_from_text, ["", "0", "-3", "3x0", "2.5", "3x3x3", str(MAX_GRID + 1), "x", "9" * 5000]),
+        (size_from_text, ["", "12", "0x5", "axb", "99999x1", "3x-3", "9" * 5000 + "x1"]),
         (view_from_text, ["", "1", "1,2,3", "a,b", "nan,0", "0,inf"]),
-        (memory_from_text, ["", "0", "-1G", "lots", "1X"]),
+        (memory_from_text, ["", "0", "-1G", "lots", "1X", "9999999999T", "9" * 400, "9" * 5000]),
         (finite_from_text, ["", "nan", "inf", "1,5"]),
+        (not_negative_from_text, ["", "nan", "-1", "-1e-300"]),
         (quality_from_text, ["", "best", "Fast"]),
         (inpainter_from_text, ["", "magic", "Background"]),
     ],
