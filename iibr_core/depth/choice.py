@@ -24,13 +24,15 @@ class DepthOrigin:
     """Where the depth of a scene came from.
 
     words: a name for it ("scene.pfm", "the photo itself (Google GDepth)"). failures: what was tried before and why it
-    was not used, a sentence each. advice: how to get better depth, "" where there is none to give.
+    was not used, a sentence each. advice: how to get better depth, "" where there is none to give. file: path of the
+    map, where it came from one.
     """
 
     kind: DepthKind
     words: str
     failures: tuple[str, ...] = ()
     advice: str = ""
+    file: str | None = None
 
     @property
     def line(self) -> str:

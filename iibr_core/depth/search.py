@@ -129,7 +129,7 @@ class _DepthSearch:
 
     def of_file(self, path: Path) -> _FoundDepth:
         disparity = read_disparity(path, self.photo.size, self.choice.file_scale)
-        return _FoundDepth(self.photo, DepthOrigin("file", disparity.source), disparity)
+        return _FoundDepth(self.photo, DepthOrigin("file", disparity.source, file=str(path)), disparity)
 
     def sidecar(self) -> _FoundDepth | None:
         path = find_sidecar(self.path)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.formats.files import is_file
 from iibr_core.types import Disparity, ImageSize
 
 SIDECAR_KINDS = ("_disparity", "_depth")
@@ -21,7 +22,7 @@ def find_sidecar(photo_path: Path) -> Path | None:
     for kind in SIDECAR_KINDS:
         for extension in SIDECAR_EXTENSIONS:
             candidate = photo_path.with_name(photo_path.stem + kind + extension)
-            if candidate.is_file() and candidate != photo_path:
+            if is_file(candidate) and candidate != photo_path:
                 return candidate
     return None
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from iibr_core.formats.files import entries_of, is_folder
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.registry import LAYOUTS, find_light_field
@@ -32,13 +33,13 @@ def read_scene(folder: Path) -> MultiView | None:
 
 def find_scenes(folder: Path) -> Iterator[MultiView]:
     """The scene of a folder, or those of its subfolders. Raises InputError where there is none, or one is damaged."""
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InputError(f"{folder}: is no folder; give the folder of a data set ({LAYOUTS})")
     scene = read_scene(folder)
     if scene is not None:
         yield scene
         return
-    below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+    below = [path for path in entries_of(folder) if is_folder(path) and not path.name.startswith(".")]
     found = [scene for path in below if (scene := read_scene(path)) is not None]
     if not found:
         raise InputError(f"{folder}: holds no scene with several views; laid out as {LAYOUTS}")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.formats.files import is_file
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.scene import MultiView
@@ -36,7 +37,7 @@ def read_lens_picture(scene: MultiView, max_pixels: int) -> LensPicture | None:
     """That of a scene, made smaller as its views are; None where there is none. Raises InputError for damaged ones."""
     beside = scene.views[scene.centre].path
     folder = beside.parent.parent if beside.parent.name == "views" else beside.parent
-    if not (folder / ABOUT).is_file():
+    if not is_file(folder / ABOUT):
         return None
     focus_disparity, radius_views = _numbers(folder / ABOUT)
     if (size := read_size(folder / PICTURE)) != (wanted := read_size(beside)):

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from iibr_core.formats.files import is_file
 from iibr_core.types import FloatImage, InputError
 
 LAYERS = ((0, 64, 4, 2), (3, 192, 1, 2), (6, 384, 1, 1), (8, 256, 1, 1), (10, 256, 1, 1))
@@ -61,7 +62,7 @@ class Lpips:
 
 
 def _tensors(path: Path, names: list[str]) -> list[Tensor]:
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path}: no such file; --lpips wants a folder with {FILES}")
     try:
         stored = torch.load(path, map_location="cpu", weights_only=True)

@@ -12,6 +12,7 @@ from typing import Any
 from iibr_core.evaluation.page import page_of
 from iibr_core.evaluation.protocol import EvaluationResult
 from iibr_core.evaluation.refocus import RefocusResult
+from iibr_core.evaluation.report_folder import FILES
 from iibr_core.evaluation.tables import (
     ABOUT_CONSISTENCY,
     Table,
@@ -23,19 +24,7 @@ from iibr_core.evaluation.tables import (
     refocus_table,
     summary_table,
 )
-from iibr_core.formats.files import atomic_write
-from iibr_core.types import InputError
-
-FILES = ("report.json", "report.md", "index.html")
-
-
-def require_report_folder(folder: Path) -> None:
-    """Raise InputError where reports cannot be written, before hours are spent on figures."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file; --out names a folder")
-    existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
-    if not existing.is_dir():
-        raise InputError(f"{folder}: {existing} is a file; choose another place with --out")
+from iibr_core.formats.outputs import atomic_write, make_folder
 
 
 def write_report(folder: Path, results: Sequence[EvaluationResult], command: str) -> None:
@@ -44,10 +33,7 @@ def write_report(folder: Path, results: Sequence[EvaluationResult], command: str
     Raises InputError where the folder cannot be written.
     """
     texts = (json_of(results, command), markdown_of(results, command), page_of(results, command))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be created ({error.strerror}); choose another place with --out") from error
+    make_folder(folder)
     for name, text in zip(FILES, texts):
         with atomic_write(folder / name) as temporary:
             temporary.write_text(text, encoding="utf-8")

@@ -1,13 +1,18 @@
-"""Files on disk: there before they are read; written whole or not at all (under another name, then renamed)."""
+"""Files on disk as they are found: what is at a path, whether it may be read, how much may come of it.
+
+Paths come from people: what cannot be looked at is refused in one line, here, so everybody asks here (`outputs.py` for
+what is written).
+"""
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
-from uuid import uuid4
 
 from iibr_core.types import InputError
 
@@ -18,7 +23,7 @@ MOST_INFLATION = 500
 HARMLESS_BYTES = 256 * 2**20
 """Whatever the file's size, so much may be decoded from it."""
 
-
+NOTHING_THERE = (errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ENAMETOOLONG)
 MOST_REASON_CHARACTERS = 200
 
 
@@ -33,41 +38,51 @@ def reason_of(failure: Exception | str) -> str:
     return type(failure).__name__ if isinstance(failure, Exception) else "no reason given"
 
 
-def temporary_sibling(path: Path) -> Path:
-    """An unused name in the folder of `path`, with its extension (writers choose the format by it)."""
-    return path.with_name(f".{path.stem}.{uuid4().hex[:12]}{path.suffix}")
+def status_of(path: Path) -> os.stat_result | None:
+    """What is at `path`, links followed; None where nothing is, or nothing can be of such a name.
 
-
-def require_folder_of(path: Path) -> None:
-    """Raise InputError unless there is a folder for `path` to be written into."""
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; create it or choose another")
-
-
-@contextmanager
-def atomic_write(path: Path) -> Iterator[Path]:
-    """Yield the temporary name to write to; it takes the place of `path` when the block ends well, else it is removed.
-
-    Raises InputError where the folder is missing, is no folder, or may not be written to.
+    Raises InputError where that may not be known, as below a folder without search permission.
     """
-    require_folder_of(path)
-    temporary = temporary_sibling(path)
     try:
-        yield temporary
-        temporary.replace(path)
+        return os.stat(path)
+    except ValueError:  # a NUL in the name
+        return None
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+        if error.errno in NOTHING_THERE:
+            return None
+        raise InputError(
+            f"{path}: cannot be looked at ({error.strerror or error}); change the permissions of its folders"
+        ) from error
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is an ordinary file. Raises InputError as `status_of` does."""
+    status = status_of(path)
+    return status is not None and stat.S_ISREG(status.st_mode)
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder. Raises InputError as `status_of` does."""
+    status = status_of(path)
+    return status is not None and stat.S_ISDIR(status.st_mode)
+
+
+def entries_of(folder: Path) -> list[Path]:
+    """What lies in a folder, by name. Raises InputError where it cannot be listed."""
+    try:
+        return sorted(folder.iterdir())
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror or error}); change its permissions") from error
 
 
 def require_file(path: Path) -> None:
     """Raise InputError unless `path` is a readable file with something in it."""
-    if path.is_dir():
+    status = status_of(path)
+    if status is not None and stat.S_ISDIR(status.st_mode):
         raise InputError(f"{path}: is a folder, not a file")
-    if not path.is_file():
+    if status is None or not stat.S_ISREG(status.st_mode):
         raise InputError(f"{path}: no such file")
-    if path.stat().st_size == 0:
+    if status.st_size == 0:
         raise InputError(f"{path}: the file is empty (0 bytes)")
     if not os.access(path, os.R_OK):
         raise InputError(f"{path}: may not be read; change its permissions")

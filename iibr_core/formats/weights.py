@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 
-from iibr_core.formats.files import atomic_write, reason_of, require_file
+from iibr_core.formats.files import reason_of, require_file
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 
 if TYPE_CHECKING:

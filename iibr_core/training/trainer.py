@@ -21,9 +21,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iibr_core.formats.files import atomic_write
+from iibr_core.formats.files import is_file
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.formats.weights import load_weights, read_tensors, require_shapes, save_weights, write_tensors
 from iibr_core.training.losses import EpiShape, LossWeights, to_perceptual, total_loss
+from iibr_core.training.run_files import checkpoint_path, log_path, require_run_files
 from iibr_core.types import InputError, ReportProgress, ignore_progress
 
 __all__ = [
@@ -121,7 +123,7 @@ def train(
     Raises InputError for a bad path, device or checkpoint, TrainingDiverged (the checkpoint stays the last good one),
     KeyboardInterrupt once what has been trained is saved, for resume.
     """
-    _require_place(out)
+    require_run_files(out)
     device = choose_device(config.device)
     model.to(device).train()
     run = _Run(model, config, checkpoint_path(out))
@@ -142,16 +144,6 @@ def train(
             run.save()
             raise
     save_weights(model, out, {**(metadata or {}), "training": json.dumps(asdict(config))})
-
-
-def checkpoint_path(out: Path) -> Path:
-    """Where training towards `out` keeps its newest checkpoint."""
-    return out.with_suffix(".checkpoint.safetensors")
-
-
-def log_path(out: Path) -> Path:
-    """Where training towards `out` keeps its log: CSV, one row a step, columns LOG_COLUMNS, losses without lambdas."""
-    return out.with_suffix(".csv")
 
 
 def choose_device(name: str) -> torch.device:
@@ -307,27 +299,32 @@ def _require_same_course(path: Path, before: Mapping[str, object], now: TrainCon
             raise InputError(f"{path}: was trained with {name} {was}, not {value}; give {was} or start anew")
 
 
-def _require_place(out: Path) -> None:
-    """Better to know before an hour of training than after it."""
-    if out.suffix != ".safetensors":
-        raise InputError(f"{out}: weights are written as .safetensors; name the file so")
-    if out.is_dir():
-        raise InputError(f"{out}: is a folder, not a file; name a file in it")
-
-
 @contextmanager
 def _log(path: Path, done: int) -> Iterator[Callable[[_Row], None]]:
-    """Yield what writes a row. Rows up to step `done` of the log that is there stay, what came after them goes."""
-    rows = path.read_text(errors="replace").splitlines() if done and path.is_file() else []
+    """Yield what writes a row. Rows up to step `done` of the log that is there stay, what came after them goes.
+
+    A log without any row is removed again. Raises InputError where it cannot be written.
+    """
+    rows = path.read_text(errors="replace").splitlines() if done and is_file(path) else []
     kept = [row for row in rows if row.count(",") == len(LOG_COLUMNS) - 1 and _step_of(row) <= done]
     with atomic_write(path) as temporary:
         temporary.write_text("".join(line + "\n" for line in [",".join(LOG_COLUMNS), *kept]))
-    with path.open("a", buffering=1) as file:
+    is_empty = not kept
 
-        def write_row(row: _Row) -> None:
-            file.write(",".join(f"{value:.9g}" for value in row) + "\n")
+    def write_row(row: _Row) -> None:
+        nonlocal is_empty
+        try:
+            with path.open("a") as file:
+                file.write(",".join(f"{value:.9g}" for value in row) + "\n")
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written ({error.strerror}); make room, or choose another") from error
+        is_empty = False
 
+    try:
         yield write_row
+    finally:
+        if is_empty:
+            path.unlink(missing_ok=True)
 
 
 def _step_of(row: str) -> float:

@@ -7,13 +7,14 @@ opened, or the depth edited. Closing the window gives up what is being drawn and
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import InputError
-from viewer.app.image_export import AlreadyThereError, export_picture, is_float, picture_path, settings_of
+from viewer.app.image_export import export_picture, is_float, picture_path, settings_of
 from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.jobs import message_of
 from viewer.display.scene_view import SceneView
@@ -49,12 +50,12 @@ class PictureSaver:
         """Whether `advance` has something to draw."""
         return bool(self._requests) and not self._is_writing
 
-    def add(self, task: SaveTask, state: AppState) -> list[Action]:
-        """Save the present picture after those asked for before; says so where that cannot be."""
+    def add(self, task: SaveTask, state: AppState, inputs: Sequence[Path]) -> list[Action]:
+        """Save the present picture after those asked for before; says so where that cannot be. inputs: what is read."""
         if state.scene is None:
             return []
         try:
-            path = picture_path(task)
+            path = picture_path(task, inputs)
             if not task.may_replace and any(request.path == path for request in self._requests):
                 raise AlreadyThereError(f"{path}: is about to be written")
         except AlreadyThereError:

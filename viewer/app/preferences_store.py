@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import atomic_write
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
 from viewer.model.reducers.worker_events import RECENT_KEPT
@@ -68,10 +68,10 @@ def _write(path: Path, value: Any) -> None:
 
 def _read(path: Path) -> Any:
     """What the file holds; None where there is none. Raises InputError where it is damaged."""
-    if not path.exists():
-        return None
     try:
         return json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        return None
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: damaged ({' '.join(str(error).split())[:80]})") from error
 

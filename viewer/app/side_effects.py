@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -9,9 +10,10 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import InputError
 from viewer.app.dialogs import Dialog, has_dialogs
-from viewer.app.image_export import AlreadyThereError, export_map, map_path
+from viewer.app.image_export import export_map, inputs_of_scene, map_path
 from viewer.app.picture_saver import PictureSaver
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
@@ -43,6 +45,7 @@ class SideEffects:
         self._files = FileWorker("iibr-files", wake)
         self._ids = count(1)
         self._under_way: set[int] = set()
+        self._masks: list[Path] = []
         self._dialog: Dialog | None = None
 
     @property
@@ -80,16 +83,20 @@ class SideEffects:
                     return [AskForPath(what)]
                 self._dialog = self._dialog or Dialog(what)
             case ReadMaskTask(path):
-                self._submit(partial(_read_mask, path))
+                self._masks.append(Path(os.path.expanduser(path)))
+                self._submit(partial(_read_mask, self._masks[-1]))
             case ReadTruthTask(path):
                 self._submit(partial(read_truth, path))
             case SaveTask(what="map"):
                 return self._save_map(task, state)
             case SaveTask():
-                return self._saver.add(task, state)
+                return self._saver.add(task, state, self._inputs(state))
             case CancelSaveTask():
                 self._saver.cancel()
         return []
+
+    def _inputs(self, state: AppState) -> tuple[Path, ...]:
+        return (*inputs_of_scene(state), *self._masks)
 
     def _submit(self, work: Callable[[], Any]) -> None:
         id_ = next(self._ids)
@@ -103,7 +110,7 @@ class SideEffects:
         if self._scene_view.generation != state.generation:
             return [Notify(Notice("The map is still being made; save it again in a moment."))]
         try:
-            path = map_path(task)
+            path = map_path(task, self._inputs(state))
             if self._scene_view.loaded is None:
                 raise InputError(f"{path}: this scene has no disparity map of its own")
         except AlreadyThereError:
@@ -155,13 +162,13 @@ def read_truth(path: str) -> GroundTruth:
     from iibr_core.formats.light_fields.scene import common_size
     from iibr_core.formats.light_fields.views import grid_of
 
-    field = open_light_field(Path(path).expanduser())
+    field = open_light_field(Path(os.path.expanduser(path)))
     grid, (height, width) = grid_of(field), common_size(field.views)
     return GroundTruth(path, field.name, grid, width, height)
 
 
-def _read_mask(path: str) -> ApertureMask:
+def _read_mask(path: Path) -> ApertureMask:
     """Raises InputError where it is no mask."""
     from viewer.model.lens.aperture_mask import read_mask
 
-    return read_mask(Path(path).expanduser())
+    return read_mask(path)

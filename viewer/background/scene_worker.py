@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.formats.files import is_folder
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
@@ -97,7 +98,7 @@ def results_of(
     report_progress: is told what it does until there is a scene. Raises InputError for a file that cannot be opened,
     Cancelled where should_stop says so while it is read.
     """
-    if Path(request.source.path).is_dir():
+    if is_folder(Path(request.source.path)):
         yield from _results_of_folder(request, should_stop)
     else:
         yield from _results_of_photo(request, should_stop, nearest_to, report_progress)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from iibr_core.formats.outputs import make_folder, require_files_in
 from iibr_core.types import InputError
-from viewer.cli.options import SCREEN_SIZE
+from viewer.cli.options import SCREEN_SIZE, inputs_with_sidecar
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
@@ -50,11 +51,13 @@ def _demo_pictures(source: Source) -> None:
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image
 
-    DEMO_FOLDER.mkdir(exist_ok=True)
+    window, views = DEMO_FOLDER / "demo.png", DEMO_FOLDER / "demo-views.png"
+    require_files_in(DEMO_FOLDER, (window.name, views.name), inputs_with_sidecar(source), may_replace=True)
+    make_folder(DEMO_FOLDER)
     with HeadlessViewer() as viewer:
         with show_progress("reading") as show:
             viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total, progress.doing))
-        export_image(DEMO_FOLDER / "demo.png", viewer.screen(SCREEN_SIZE) if viewer.has_panels else viewer.picture())
-        export_image(DEMO_FOLDER / "demo-views.png", contact_sheet(viewer))
-    print(f"{DEMO_FOLDER / 'demo.png'}: the viewer's window")
-    print(f"{DEMO_FOLDER / 'demo-views.png'}: viewpoints above, focus from near to far below")
+        export_image(window, viewer.screen(SCREEN_SIZE) if viewer.has_panels else viewer.picture())
+        export_image(views, contact_sheet(viewer))
+    print(f"{window}: the viewer's window")
+    print(f"{views}: viewpoints above, focus from near to far below")

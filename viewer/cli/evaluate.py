@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from importlib.util import find_spec
@@ -11,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.formats.files import is_file, status_of
 from iibr_core.types import InputError, Quality
-from viewer.cli.options import DepthModel, MaxPixels, Refine, quality_from_text, require_model
+from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, quality_from_text, require_model
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
@@ -58,20 +60,25 @@ def evaluate(
             metavar="DIR", help="LPIPS too: its alex.pth and torchvision's alexnet-*.pth.", show_default=False
         ),
     ] = None,
+    force: Force = False,
 ) -> None:
     """Judge views against data sets whose true views are known, beside a plain warp and beside doing nothing.
 
     Example: iibr evaluate hci/dino hci/cotton --out report
     """
     _require_packages("scipy", "skimage", "jinja2")
+    from iibr_core.evaluation.report_folder import require_report_folder
+
+    others = [Path(os.path.expanduser(path)) for path in (disparity, depth_model, lpips) if path is not None]
+    require_report_folder(out, [path for path in (*datasets, *others) if status_of(path) is not None], force)
+
     from iibr_core.evaluation.datasets import find_scenes
     from iibr_core.evaluation.protocol import QUALITIES, Options
     from iibr_core.evaluation.protocol import evaluate as evaluate_scene
-    from iibr_core.evaluation.report import require_report_folder, write_report
+    from iibr_core.evaluation.report import write_report
     from iibr_core.evaluation.tables import summary_line
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 
-    require_report_folder(out)
     chosen: tuple[Quality, ...] = tuple(dict.fromkeys(quality)) if quality else QUALITIES
     choice = DepthChoice(model=depth_model, refine=refine)
     require_model(choice)
@@ -81,12 +88,12 @@ def evaluate(
     with show_progress("reading") as show:
         for scene in scenes:
             results += evaluate_scene(scene, options, show)
+    write_report(out, results, shlex.join(["iibr", *sys.argv[1:]]))
     for result in results:
         print(summary_line(result))
     notes = dict.fromkeys(f"{result.scene}: {note}" for result in results for note in result.notes)
-    print_notes(tuple(notes))
-    write_report(out, results, shlex.join(["iibr", *sys.argv[1:]]))
     print(out / "index.html")
+    print_notes(tuple(notes))
 
 
 def _require_packages(*names: str) -> None:
@@ -105,6 +112,6 @@ def _disparity_source(text: str) -> DisparityFrom | Path:
         if text == word:
             return word
     path = Path(text)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"--disparity {text}: is no file; give {', '.join(words)} or a disparity map")
     return path

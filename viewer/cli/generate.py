@@ -16,6 +16,7 @@ from viewer.cli.options import (
     DepthModel,
     DisparityFile,
     DisparityScale,
+    Force,
     Inpaint,
     LightFieldFormat,
     MaxPixels,
@@ -25,6 +26,8 @@ from viewer.cli.options import (
     Refine,
     depth_choice,
     grid_from_text,
+    inputs_with_sidecar,
+    require_existing,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
@@ -44,27 +47,32 @@ def generate(
     memory: Memory = None,
     quality: QualityChoice = DEFAULT_QUALITY,
     inpaint: Inpaint = DEFAULT_INPAINTER,
+    force: Force = False,
 ) -> None:
     """Write the light field of a photo; its disparity counts literally, in pixels per view.
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
     """
     from iibr_core.formats.light_fields.registry import writer_for
-    from iibr_core.generation.light_field import generate as generated
-    from iibr_core.generation.plan import plan_literal
-    from viewer.background.loaded_photo import load_photo
     from viewer.model.state.app_state import Source
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     source = Source(str(photo), choice, grid, max_pixels=max_pixels)
+    require_existing(source)
+    new_writer = writer_for(format)
+    new_writer.require_place(out, inputs_with_sidecar(source), force)
+
+    from iibr_core.generation.light_field import generate as generated
+    from iibr_core.generation.plan import plan_literal
+    from viewer.background.loaded_photo import load_photo
+
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing))
-    print_notes(loaded.photo.notes + loaded.disparity.notes)
     plan = plan_literal(loaded.photo, loaded.disparity, grid, memory)
     total = grid.rows * grid.columns
     views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality, inpaint=inpaint)
     with (
-        writer_for(format)(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
+        new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         show_progress("making views") as show,
         closing(views),
     ):
@@ -75,6 +83,7 @@ def generate(
             seconds += time.perf_counter() - start
             writer.add(update)
             show(done, total)
-    print_depth(loaded.origin)
     height, width = loaded.photo.size
     print(f"{total} views of {width}x{height} in {seconds:.2f} s ({1000 * seconds / total:.1f} ms per view): {out}")
+    print_notes(loaded.photo.notes + loaded.disparity.notes)
+    print_depth(loaded.origin)

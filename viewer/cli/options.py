@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
+from iibr_core.formats.files import is_folder, status_of
 from iibr_core.formats.light_fields.registry import WRITERS
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
@@ -122,7 +123,7 @@ def depth_choice(
 def require_heeded(context: typer.Context, path: Path) -> None:
     """Raise InputError for options given that a light field at `path` would not heed."""
     given = given_options(context) & NOT_FOR_LIGHT_FIELDS
-    if not given or not path.is_dir():
+    if not given or not is_folder(path):
         return
     options = [parameter.opts[0] for parameter in context.command.params if parameter.name in given]
     raise InputError(f"{' and '.join(options)}: {path} is a folder, and its views are taken as they are; leave it out")
@@ -131,7 +132,7 @@ def require_heeded(context: typer.Context, path: Path) -> None:
 def require_existing(source: Source) -> None:
     """Raise InputError before a window opens, rather than say so in it."""
     for path in (source.path, source.depth.file):
-        if path is not None and not Path(path).exists():
+        if path is not None and status_of(Path(path)) is None:
             raise InputError(f"{path}: no such file")
     require_model(source.depth)
 
@@ -142,6 +143,15 @@ def require_model(choice: DepthChoice) -> None:
         from iibr_core.depth.models.catalog import model_to_use
 
         model_to_use(choice)
+
+
+def inputs_with_sidecar(source: Source, *more: Path | None) -> tuple[Path, ...]:
+    """What a command reads, and nothing may be written onto: the source, the map that lies beside it, and more."""
+    from iibr_core.depth.sidecar import find_sidecar
+    from viewer.app.image_export import inputs_of
+
+    beside = find_sidecar(Path(source.path)) if source.depth.start == "auto" and source.depth.file is None else None
+    return (*inputs_of(source), *(path for path in (beside, *more) if path is not None))
 
 
 def memory_from_text(text: str) -> int:
@@ -232,6 +242,8 @@ Memory = Annotated[
     int | None,
     typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
 ]
+
+Force = Annotated[bool, typer.Option("--force", help="Replace what is there already; what is read, never.")]
 
 LightFieldFormat = Annotated[
     str, typer.Option("--format", parser=format_from_text, metavar="|".join(WRITERS), help="Layout of the folder.")

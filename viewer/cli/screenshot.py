@@ -21,6 +21,7 @@ from viewer.cli.options import (
     DisparityFile,
     DisparityScale,
     FocusDisparity,
+    Force,
     Grid,
     Inpaint,
     MaxPixels,
@@ -30,6 +31,7 @@ from viewer.cli.options import (
     ScenePath,
     depth_choice,
     given_options,
+    inputs_with_sidecar,
     not_negative_from_text,
     number_option,
     require_existing,
@@ -41,6 +43,7 @@ from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.model.layout import ScreenSize
 
 if TYPE_CHECKING:
+    from iibr_core.depth.choice import DepthOrigin
     from viewer.model.actions import Action
     from viewer.model.state.app_state import Scene, Source
 
@@ -90,13 +93,16 @@ class _LensOptions:
 
 @dataclass(frozen=True)
 class _Shot:
-    """What is opened, and what is done to it before the picture is taken. size: None for the usual one."""
+    """What is opened, and what is done to it before the picture is taken. size: None for the usual one. notes: to be
+    said with it.
+    """
 
     source: Source
     depth_strength: float
     size: ScreenSize | None
     edits: DepthEdits = UNEDITED
     actions: tuple[Action, ...] = ()
+    notes: tuple[str, ...] = ()
     lens: _LensOptions = _LensOptions()
 
 
@@ -143,11 +149,13 @@ def screenshot(
     memory: Memory = None,
     quality: QualityChoice = DEFAULT_QUALITY,
     inpaint: Inpaint = DEFAULT_INPAINTER,
+    force: Force = False,
 ) -> None:
     """Render one picture without a display; its settings are saved in it.
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
+    from viewer.app.image_export import require_picture_place
     from viewer.model.state.app_state import Source
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
@@ -156,8 +164,12 @@ def screenshot(
     require_heeded(context, path)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
-    _write(replace(shot, lens=_LensOptions(view, focus, aperture)), output, ui, backend)
+    require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)
+    shot = replace(shot, lens=_LensOptions(view, focus, aperture))
+    notes, origin = _write(shot, output, ui, backend)
     print(output)
+    print_depth(origin)
+    print_notes(shot.notes + notes)
 
 
 def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Shot:
@@ -166,17 +178,18 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
     from viewer.model.saved_settings import read_settings, source_like, unknown_note
 
     saved = read_settings(like)
-    print_notes(tuple(filter(None, [unknown_note(saved)])))
     return _Shot(
         source_like(shot.source, saved, given),
         shot.depth_strength if "depth_strength" in given else saved.depth_strength,
         shot.size or (None if ui else ScreenSize(*saved.size_px)),
         saved.depth_edits,
         (TakeSettings(saved),),
+        tuple(filter(None, [unknown_note(saved)])),
     )
 
 
-def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> None:
+def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple[str, ...], DepthOrigin | None]:
+    """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image, is_float, settings_of
 
@@ -191,11 +204,10 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> None:
                 shot.edits,
                 on_ready=shot.lens.require_within,
             )
-        if viewer.state.scene is not None:
-            print_depth(viewer.state.scene.depth_origin)
-            print_notes(viewer.state.scene.notes)
         viewer.do(*shot.actions, *shot.lens.actions())
         pixels = viewer.screen(shot.size or SCREEN_SIZE) if ui else viewer.picture(shot.size, is_float(output))
     export_image(
         output, pixels, None if ui else settings_of(viewer.state, ScreenSize(pixels.shape[1], pixels.shape[0]))
     )
+    scene = viewer.state.scene
+    return (scene.notes, scene.depth_origin) if scene is not None else ((), None)

@@ -1,4 +1,6 @@
-"""What commands say on stderr while they work: notes, where depth comes from, a bar."""
+"""What commands say on stderr: a bar while they work; notes, and where depth comes from, once all went well: an error
+is the only line.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ class Commands(TyperGroup):
 
 
 def print_notes(notes: tuple[str, ...]) -> None:
-    """One line each."""
+    """One line each, for the end of a command that succeeded: what it says on stdout comes first, and may fail."""
+    sys.stdout.flush()
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
 
@@ -42,7 +45,8 @@ def show_progress(doing: str) -> Iterator[Callable[..., None]]:
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(doing, total=None)
 
         def show(done: int, total: int, now: str = "") -> None:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.formats.files import is_file
 from iibr_core.types import ReportProgress
+from viewer.cli.options import Force
 
 if TYPE_CHECKING:
     from iibr_core.training.trainer import Batch
@@ -30,11 +32,15 @@ def train(
     device: Annotated[str, typer.Option(metavar="NAME", help="auto, cpu, cuda, cuda:1 or mps.")] = "auto",
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint beside the weights.")] = False,
     checkpoint_every: Annotated[int, typer.Option(min=1, help="Steps from one checkpoint to the next.")] = 500,
+    force: Force = False,
 ) -> None:
     """Train the ray transformer on made-up scenes. Ctrl-C saves, --resume goes on; a log lies beside the weights.
 
     Example: iibr train --steps 2500 --learning-rate 3e-3 --out weights.safetensors
     """
+    from iibr_core.training.run_files import require_run_files
+
+    require_run_files(out, may_replace=force or resume)
     raise typer.Exit(train_weights(steps, out, seed, learning_rate, device, resume, checkpoint_every))
 
 
@@ -74,7 +80,7 @@ def train_weights(
             about = {"command": published}
             trainer.train(model, batches, config, out, resume=resume, metadata=about, report_progress=show)
     except KeyboardInterrupt:
-        if not trainer.checkpoint_path(out).is_file():
+        if not is_file(trainer.checkpoint_path(out)):
             return _report_end("interrupted before the first step was done", EXIT_INTERRUPTED)
         again = command if resume else f"{command} --resume"
         return _report_end(f"interrupted; what was learned is saved, go on with: {again}", EXIT_INTERRUPTED)
@@ -96,6 +102,7 @@ def _show_bar() -> Iterator[ReportProgress]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[loss]}"), TimeRemainingColumn())
-    with Progress("training", *columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress("training", *columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=None, loss="")
         yield lambda done, total, doing: bar.update(task, completed=done, total=total, loss=doing)

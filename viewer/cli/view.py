@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from iibr_core.formats.files import is_folder
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import DEFAULT_QUALITY, InputError
 from viewer.cli.demo import demo_photo
@@ -60,7 +61,7 @@ def view(
     source = Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint)
     require_existing(source)
     require_heeded(context, path)
-    if ground_truth is not None and not ground_truth.is_dir():
+    if ground_truth is not None and not is_folder(ground_truth):
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import user_folder

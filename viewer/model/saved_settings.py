@@ -111,10 +111,10 @@ def settings_text_in(path: Path) -> str:
     """The text of the settings in a picture's header, "" without. Raises InputError where it is no picture."""
     import OpenImageIO as oiio
 
+    from iibr_core.formats.files import require_file
     from iibr_core.formats.images.oiio_reader import complaint_of
 
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
+    require_file(path)
     source = oiio.ImageInput.open(str(path))
     if source is None:
         raise InputError(f"{path}: is no picture ({' '.join(complaint_of(oiio).split())[:120] or 'no reason given'})")

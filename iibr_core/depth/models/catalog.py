@@ -6,11 +6,13 @@ Only safetensors files are ever fetched or read: pickled weights run code.
 from __future__ import annotations
 
 import importlib.util
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.formats.files import is_file, is_folder
 from iibr_core.types import InputError
 
 TRANSFORMERS = "transformers"
@@ -130,10 +132,10 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
         if folder is None and choice.asks_for_model:
             raise InputError(f"--depth model: none is on this machine; get one with: iibr models get {USUAL_MODEL}")
         return LocalModel(usual.title, folder, usual.package) if folder is not None else None
-    path = Path(wanted).expanduser()
-    if path.is_dir():
+    path = Path(os.path.expanduser(wanted))
+    if is_folder(path):
         return _model_in(path)
-    if path.exists():
+    if is_file(path):
         raise InputError(f"{wanted}: is a file; --depth-model takes the model's folder, or a name `iibr models` lists")
     if "/" in wanted or "\\" in wanted:
         raise InputError(f"{wanted}: no such folder")
@@ -158,7 +160,7 @@ def cached_folder(model: KnownModel) -> Path | None:
 
     # Looked for by hand first: importing the rest of the library takes half a second.
     repository = Path(constants.HF_HUB_CACHE) / f"models--{model.repository.replace('/', '--')}"
-    if not repository.is_dir():
+    if not os.path.isdir(repository):  # nor where it may not be looked at
         return None
     from huggingface_hub import try_to_load_from_cache
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from iibr_core.formats.files import is_file
 from iibr_core.types import ImageSize, InputError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
@@ -83,7 +84,7 @@ def read_preparation(folder: Path, kind: str) -> Preparation:
 
 def _json_object(folder: Path, name: str) -> dict[str, Any]:
     path = folder / name
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{folder}: holds no {name}; get the whole model folder")
     try:
         if path.stat().st_size > MAX_CONFIG_BYTES:

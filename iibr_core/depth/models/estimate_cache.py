@@ -11,7 +11,6 @@ import os
 import zipfile
 import zlib
 from pathlib import Path
-from uuid import uuid4
 
 import numpy as np
 
@@ -19,7 +18,8 @@ from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, Relat
 from iibr_core.depth.models.catalog import weight_files
 from iibr_core.depth.models.config import CONFIG, PREPROCESSOR
 from iibr_core.formats.maps import npy
-from iibr_core.types import FloatImage
+from iibr_core.formats.outputs import atomic_write
+from iibr_core.types import FloatImage, InputError
 
 MAX_BYTES = 512 * 2**20
 FORMAT = "1"
@@ -67,23 +67,18 @@ def load(key: str) -> Estimate | None:
 def store(key: str, estimate: Estimate) -> None:
     """Keep an estimate; the least recently used ones go where all exceed MAX_BYTES."""
     folder = cache_folder()
-    temporary = folder / f".{uuid4().hex}.npz"
-    try:
+    # read-only or full: the estimate is made anew the next time
+    with contextlib.suppress(OSError, InputError):
         folder.mkdir(parents=True, exist_ok=True)
-        match estimate:
-            case RelativeInverseDepth(values):
-                np.savez(temporary, kind="relative", values=values, focal_px=0.0)
-            case MetricDepth(values, focal_px):
-                np.savez(temporary, kind="metric", values=values, focal_px=focal_px or 0.0)
-            case DisparityMap(values):
-                np.savez(temporary, kind="disparity", values=values, focal_px=0.0)
-        temporary.replace(folder / f"{key}.npz")
+        with atomic_write(folder / f"{key}.npz") as temporary:
+            match estimate:
+                case RelativeInverseDepth(values):
+                    np.savez(temporary, kind="relative", values=values, focal_px=0.0)
+                case MetricDepth(values, focal_px):
+                    np.savez(temporary, kind="metric", values=values, focal_px=focal_px or 0.0)
+                case DisparityMap(values):
+                    np.savez(temporary, kind="disparity", values=values, focal_px=0.0)
         _make_room(folder)
-    except OSError:
-        pass  # read-only or full: the estimate is made anew the next time
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def _make_room(folder: Path) -> None:

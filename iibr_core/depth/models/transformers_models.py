@@ -19,6 +19,7 @@ from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, Relat
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
 from iibr_core.depth.models.config import Preparation, read_config, read_preparation
+from iibr_core.formats.files import is_folder
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress, image_size
@@ -251,7 +252,7 @@ def _depth_pro_estimate(canonical: FloatImage, field_of_view: Any) -> Estimate:
 
 def _require_weights(folder: Path) -> None:
     """Raises InputError where a model folder holds no safetensors weights; pickled ones are told apart."""
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InputError(f"{folder}: no such folder")
     if any(weight_files(folder)):
         return

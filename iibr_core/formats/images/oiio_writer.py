@@ -11,8 +11,9 @@ from typing import Any
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import atomic_write, reason_of
+from iibr_core.formats.files import reason_of
 from iibr_core.formats.images.oiio_reader import complaint_of, require_whole_png
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 
 

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import math
 import re
-import shutil
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 
-from iibr_core.formats.files import temporary_sibling
+from iibr_core.formats.files import entries_of, is_folder
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_grid, write_parameters
 from iibr_core.formats.light_fields.scene import MultiView
@@ -29,6 +28,7 @@ from iibr_core.formats.light_fields.view_grid import (
     set_view,
 )
 from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place
 from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
 
 CAM_NAME = re.compile(r"input_cam(\d{1,9})$", re.IGNORECASE)
@@ -55,18 +55,19 @@ class HciWriter:
         self._range = (math.inf, -math.inf)
         self._pending: list[Future[None]] = []
 
+    @staticmethod
+    def require_place(folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
+        """Raise InputError as `require_folder_place` does, and where the folder holds anything but a light field."""
+        if is_folder(folder):
+            foreign = next((file.name for file in entries_of(folder) if not OWN_FILE.fullmatch(file.name)), None)
+            if foreign is not None:
+                raise InputError(f"{folder}: holds other files ({foreign}); choose an empty or new folder with --out")
+        require_folder_place(folder, inputs, may_replace, is_whole=True)
+
     def __enter__(self) -> HciWriter:
         """Make the temporary folder."""
-        _require_replaceable(self.folder)
-        self._made_parents = [parent for parent in self.folder.parents if not parent.exists()]
-        self._temporary = temporary_sibling(self.folder)
-        try:
-            self._temporary.mkdir(parents=True)
-        except OSError as error:
-            self._remove_traces()
-            raise InputError(
-                f"{self.folder}: cannot be created ({error.strerror}); choose another place with --out"
-            ) from error
+        self.require_place(self.folder, may_replace=True)
+        self._unfinished = UnfinishedFolder(self.folder)
         self._pool = ThreadPoolExecutor(WRITING_THREADS, thread_name_prefix="hci-writer")
         return self
 
@@ -95,14 +96,7 @@ class HciWriter:
             if kind is None:
                 self._finish()
         finally:
-            self._remove_traces()
-
-    def _remove_traces(self) -> None:
-        """Remove what is still temporary, and parent folders made for it; nothing if the folder is in its place."""
-        shutil.rmtree(self._temporary, ignore_errors=True)
-        for parent in self._made_parents:
-            with suppress(OSError):  # not empty: the light field is in it
-                parent.rmdir()
+            self._unfinished.discard()
 
     def _finish(self) -> None:
         for pending in self._pending:
@@ -110,25 +104,25 @@ class HciWriter:
         total = self.grid.rows * self.grid.columns
         if len(self._added) != total:
             raise InputError(f"{self.folder}: only {len(self._added)} of {total} views were made; nothing was written")
-        write_parameters(self._temporary, self.name, self.grid, self._size, self.focal_px, self._range)
-        _replace_folder(self._temporary, self.folder)
+        write_parameters(self._unfinished.path, self.name, self.grid, self._size, self.focal_px, self._range)
+        self._unfinished.put_in_place()
 
     def _write(self, update: ViewUpdate) -> None:
         try:
             self._write_view(update)
         except InputError as error:  # the temporary folder's name says nothing to people
-            raise InputError(str(error).replace(str(self._temporary), str(self.folder))) from error
+            raise InputError(str(error).replace(str(self._unfinished.path), str(self.folder))) from error
 
     def _write_view(self, update: ViewUpdate) -> None:
         index = update.row * self.grid.columns + update.column
         extension = ".png" if update.colors.dtype == np.uint8 else ".exr"
-        write_image(self._temporary / f"input_Cam{index:03d}{extension}", update.colors)
+        write_image(self._unfinished.path / f"input_Cam{index:03d}{extension}", update.colors)
         if update.disparity is None:
             return
         if self.with_disparity:
-            write_pfm(self._temporary / f"disp_Cam{index:03d}.pfm", update.disparity)
+            write_pfm(self._unfinished.path / f"disp_Cam{index:03d}.pfm", update.disparity)
         if (update.row, update.column) == self.grid.centre:
-            write_pfm(self._temporary / "gt_disp_lowres.pfm", update.disparity)
+            write_pfm(self._unfinished.path / "gt_disp_lowres.pfm", update.disparity)
 
 
 def read_hci(folder: Path) -> MultiView | None:
@@ -183,27 +177,3 @@ def _path_of(number: int, pictures: dict[int, Path]) -> Path:
     """Where a missing view would lie."""
     one = next(iter(pictures.values()))
     return one.with_stem(f"input_Cam{number:03d}")
-
-
-def _require_replaceable(folder: Path) -> None:
-    """Raise InputError where writing `folder` would destroy something that is not a light field of ours."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file; --out names a folder")
-    if not folder.is_dir():
-        return
-    foreign = next((file.name for file in folder.iterdir() if not OWN_FILE.fullmatch(file.name)), None)
-    if foreign is not None:
-        raise InputError(f"{folder}: holds other files ({foreign}); choose an empty or new folder with --out")
-
-
-def _replace_folder(source: Path, target: Path) -> None:
-    old = temporary_sibling(target)
-    try:
-        if target.exists():
-            target.rename(old)
-        source.rename(target)
-        shutil.rmtree(old, ignore_errors=True)
-    except OSError as error:
-        if old.exists() and not target.exists():
-            old.rename(target)
-        raise InputError(f"{target}: cannot be replaced ({error.strerror}); choose another place") from error

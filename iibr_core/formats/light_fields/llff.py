@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.formats.files import is_file, is_folder
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.light_fields.scene import MOST_VIEWS, KnownView, MultiView, pictures_in
 from iibr_core.formats.maps.npy import read_array
@@ -33,9 +34,9 @@ def read_llff(folder: Path) -> MultiView | None:
     where poses are damaged or do not fit the pictures.
     """
     path = folder / "poses_bounds.npy"
-    if not path.is_file():
+    if not is_file(path):
         return None
-    inside = next((folder / name for name in FOLDERS if (folder / name).is_dir()), folder)
+    inside = next((folder / name for name in FOLDERS if is_folder(folder / name)), folder)
     pictures = pictures_in(inside)
     rotations, positions, shapes, bounds = _read_poses(path, len(pictures))
     central = int(np.argmin(((positions - positions.mean(axis=0)) ** 2).sum(axis=1)))

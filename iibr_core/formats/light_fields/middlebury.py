@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from iibr_core.formats.files import is_file
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.light_fields.scene import (
     KnownDisparity,
@@ -38,7 +39,7 @@ def read_middlebury(folder: Path) -> MultiView | None:
     if len(named) < 2 or len({kind for kind, _ in named}) > 1:
         return None
     kind = next(iter(named))[0]
-    if kind == "im" and (folder / "disp0.pfm").is_file() and set(named) == {("im", 0), ("im", 1)}:
+    if kind == "im" and is_file(folder / "disp0.pfm") and set(named) == {("im", 0), ("im", 1)}:
         maps, layout = _float_maps(folder), "Middlebury pair"
     else:
         maps, layout = _coded_maps(folder, kind, next(iter(named.values()))), f"Middlebury, {len(named)} views"
@@ -50,7 +51,7 @@ def read_middlebury(folder: Path) -> MultiView | None:
 
 def _float_maps(folder: Path) -> dict[int, KnownDisparity]:
     maps = {n: folder / f"disp{n}.pfm" for n in (0, 1)}
-    return {n: KnownDisparity(path) for n, path in maps.items() if path.is_file()}
+    return {n: KnownDisparity(path) for n, path in maps.items() if is_file(path)}
 
 
 def _coded_maps(folder: Path, kind: str, picture: Path) -> dict[int, KnownDisparity]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from iibr_core.formats.files import open_binary, reason_of
+from iibr_core.formats.files import is_file, open_binary, reason_of
 from iibr_core.types import GridShape, ImageSize, InputError
 
 FILE_NAME = "parameters.cfg"
@@ -22,7 +22,7 @@ def read_parameters(folder: Path) -> dict[str, float]:
     Raises InputError for a file that is too large or no text with sections.
     """
     path = folder / FILE_NAME
-    if not path.is_file() or path.stat().st_size == 0:
+    if not is_file(path) or path.stat().st_size == 0:
         return {}
     with open_binary(path) as file:
         data = file.read(MOST_BYTES + 1)

@@ -6,12 +6,13 @@ loading what they need. A new layout is a file of its own and one line here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from pkgutil import resolve_name
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
+from iibr_core.formats.files import is_folder
 from iibr_core.types import GridShape, InputError, ViewUpdate
 
 if TYPE_CHECKING:
@@ -51,9 +52,20 @@ class LightFieldWriter(Protocol):
 Reader = Callable[[Path], "MultiView | None"]
 """Gives the scene of a folder, None where the folder is laid out otherwise; InputError where it is damaged."""
 
-WriterFactory = Callable[[Path, GridShape, float, str, bool], LightFieldWriter]
-"""(where to write, grid, focal length in pixels of a view, the scene's name, whether every view's disparity is wanted)
--> its writer."""
+
+class WriterFactory(Protocol):
+    """Makes the writers of a layout: a class of them."""
+
+    def __call__(
+        self, folder: Path, grid: GridShape, focal_px: float, name: str, with_disparity: bool
+    ) -> LightFieldWriter:
+        """focal_px: of a view. name: of the scene. with_disparity: whether every view's disparity is wanted."""
+
+    def require_place(self, folder: Path, inputs: Iterable[Path], may_replace: bool) -> None:
+        """Raise InputError where no light field may be written; AlreadyThereError where one may not be replaced.
+
+        inputs: files and folders that are read.
+        """
 
 
 def find_light_field(folder: Path) -> MultiView | None:
@@ -68,7 +80,7 @@ def find_light_field(folder: Path) -> MultiView | None:
 
 def open_light_field(folder: Path) -> MultiView:
     """The scene of a folder. Raises InputError where there is none, or it is damaged."""
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InputError(f"{folder}: is not a folder")
     scene = find_light_field(folder)
     if scene is None:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.formats.files import entries_of, is_file
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
@@ -107,10 +108,7 @@ def nearest_view(views: tuple[KnownView, ...], to: ViewOffset) -> int:
 
 def pictures_in(folder: Path) -> list[Path]:
     """The pictures directly in a folder, by name. Raises InputError if it cannot be read or holds too many."""
-    try:
-        found = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURE_EXTENSIONS and p.is_file())
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read ({error.strerror}); give a folder with views") from error
+    found = [path for path in entries_of(folder) if path.suffix.lower() in PICTURE_EXTENSIONS and is_file(path)]
     if len(found) > MOST_VIEWS:
         raise InputError(f"{folder}: holds {len(found)} pictures, more than {MOST_VIEWS}; give the folder of one scene")
     return found
@@ -145,14 +143,14 @@ def maps_in(folder: Path) -> dict[str, Path]:
 
     One look at the folder: the maps of 81 views may have 1,600 names, and asking for each took longer than all else.
     """
-    files = [path for path in folder.iterdir() if path.suffix.lower() in MAP_EXTENSIONS]
+    files = [path for path in entries_of(folder) if path.suffix.lower() in MAP_EXTENSIONS]
     by_preference = sorted(files, key=lambda path: MAP_EXTENSIONS.index(path.suffix.lower()), reverse=True)
     return {path.stem: path for path in by_preference}
 
 
 def first_map(maps: Mapping[str, Path], *stems: str) -> Path | None:
     """The first file of these names, of what `maps_in` found."""
-    return next((maps[stem] for stem in stems if stem in maps and maps[stem].is_file()), None)
+    return next((maps[stem] for stem in stems if stem in maps and is_file(maps[stem])), None)
 
 
 def numbers_in(name: str) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.formats.files import is_folder
 from iibr_core.formats.light_fields.scene import KnownView, MultiView, on_grid, pictures_in
 from iibr_core.types import InputError, ViewOffset
 
@@ -23,7 +24,9 @@ MOST_STRAY = 0.5
 
 def read_stanford(folder: Path) -> MultiView | None:
     """The views of a Stanford archive folder (or of its subfolder `rectified`), None where names are others."""
-    inside = next((p for p in (folder / "rectified", folder) if p.is_dir() and any(map(_match, pictures_in(p)))), None)
+    inside = next(
+        (p for p in (folder / "rectified", folder) if is_folder(p) and any(map(_match, pictures_in(p)))), None
+    )
     if inside is None:
         return None
     named = [(path, match) for path in pictures_in(inside) if (match := _match(path))]

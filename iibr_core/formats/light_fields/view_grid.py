@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar
 
+from iibr_core.formats.files import entries_of, is_folder
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_focal_px, stated_range_px
 from iibr_core.formats.light_fields.scene import (
@@ -29,7 +30,7 @@ Key = TypeVar("Key")
 
 def view_folder(folder: Path) -> Path:
     """Where the views of a scene lie: its subfolder `views`, or the folder itself."""
-    return folder / "views" if (folder / "views").is_dir() else folder
+    return folder / "views" if is_folder(folder / "views") else folder
 
 
 def candidate_views(folder: Path) -> list[Path]:
@@ -106,5 +107,5 @@ def _maps(folder: Path, grid: GridShape) -> dict[GridIndex, KnownDisparity]:
 
 def _sole_map(folder: Path) -> Path | None:
     """The one file that looks like the centre view's disparity; None where there are several or none."""
-    maps = [p for p in sorted(folder.iterdir()) if "disp" in p.stem.lower() and p.suffix.lower() in MAP_EXTENSIONS[:3]]
+    maps = [p for p in entries_of(folder) if "disp" in p.stem.lower() and p.suffix.lower() in MAP_EXTENSIONS[:3]]
     return maps[0] if len(maps) == 1 and not numbers_in(maps[0].stem) else None

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, atomic_write, open_binary
+from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import FloatImage, InputError
 
 # The header ends with exactly one white-space character (or CR LF); the next byte is data.

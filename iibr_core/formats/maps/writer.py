@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import atomic_write
 from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import FloatImage, InputError
 
 MAP_SUFFIXES = (".pfm", ".exr", ".npy", ".png")

@@ -20,6 +20,7 @@ from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.evaluation.protocol import EvaluationResult, Options, evaluate
 from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.report_folder import FILES, require_report_folder
 from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
 from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input, trials_of
 from iibr_core.formats.images.photo import read_photo
@@ -252,16 +253,16 @@ def test_reports_replace_older_ones_whole(results: list[EvaluationResult], tmp_p
     out = tmp_path / "made" / "report"
     report.write_report(out, results, "first")
     report.write_report(out, results[:1], "second")
-    assert sorted(path.name for path in out.iterdir()) == sorted(report.FILES)
+    assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
     assert "`second`" in (out / "report.md").read_text()
 
 
 def test_places_where_no_report_can_be_are_told_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    report.require_report_folder(tmp_path / "new" / "deep")
+    require_report_folder(tmp_path / "new" / "deep")
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
         with pytest.raises(InputError, match="file"):
-            report.require_report_folder(folder)
+            require_report_folder(folder)
 
 
 def test_the_summary_takes_means_over_scenes(results: list[EvaluationResult]) -> None:

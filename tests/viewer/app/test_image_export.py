@@ -11,11 +11,11 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.color import srgb_from_linear
+from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import (
-    AlreadyThereError,
     export_image,
     is_float,
     map_path,
@@ -106,23 +106,23 @@ def test_absurd_sizes_are_refused(opened: HeadlessViewer, size_px: tuple[int, in
 
 
 @pytest.mark.parametrize("path_for", [picture_path, map_path])
-def test_files_are_not_replaced_unasked(tmp_path: Path, path_for: Callable[[SaveTask], Path]) -> None:
+def test_files_are_not_replaced_unasked(tmp_path: Path, path_for: Callable[[SaveTask, tuple[Path, ...]], Path]) -> None:
     path = tmp_path / "taken.png"
     path.write_bytes(b"mine")
     with pytest.raises(AlreadyThereError, match=r"taken\.png"):
-        path_for(SaveTask(str(path), (8, 8)))
-    assert path_for(SaveTask(str(path), (8, 8), may_replace=True)) == path
+        path_for(SaveTask(str(path), (8, 8)), ())
+    assert path_for(SaveTask(str(path), (8, 8), may_replace=True), ()) == path
 
 
 def test_a_name_without_an_ending_gets_one(tmp_path: Path) -> None:
-    assert picture_path(SaveTask(f" {tmp_path}/a ", (8, 8))) == tmp_path / "a.png"
-    assert map_path(SaveTask(f"{tmp_path}/a", (8, 8))) == tmp_path / "a.pfm"
+    assert picture_path(SaveTask(f" {tmp_path}/a ", (8, 8)), ()) == tmp_path / "a.png"
+    assert map_path(SaveTask(f"{tmp_path}/a", (8, 8)), ()) == tmp_path / "a.pfm"
 
 
 @pytest.mark.parametrize("name", ["", "a.jpg", "missing-folder/a.png"])
 def test_places_that_cannot_be_written_are_told_before_anything_is_drawn(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError):
-        picture_path(SaveTask(str(tmp_path / name) if name else "", (8, 8)))
+        picture_path(SaveTask(str(tmp_path / name) if name else "", (8, 8)), ())
 
 
 def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_a_picture_starts_over_when_more_of_the_same_scene_is_there(tmp_path: Pa
     with headless_with_scene(tmp_path) as viewer:
         scene_view, woken = viewer._scene_view, threading.Event()
         saver = PictureSaver(scene_view, woken.set)
-        assert saver.add(SaveTask(str(out), (90, 60)), viewer.state) == []
+        assert saver.add(SaveTask(str(out), (90, 60)), viewer.state, ()) == []
         assert saver.advance(0.0) == [SavingChanged(Saving("out.png"))]
         scene_view.renderer.upload_view(1, 1, np.full((HEIGHT, WIDTH, 3), 90, np.uint8), None)
         expected = render_pixels(scene_view, viewer.state, (90, 60))
@@ -152,7 +152,7 @@ def test_a_picture_is_given_up_when_edited_depth_is_shown(tmp_path: Path) -> Non
     before = set(tmp_path.iterdir())
     with headless_with_scene(tmp_path) as viewer:
         saver = PictureSaver(viewer._scene_view, lambda: None)
-        saver.add(SaveTask(str(tmp_path / "out.png"), (90, 60)), viewer.state)
+        saver.add(SaveTask(str(tmp_path / "out.png"), (90, 60)), viewer.state, ())
         saver.advance(0.0)
         viewer._scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
         notified, changed = saver.advance(0.0)

@@ -133,7 +133,7 @@ def test_closing_the_window_waits_for_what_is_being_written(viewer: Driver, tmp_
     viewer.until(lambda app: app.state.saving is not None and app.state.saving.drawn == 1)
     viewer.close()
     assert read_photo(out).pixels.shape == (200, 300, 3)
-    assert not list(tmp_path.glob(".out*"))
+    assert not list(tmp_path.glob(".iibr-*"))
 
 
 @pytest.mark.parametrize("error", [InputError("the disk is full"), SystemExit("a library tried to end the program")])

@@ -145,7 +145,8 @@ def test_generate_says_where_depth_came_from(
     assert said.count("Depth: rough") == 1
     assert "iibr models" in said
     # A bad model that was asked for is an error, and nothing is made.
-    assert run_command(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", tmp_path) == 2
+    (model := tmp_path / "model").mkdir()
+    assert run_command(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", model) == 2
     (line,) = filter(None, capsys.readouterr().err.splitlines())
     assert "config.json" in line
     assert not (tmp_path / "c").exists()

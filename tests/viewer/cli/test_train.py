@@ -59,7 +59,7 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_gives_the_same_weights(
     with monkeypatch.context() as patch:
         interrupt_at(patch, 3)
         assert run(patch, *words, "--out", "w.safetensors") == 130
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+    (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("iibr: interrupted; what was learned is saved, go on with: iibr train ")
     again = line.split("go on with: iibr ")[1].split()
     assert names(tmp_path)[:2] == WRITTEN[:2]
@@ -97,7 +97,7 @@ def test_training_that_diverges_is_one_line_that_names_the_step(
     monkeypatch.setattr("iibr_core.training.batches.training_batch", batch)
     out = tmp_path / "w.safetensors"
     assert run(monkeypatch, *WORDS, "--steps", 3, "--checkpoint-every", 1, "--out", out) == 1
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+    (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("iibr: ")
     assert "is not finite at step 2" in line
     assert names(tmp_path) == WRITTEN[:2]
@@ -128,7 +128,7 @@ def test_bad_values_are_one_line_and_leave_nothing(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run(monkeypatch, "train", "--steps", 2, "--out", "w.safetensors", *words) == 2
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+    (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("iibr: ")
     assert named in line
     assert names(tmp_path) == []

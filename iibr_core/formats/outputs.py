@@ -1,0 +1,327 @@
+"""Files and folders that are written: where they may go, and that they come there whole or not at all.
+
+Nothing is ever written onto, into or over what is read; over other things only where that was allowed. Links are
+followed. What is not finished lies beside its place under a short hidden name, locked while its process lives; whoever
+writes there next removes what nobody holds any more, and puts back what had been moved aside.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import stat
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from secrets import token_hex
+
+from iibr_core.formats.files import entries_of, is_folder, reason_of, status_of
+from iibr_core.types import InputError
+
+try:
+    import fcntl
+except ImportError:  # not on this system: then nothing is locked, and nothing removed for others
+    fcntl = None  # type: ignore[assignment]
+
+TEMPORARY_NAME = re.compile(r"\.iibr-[0-9a-f]{16}(\.\w{1,15})?")
+MOST_NAME_BYTES = 255
+MOST_LINKS = 40
+FOLDER_LEVELS = 3
+"""How deep the pictures of data sets lie below the folder that is named: scene, subfolder, picture."""
+NEW, OLD = "new", "old"
+
+
+class AlreadyThereError(InputError):
+    """There is something under this name, and nobody said that it may go."""
+
+
+def require_file_place(path: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
+    """Raise InputError unless a file may be written to `path`: its folder is there and may be written to, and no input
+    is it or holds it. AlreadyThereError where there is one that may not be replaced.
+
+    inputs: files and folders that are read.
+    """
+    real = _real_place(path)
+    _require_folder_for(path, real)
+    remove_leftovers(real.parent)
+    status = status_of(real)
+    if status is not None and stat.S_ISDIR(status.st_mode):
+        raise InputError(f"{path}: is a folder, not a file; name a file in it")
+    if status is not None and not stat.S_ISREG(status.st_mode):
+        raise InputError(f"{path}: is a device or a pipe; give the name of a file")
+    for read in inputs:
+        _require_outside(path, real, read)
+        if status is not None and _reads(read, status):
+            raise InputError(f"{path}: is read here ({read}), and no input is overwritten; choose another name")
+    if status is not None and not may_replace:
+        raise AlreadyThereError(f"{path}: is there already; give --force to replace it, or choose another name")
+
+
+def require_folder_place(
+    folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False, is_whole: bool = False
+) -> None:
+    """Raise InputError unless a folder may be written to: it can be made or is one, and no input is it, holds it or
+    lies in it. AlreadyThereError where something lies in it and it may not be replaced.
+
+    inputs: files and folders that are read. is_whole: whether all of it is replaced, not files in it.
+    """
+    real = _real_place(folder)
+    _require_no_dangling_link(folder, real)
+    remove_leftovers(real.parent if is_whole else real)
+    status = status_of(real)
+    if status is not None and not stat.S_ISDIR(status.st_mode):
+        raise InputError(f"{folder}: is a file, not a folder; choose another name")
+    above = real.parent if is_whole else real
+    there = next(place for place in (above, *above.parents) if os.path.lexists(place))
+    if not is_folder(there):
+        raise InputError(f"{folder}: {there} is a file, not a folder; choose another place")
+    _require_writable(folder, there)
+    for read in inputs:
+        _require_outside(folder, real, read)
+        if status is not None and any(_is_within(place.parent, status) for place in _places_of(read)):
+            raise InputError(f"{folder}: holds {read}, which is read, and no input is overwritten; choose another")
+    if status is not None and is_whole and os.path.ismount(real):
+        raise InputError(f"{folder}: a disk is mounted there; name a folder in it")
+    if status is not None and not may_replace and entries_of(real):
+        raise AlreadyThereError(f"{folder}: is there already; give --force to replace it, or choose another folder")
+
+
+def require_files_in(
+    folder: Path, names: Iterable[str], inputs: Iterable[Path] = (), may_replace: bool = False
+) -> None:
+    """Raise as `require_folder_place` does, and as `require_file_place` for what is there already of the files that a
+    folder is to hold.
+    """
+    inputs = tuple(inputs)
+    require_folder_place(folder, inputs, may_replace)
+    for name in names if is_folder(folder) else ():
+        require_file_place(folder / name, inputs, may_replace=True)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, where there is none; links are followed. Raises InputError."""
+    try:
+        _real_place(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be created ({error.strerror or error}); choose another place") from error
+
+
+@contextmanager
+def atomic_write(path: Path) -> Iterator[Path]:
+    """Yield the temporary name to write to; it takes the place of `path` when the block ends well, else it is removed.
+
+    The temporary file is there, empty, with the extension of `path`. Raises InputError where the folder is missing, is
+    no folder, or may not be written to.
+    """
+    real = _real_place(path)
+    _require_folder_for(path, real)
+    if not any(map(TEMPORARY_NAME.fullmatch, real.parts)):  # else once for every view of a light field
+        remove_leftovers(real.parent)
+    suffix = real.suffix if TEMPORARY_NAME.fullmatch(f".iibr-{'0' * 16}{real.suffix}") else ""
+    temporary, lock = None, None
+    try:
+        temporary, lock = _make_temporary(real.parent, lambda new: new.touch(exist_ok=False), suffix)
+        yield temporary
+        temporary.replace(real)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+    finally:
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        _unlock(lock)
+
+
+class UnfinishedFolder:
+    """A folder on its way to its place: write to `path`, then call `put_in_place`; `discard` in any case at the end.
+
+    Folders above it are made where they are missing.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Raises InputError where it cannot be made."""
+        self.folder = folder
+        self._real = _real_place(folder)
+        self._made_parents = [parent for parent in self._real.parents if not os.path.lexists(parent)]
+        self._around: Path | None = None
+        self._lock: int | None = None
+        try:
+            self._real.parent.mkdir(parents=True, exist_ok=True)
+            remove_leftovers(self._real.parent)
+            self._around, self._lock = _make_temporary(self._real.parent, Path.mkdir)
+            self.path = self._around / NEW / self._real.name
+            self.path.mkdir(parents=True)
+        except OSError as error:
+            self.discard()
+            raise InputError(
+                f"{folder}: cannot be created ({error.strerror or error}); choose another place"
+            ) from error
+
+    def put_in_place(self) -> None:
+        """Replace what is there by it. Raises InputError where that cannot be; then what was there stays."""
+        assert self._around is not None
+        try:
+            if os.path.lexists(self._real):
+                # Under its own name, and it is known where it belongs, should this process be killed now.
+                (self._around / OLD).mkdir()
+                self._real.rename(self._around / OLD / self._real.name)
+            self.path.rename(self._real)
+        except OSError as error:
+            raise InputError(
+                f"{self.folder}: cannot be replaced ({error.strerror or error}); choose another place"
+            ) from error
+
+    def discard(self) -> None:
+        """Remove what is temporary, and folders made for it; what was moved aside and not replaced comes back."""
+        if self._around is not None:
+            with suppress(OSError):
+                _remove_around(self._around)
+        _unlock(self._lock)
+        self._lock = None
+        for parent in self._made_parents:
+            with suppress(OSError):  # not empty: the folder is in it
+                parent.rmdir()
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what processes that were killed while they wrote left in a folder; put back what they had moved aside."""
+    found: list[Path] = []
+    with suppress(OSError), os.scandir(folder) as entries:
+        found = [Path(entry.path) for entry in entries if TEMPORARY_NAME.fullmatch(entry.name)]
+    for path in found:
+        lock = _lock(path, waits=False)
+        if lock is None:
+            continue
+        with suppress(OSError):
+            if stat.S_ISDIR(os.fstat(lock).st_mode):
+                _remove_around(path)
+            else:
+                path.unlink()
+        _unlock(lock)
+
+
+def _remove_around(around: Path) -> None:
+    """Remove the folder around a new and an old one. The old one goes back unless the new one took its place."""
+    old = next(iter((around / OLD).glob("*")), None)
+    if old is not None and (around / NEW / old.name).exists():
+        if os.path.lexists(around.parent / old.name):
+            return  # somebody made another one meanwhile: both are kept
+        old.rename(around.parent / old.name)
+    shutil.rmtree(around, ignore_errors=True)
+
+
+def _make_temporary(folder: Path, make: Callable[[Path], None], suffix: str = "") -> tuple[Path, int | None]:
+    """A new file or folder in `folder`, and its lock. Its name does not depend on what it becomes: that may be long."""
+    while True:
+        path = folder / f".iibr-{token_hex(8)}{suffix}"
+        make(path)
+        lock = _lock(path, waits=True)
+        if lock is not None or os.path.lexists(path):
+            return path, lock
+        # else taken for a leftover before it was locked
+
+
+def _lock(path: Path, waits: bool) -> int | None:
+    """A descriptor that keeps `path` locked while it is open; None where others hold it, it is gone, or there are no
+    locks. A lock, not a process's number: that would mean nothing to another machine or container.
+    """
+    if fcntl is None:
+        return None
+    descriptor = None
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
+        if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
+            return descriptor
+    except OSError:
+        pass
+    _unlock(descriptor)
+    return None
+
+
+def _unlock(descriptor: int | None) -> None:
+    if descriptor is not None:
+        os.close(descriptor)
+
+
+def _real_place(path: Path) -> Path:
+    """Where `path` leads, links followed. Raises InputError where nothing can be of that name, or nobody may look."""
+    try:
+        longest = max((len(os.fsencode(part)) for part in path.parts), default=0)
+        real = Path(os.path.realpath(path))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: is no place to write to ({reason_of(error)}); choose another") from error
+    if longest > MOST_NAME_BYTES:
+        raise InputError(f"{path}: a name has {longest} bytes, {MOST_NAME_BYTES} at most are possible; shorten it")
+    status_of(real)
+    if real.is_symlink():
+        raise InputError(f"{path}: its links lead in a circle; choose another name")
+    return real
+
+
+def _require_folder_for(path: Path, real: Path) -> None:
+    folder = path.parent if real.parent == Path(os.path.realpath(path.parent)) else real.parent
+    if not is_folder(real.parent):
+        raise InputError(f"{path}: the folder {folder} does not exist; create it or choose another")
+    _require_writable(path, real.parent)
+
+
+def _require_writable(path: Path, folder: Path) -> None:
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: the folder {folder} may not be written to; choose another place")
+
+
+def _require_no_dangling_link(folder: Path, real: Path) -> None:
+    """A disk that is not there now must not be replaced by a folder of its name."""
+    for place in (folder, *folder.parents):
+        if place.is_symlink() and status_of(place) is None and not (place == folder and is_folder(real.parent)):
+            raise InputError(f"{folder}: {place} is a link to what is not there; choose another place")
+
+
+def _require_outside(path: Path, real: Path, read: Path) -> None:
+    """Raise InputError where an input is a folder, and `path` it or in it."""
+    status = status_of(read)
+    if status is not None and stat.S_ISDIR(status.st_mode) and _is_within(real, status):
+        raise InputError(f"{path}: lies in {read}, which is read, and nothing is written there; choose another place")
+
+
+def _is_within(path: Path, folder: os.stat_result) -> bool:
+    """Whether a place, which need not be there, is this folder or lies in it."""
+    found = (status_of(place) for place in (path, *path.parents))
+    return any(status is not None and os.path.samestat(status, folder) for status in found)
+
+
+def _places_of(read: Path) -> Iterator[Path]:
+    """Where an input lies: under the name given, under those that its links lead by, and at their end."""
+    for _ in range(MOST_LINKS):
+        read = Path(os.path.realpath(read.parent), read.name)
+        yield read
+        if not read.is_symlink():
+            break
+        read = read.parent / os.readlink(read)
+    yield Path(os.path.realpath(read))
+
+
+def _reads(read: Path, target: os.stat_result) -> bool:
+    """Whether an input is this file or, being a folder, holds it, under whatever name."""
+    status = status_of(read)
+    if status is None:
+        return False
+    if stat.S_ISDIR(status.st_mode):
+        return _folder_reads(read, target, FOLDER_LEVELS)
+    return os.path.samestat(status, target)
+
+
+def _folder_reads(folder: Path, target: os.stat_result, levels: int) -> bool:
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            with suppress(OSError):  # a link to nothing
+                if entry.is_dir():
+                    if levels > 1 and _folder_reads(Path(entry.path), target, levels - 1):
+                        return True
+                elif (entry.is_symlink() or entry.inode() == target.st_ino) and os.path.samestat(
+                    os.stat(entry.path), target
+                ):
+                    return True
+    return False
