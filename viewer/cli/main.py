@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from typing import Annotated, Any
 
@@ -39,8 +38,7 @@ app.add_typer(models, name="models")
 
 
 def main() -> None:
-    """Run the command line. Bad input ends in one line on stderr and exit code 2, Ctrl-C or SIGTERM in one and 130."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    """Run the command line. Bad input ends in one line on stderr and exit code 2, interruption in one and 130."""
     try:
         sys.exit(app(standalone_mode=False) or 0)
     except UsageError as error:

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.types import InputError
+
 if TYPE_CHECKING:
     from iibr_core.depth.models.catalog import KnownModel
 
 EXIT_DECLINED = 1
+NOBODY_ANSWERS = "nobody answers whether to download it (end of input): say --yes"
 
 models = typer.Typer(invoke_without_command=True, help="Depth models: list them, or get one.")
 
@@ -48,17 +51,29 @@ def get(
     if folder is not None:
         print(f"{model.title} is here already: {folder}")
         return
+    if not yes and not sys.stdin.isatty() and not sys.stdin.buffer.peek(1):
+        raise InputError(NOBODY_ANSWERS)
     about = (
         f"{model.title}: about {model.megabytes:,} MB from huggingface.co/{model.repository}, licence {model.licence}"
     )
     print(about, file=sys.stderr)
-    if not yes and not typer.confirm("Download it?", err=True):
+    if not yes and not _agrees():
         print("Nothing was downloaded.", file=sys.stderr)
         raise typer.Exit(EXIT_DECLINED)
     folder = fetch(model)
     print(f"{folder} ({bytes_of(folder) / 1e6:,.0f} MB). Use it: iibr view PHOTO --depth-model {model.name}")
     if not is_installed(model.package):
         print(f"It also needs the package {model.package}: {model.install}")
+
+
+def _agrees() -> bool:
+    try:
+        return typer.confirm("Download it?", err=True)
+    except typer.Abort as error:
+        if isinstance(error.__context__, KeyboardInterrupt):
+            raise
+        print(file=sys.stderr)  # the question stands in the line still
+        raise InputError(NOBODY_ANSWERS) from error
 
 
 def _state(model: KnownModel) -> str:

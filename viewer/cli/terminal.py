@@ -16,14 +16,29 @@ from iibr_core.depth.choice import DepthOrigin
 
 
 class Commands(TyperGroup):
-    """Typer ends without a word when it is interrupted; this one aborts, and whoever runs it says so."""
+    """Typer ends without a word when it is interrupted, and takes the end of any file for an interruption; this one
+    aborts for the one only, and whoever runs it says so.
+    """
+
+    def make_context(self, *args: Any, **options: Any) -> Any:
+        """Read the command line. Raises typer.Abort for KeyboardInterrupt."""
+        with _interruption_aborts():
+            return super().make_context(*args, **options)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command. Raises typer.Abort for KeyboardInterrupt."""
-        try:
+        """Run the command. Raises typer.Abort for KeyboardInterrupt, RuntimeError for EOFError."""
+        with _interruption_aborts():
             return super().invoke(ctx)
-        except KeyboardInterrupt as error:
-            raise typer.Abort from error
+
+
+@contextmanager
+def _interruption_aborts() -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        raise typer.Abort from error
+    except EOFError as error:
+        raise RuntimeError(f"EOFError: {error}") from error
 
 
 def print_notes(notes: tuple[str, ...]) -> None:
