@@ -11,10 +11,9 @@ from contextlib import suppress
 from math import floor
 from typing import Any
 
-import numba
 import numpy as np
 
-from iibr_core.runtime.kernel_cache import KernelCache
+from iibr_core.runtime.kernel_cache import KernelCache, numba
 
 # Reassociation and contraction only: NaN and infinity keep their meaning.
 _compile = numba.njit(nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
@@ -27,7 +26,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     """
     compiled = _compile(function)
     if not numba.config.DISABLE_JIT:
-        with suppress(OSError, RuntimeError):
+        with suppress(Exception):  # folders, disks, Numba's settings: none of it is worth a kernel
             compiled._cache = KernelCache(function)
     return compiled
 

@@ -8,22 +8,48 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import os
+import pickle
 import re
+import shutil
+import sys
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+def _import_numba() -> Any:
+    """Numba, without the settings that it takes from `.numba_config.yaml` in the working folder: they name the folder
+    where compiled code is kept, and what lies there is run.
+    """
+    yaml = sys.modules.get("yaml")
+    sys.modules["yaml"] = None  # type: ignore[assignment]  # how Python says that there is none
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "A Numba config file is found")
+            import numba
+    finally:
+        del sys.modules["yaml"]
+        if yaml is not None:
+            sys.modules["yaml"] = yaml
+    numba.core.config._config_fname = os.devnull  # it looks again whenever it compiles
+    return numba
+
+
+numba = _import_numba()
+"""All of the core has it from here."""
 
 PACKAGE = Path(__file__).resolve().parents[1]
 _NAMES = re.compile(rf"\b{PACKAGE.name}(?:\.\w+)*".encode())
 _LINE_NUMBER = re.compile(r"-\d+(?=\.py\d+\w*$)")
 
 
-class KernelCache(FunctionCache):  # type: ignore[misc]  # numba has no types
-    """Of one kernel: Numba's, but for the stamp, the names of the files, and that a file gone bad is a miss.
+class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-defined]  # numba has no types
+    """Of one kernel: Numba's, but for the stamp, the names of the files, and that nothing goes wrong in it: what cannot
+    be read is a miss and goes, what cannot be written is compiled anew the next time.
 
     Raises OSError or RuntimeError where the kernel's source cannot be read, or nothing can be written.
     """
@@ -31,23 +57,60 @@ class KernelCache(FunctionCache):  # type: ignore[misc]  # numba has no types
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         # Without the line on which the kernel begins: its files of old are overwritten when the kernel moves.
-        name = _LINE_NUMBER.sub("", self._impl.filename_base)
+        self._file_name = _LINE_NUMBER.sub("", self._impl.filename_base)
         stamp = sources_hash(Path(inspect.getfile(function)).resolve())
-        self._cache_file = IndexDataCacheFile(self.cache_path, name, stamp)
+        self._cache_file = _CheckedFiles(self.cache_path, self._file_name, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled kernel for a signature; None where there is none, or a damaged one."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # damaged bytes raise whatever they like when they are unpickled
-            with suppress(OSError):
-                self.flush()
+            self.flush()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled kernel, where the disk has room for it."""
-        with suppress(OSError):
+        """Keep a compiled kernel, where the disk has room for it and nothing else lies in its place."""
+        try:
             super().save_overload(sig, data)
+        except BaseException as error:
+            self.flush()  # the index may promise what is not there; a file may be written in part
+            if not isinstance(error, Exception):
+                raise
+
+    def flush(self) -> None:
+        """Remove all that is kept of this kernel, and whatever has its files' names."""
+        for path in Path(self.cache_path).glob(f"{self._file_name}.*"):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                with suppress(OSError):
+                    path.unlink()
+
+
+class _CheckedFiles(numba.core.caching.IndexDataCacheFile):  # type: ignore[misc, name-defined]
+    """Each with a digest at its end: what a crash has left of machine code would be run, or end the process."""
+
+    def _dump(self, value: Any) -> bytes:
+        data: bytes = super()._dump(value)
+        return data + hashlib.sha256(data).digest()
+
+    def _load_index(self) -> Any:
+        with suppress(FileNotFoundError), open(self._index_path, "rb") as file:
+            pickle.load(file)  # Numba's version stands before the rest
+            _require_whole(file.read())
+        return super()._load_index()
+
+    def _load_data(self, name: str) -> Any:
+        path = Path(self._data_path(name))
+        _require_whole(path.read_bytes() if path.is_file() else b"")
+        return super()._load_data(name)
+
+
+def _require_whole(data: bytes) -> None:
+    size = hashlib.sha256().digest_size
+    if hashlib.sha256(data[:-size]).digest() != data[-size:]:
+        raise ValueError("damaged")
 
 
 def sources_hash(path: Path) -> str:

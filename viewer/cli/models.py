@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -51,7 +51,7 @@ def get(
     if folder is not None:
         print(f"{model.title} is here already: {folder}")
         return
-    if not yes and not sys.stdin.isatty() and not sys.stdin.buffer.peek(1):
+    if not yes and _is_at_end(sys.stdin.buffer):
         raise InputError(NOBODY_ANSWERS)
     about = (
         f"{model.title}: about {model.megabytes:,} MB from huggingface.co/{model.repository}, licence {model.licence}"
@@ -64,6 +64,11 @@ def get(
     print(f"{folder} ({bytes_of(folder) / 1e6:,.0f} MB). Use it: iibr view PHOTO --depth-model {model.name}")
     if not is_installed(model.package):
         print(f"It also needs the package {model.package}: {model.install}")
+
+
+def _is_at_end(file: Any) -> bool:
+    """Whether nothing can come from it; a terminal is asked in earnest."""
+    return not file.isatty() and not file.peek(1)
 
 
 def _agrees() -> bool:

@@ -1,6 +1,8 @@
 """Kernels kept on disk, in a small copy of the package whose files are edited between two processes."""
 
 import os
+import resource
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +10,8 @@ from pathlib import Path
 import pytest
 
 import iibr_core
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernel_cache import numba
 
 ENCODING = """
 from iibr_core.encoding_constants import GAIN
@@ -43,13 +47,23 @@ def package(tmp_path):
     return copy
 
 
-def encode_in_new_process(package, **environment):
-    """(what the kernel gives, whether it came from the disk)."""
+# Root may write everywhere, unless it gives that up.
+WITHOUT_PRIVILEGES = ("setpriv", "--bounding-set=-all", "--inh-caps=-all") if os.geteuid() == 0 else ()
+
+
+def encode_in_new_process(package, *before, cwd=None, preexec_fn=None, **environment):
+    """(what the kernel gives, whether it came from the disk). before: words that start Python."""
     kept = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": str(package.parent / "kept")}
     run = subprocess.run(
-        [sys.executable, "-c", CALL], env=kept | environment, cwd=package.parent, capture_output=True, text=True
+        [*before, sys.executable, "-c", CALL],
+        env=kept | environment,
+        cwd=cwd or package.parent,
+        capture_output=True,
+        text=True,
+        preexec_fn=preexec_fn,
     )
     assert run.returncode == 0, run.stderr
+    assert run.stderr == ""
     value, hits = run.stdout.split()
     return float(value), hits == "1"
 
@@ -78,13 +92,84 @@ def test_an_edit_of_an_inlined_file_is_noticed(package):
     assert kept_files(package) == files, "old entries are overwritten"
 
 
-def test_a_damaged_entry_is_a_miss(package):
-    encode_in_new_process(package)
-    for ending in ("nbi", "nbc"):
-        for path in (package.parent / "kept").rglob(f"*.{ending}"):
-            path.write_bytes(path.read_bytes()[:-20])
-        assert encode_in_new_process(package) == (pytest.approx(0.01292), False)
-    assert encode_in_new_process(package)[1], "it was written anew"
+def cut_off(path):
+    path.write_bytes(path.read_bytes()[:-20])
+
+
+def empty(path):
+    path.write_bytes(b"")
+
+
+def overwrite_with_garbage(path):
+    path.write_bytes(b"\x80garbage" * 1000)
+
+
+def lose_a_block(path):
+    """As power that fails does: the length is right, and zeros where code was."""
+    data = bytearray(path.read_bytes())
+    start = len(data) // 2
+    data[start : start + 512] = bytes(len(data[start : start + 512]))
+    path.write_bytes(data)
+
+
+def become_a_folder(path):
+    path.unlink()
+    (path / "inside").mkdir(parents=True)
+
+
+def plus_one(value):
+    return value + 1.0
+
+
+def run_anew():
+    """Whether the kernel came from the disk, as in a new process."""
+    compiled = kernel(plus_one)
+    assert compiled(1.0) == 2.0
+    return bool(compiled.stats.cache_hits)
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [cut_off, empty, overwrite_with_garbage, lose_a_block, become_a_folder, Path.unlink])
+def test_a_damaged_entry_is_a_miss_and_goes(tmp_path, monkeypatch, damage, ending):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    assert not run_anew()
+    files = sorted(tmp_path.rglob("*.nb?"))
+    (path,) = (file for file in files if file.suffix == f".{ending}")
+    damage(path)
+    assert not run_anew()
+    assert run_anew(), "it was written anew"
+    assert sorted(tmp_path.rglob("*.nb?")) == files
+
+
+def test_a_full_disk_leaves_nothing_and_stops_nothing(package):
+    def fill_disk():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))
+
+    assert encode_in_new_process(package, preexec_fn=fill_disk) == (pytest.approx(0.01292), False)
+    assert kept_files(package) == []
+    assert [path for path in (package.parent / "kept").rglob("*") if path.is_file()] == []
+
+
+@pytest.mark.parametrize("home", [None, "", os.devnull, "/proc"])
+def test_a_read_only_installation_runs_wherever_home_is(package, home):
+    shutil.rmtree(package / "runtime" / "__pycache__", ignore_errors=True)
+    for folder in (package, package / "runtime"):
+        folder.chmod(0o500)
+    given = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": os.devnull} | ({} if home is None else {"HOME": home})
+    words = (*WITHOUT_PRIVILEGES, *(("env", "-u", "HOME") if home is None else ()))
+    assert encode_in_new_process(package, *words, **given) == (pytest.approx(0.01292), False)
+    for folder in (package, package / "runtime"):
+        folder.chmod(0o700)
+
+
+@pytest.mark.parametrize("text", ["cache_dir: {}\n", "[: no YAML"])
+def test_the_working_folder_names_no_place_to_take_code_from(package, tmp_path, text):
+    """Numba reads `.numba_config.yaml` there, and runs what it finds in the cache that it names."""
+    strange = tmp_path / "downloads"
+    strange.mkdir()
+    (strange / ".numba_config.yaml").write_text(text.format(strange / "cache"))
+    assert encode_in_new_process(package, cwd=strange, NUMBA_CACHE_DIR="") == (pytest.approx(0.01292), False)
+    assert [path.name for path in strange.iterdir()] == [".numba_config.yaml"]
 
 
 def test_without_a_place_to_keep_them_kernels_run(package):
