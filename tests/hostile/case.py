@@ -1,0 +1,146 @@
+"""One hostile case: a command in a folder of its own, run as a user runs it, and what is left of that folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import stat
+import subprocess
+import sysconfig
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.hostile.forks import run_in_fork
+
+IIBR = str(Path(sysconfig.get_path("scripts")) / "iibr")
+DEADLINE_S = 120.0
+"""Of one command. None takes so long; one that hangs must not hang the tests."""
+
+WITHOUT_PRIVILEGES = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
+"""Before a command: permissions bind root as they bind everybody."""
+
+PLAINLY = 'exec "$@"'
+
+
+def nothing(folder: Path) -> None:
+    """Leave the folder as it is."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """arguments: of `iibr`; "{folder}" stands for the case's folder, where the command runs. code: the exit code
+    expected. says: a part of the line on standard error. makes: what may be new afterwards. environment: changes, None
+    takes a variable away. prepare: changes the folder before. limits: `prlimit`'s. shell: how the shell starts the
+    command, "$@". is_mute: standard error goes elsewhere. is_bound: by permissions, also where the tests run as root.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    code: int = 2
+    says: str = ""
+    makes: tuple[str, ...] = ()
+    environment: Mapping[str, str | None] = field(default_factory=dict)
+    prepare: Callable[[Path], None] = nothing
+    limits: tuple[str, ...] = ()
+    shell: str = PLAINLY
+    is_mute: bool = False
+    is_bound: bool = False
+
+    @property
+    def runs_apart(self) -> bool:
+        """Whether what surrounds the command matters, so that it needs a process of its own."""
+        return bool(self.environment or self.limits or self.is_bound or self.is_mute) or self.shell != PLAINLY
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a case ended. changed: what is new, gone or other than before, but for what the case may make."""
+
+    code: int
+    output: str
+    errors: str
+    changed: tuple[str, ...]
+
+
+def run_case(case: Case, template: Path, folder: Path) -> Ended:
+    """Copy the template to the folder, run the command there, and compare."""
+    work, home = folder / "work", folder / "home"
+    shutil.copytree(template, work, symlinks=True)
+    home.mkdir()
+    case.prepare(work)
+    before = snapshot(work)
+    environment = {"PATH": os.environ["PATH"], "HOME": str(home), "LANG": "C.UTF-8", **_inherited(), **case.environment}
+    arguments = tuple(word.replace("{folder}", str(work)) for word in case.arguments)
+    given = {name: value.replace("{folder}", str(work)) for name, value in environment.items() if value is not None}
+    if case.runs_apart:
+        code = _run_apart(case, arguments, work, given, folder)
+    else:
+        code = run_in_fork(arguments, work, given, folder, DEADLINE_S)
+    output, errors = ((folder / name).read_bytes().decode("utf-8", "backslashreplace") for name in ("output", "errors"))
+    changed = tuple(name for name in _differences(before, snapshot(work)) if not _is_made(name, case.makes))
+    _unlock(folder)
+    shutil.rmtree(folder)
+    return Ended(code, output, errors, changed)
+
+
+def snapshot(folder: Path) -> dict[str, str]:
+    """What a folder holds: of each path the kind and permissions, of files the contents, of links the target."""
+    found = {}
+    for place, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            path = Path(place, name)
+            status = path.lstat()
+            content = stat.filemode(status.st_mode)
+            if stat.S_ISLNK(status.st_mode):
+                content += str(path.readlink())
+            elif stat.S_ISREG(status.st_mode):
+                content += hashlib.sha256(path.read_bytes()).hexdigest()
+            found[str(path.relative_to(folder))] = content
+    return found
+
+
+def _run_apart(case: Case, arguments: tuple[str, ...], work: Path, environment: dict[str, str], told: Path) -> int:
+    """As `run_in_fork`, in a process of its own, as a user starts it."""
+    with (told / "output").open("wb") as output, (told / "errors").open("wb") as errors:
+        words = [*_wrapper(case), IIBR, *arguments]
+        done = subprocess.run(
+            words,
+            cwd=work,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=errors,
+            timeout=DEADLINE_S,
+            check=False,
+        )
+    return done.returncode
+
+
+def _wrapper(case: Case) -> tuple[str, ...]:
+    words: tuple[str, ...] = ("prlimit", *case.limits) if case.limits else ()
+    if case.is_bound and os.geteuid() == 0:
+        words += WITHOUT_PRIVILEGES
+    return (*words, "sh", "-c", case.shell, "sh") if case.shell != PLAINLY else words
+
+
+def _inherited() -> dict[str, str]:
+    return {name: os.environ[name] for name in ("PYTHONPATH",) if name in os.environ}
+
+
+def _differences(before: dict[str, str], after: dict[str, str]) -> list[str]:
+    return [name for name in sorted({*before, *after}) if before.get(name) != after.get(name)]
+
+
+def _is_made(name: str, makes: tuple[str, ...]) -> bool:
+    return any(name == made or name.startswith(f"{made}/") for made in makes)
+
+
+def _unlock(folder: Path) -> None:
+    """What the case locked may go all the same, where the tests do not run as root."""
+    for place, folders, _ in os.walk(folder):
+        for name in folders:
+            path = Path(place, name)
+            if not path.is_symlink():
+                path.chmod(0o700)

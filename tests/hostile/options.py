@@ -1,0 +1,146 @@
+"""Hostile cases of options: values that mean nothing, that are too large, or that what is opened cannot heed."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from tests.hostile.case import Case
+from tests.hostile.inputs import COMMANDS
+
+HUGE = str(10**30)
+
+_EVERYWHERE = (
+    ("--disparity-scale", ("", "x", "nan", "inf", "1,5")),
+    ("--depth", ("", "best", "AUTO")),
+    ("--refine", ("", "2", "-0.1", "nan", "yes")),
+    ("--grid", ("", "0", "-3", "2.5", "3x3x3", "100", HUGE, "9x0", "x")),
+    ("--max-pixels", ("0", "-1", "x", "1e6", HUGE)),
+    ("--memory", ("0", "-1G", "lots", "1X", HUGE, "9999999999T", "1e400", "nan")),
+)
+"""Options of every command that opens a photo, with values that are none."""
+
+
+def _without(words: tuple[str, ...], option: str) -> tuple[str, ...]:
+    """The words but for this option and its value."""
+    kept = [pair for pair in zip(words[::2], words[1::2]) if pair[0] != option]
+    return tuple(word for pair in kept for word in pair)
+
+
+def _hide_map(folder: Path) -> None:
+    """A photo beside which there is nothing that could give it depth."""
+    (folder / "model").mkdir()
+    (folder / "model" / "config.json").write_text("{}")
+    shutil.copy(folder / "photo.png", folder / "bare.png")
+
+
+_values = [
+    Case(
+        f"{command} {option} {value!r}",
+        (command, "photo.png", *_without(COMMANDS[command], option), option, value),
+        says=option,
+    )
+    for number, (option, values) in enumerate(_EVERYWHERE)
+    for index, value in enumerate(values)
+    # Each value meets one of the commands, in turn: they share the options.
+    for command in (list(COMMANDS)[(number + index) % len(COMMANDS)],)
+]
+
+_screenshot = [
+    Case(f"screenshot {option} {value!r}", ("screenshot", "photo.png", "-o", "new.png", option, value), says=option)
+    for option, values in (
+        ("--view", ("", "1", "1,2,3", "a,b", "nan,0", "99,99", "-1e300,0")),
+        ("--focus", ("", "x", "nan", "1e300")),
+        ("--aperture", ("", "x", "nan", "-1", "1e300")),
+        ("--size", ("", "12", "0x5", "axb", "99999x1", "16384x16384", f"{HUGE}x1")),
+        ("--backend", ("", "vulkan")),
+        ("--quality", ("", "best", "Exact")),
+        ("--inpaint", ("", "magic")),
+        ("--depth-strength", ("", "nan", "1e300")),
+        ("--focus-disparity", ("", "inf")),
+    )
+    for value in values
+]
+
+_models = [
+    Case(f"{command} {words}", (command, "bare.png", *COMMANDS[command], *more), prepare=_hide_map, says=says)
+    for command in ("plan", "screenshot", "generate")
+    for words, more, says in (
+        ("--depth-model unknown", ("--depth-model", "unknown"), "unknown"),
+        ("--depth-model in a missing folder", ("--depth-model", "missing/model"), "missing/model"),
+        ("--depth-model a file", ("--depth-model", "photo.png"), "photo.png"),
+        ("--depth-model an empty folder", ("--depth-model", "folder"), "folder"),
+        ("--depth-model a folder that says nothing", ("--depth-model", "model"), "model"),
+        ("--depth-model not here", ("--depth-model", "depth-pro"), "depth-pro"),
+        ("--depth model without one", ("--depth", "model"), "--depth model"),
+    )
+] + [
+    Case("view --depth-model unknown", ("view", "photo.png", "--depth-model", "unknown"), says="unknown"),
+    Case("view --depth model", ("view", "photo.png", "--depth", "model"), says="--depth model"),
+    Case(
+        "evaluate --depth-model unknown",
+        ("evaluate", "field", "--out", "new", "--depth-model", "unknown", "--views", "1"),
+        says="unknown",
+    ),
+]
+
+_contradictions = [
+    Case(f"{command} {' '.join(more)}", (command, "photo.png", *COMMANDS[command], *more), says=more[0])
+    for command in ("plan", "screenshot")
+    for more in (
+        ("--disparity", "map.pfm", "--depth", "rough"),
+        ("--disparity", "map.pfm", "--depth-model", "depth-pro"),
+        ("--depth", "flat", "--depth-model", "depth-pro"),
+    )
+]
+
+_IGNORED_BY_FOLDERS = (
+    ("--disparity", "map.pfm"), ("--disparity-scale", "2"), ("--depth", "rough"), ("--depth-model", "depth-pro"),
+    ("--refine", "off"), ("--depth-strength", "2"), ("--focus-disparity", "1"), ("--grid", "3"),
+    ("--max-pixels", "100"), ("--quality", "fast"), ("--inpaint", "background"),
+)  # fmt: skip
+"""A light field brings views of its own: what says how views are made says nothing about them."""
+
+_ignored = [
+    Case(f"{command} a light field {' '.join(more)}", (command, "field", *COMMANDS[command], *more), says=more[0])
+    for command, each in (("screenshot", _IGNORED_BY_FOLDERS), ("view", _IGNORED_BY_FOLDERS[:3]))
+    for more in each
+]
+
+_others = [
+    Case(f"{' '.join(words)[:60]}", words, says=says)
+    for words, says in (
+        (("fly",), "fly"),
+        (("plan",), "PHOTO"),
+        (("plan", "photo.png", "photo.png"), "photo.png"),
+        (("plan", "photo.png", "--fly"), "--fly"),
+        (("plan", "--", "--fly"), "--fly"),
+        (("--fly",), "--fly"),
+        (("generate", "photo.png", "--grid", "3", "--out", "new", "--format", "mp4"), "mp4"),
+        (("generate", "photo.png", "--grid", "99", "--out", "new", "--memory", "1K"), "--memory"),
+        (("view", "photo.png", "--ground-truth", "missing"), "missing"),
+        (("view", "photo.png", "--ground-truth", "photo.png"), "photo.png"),
+        (("evaluate", "field", "--out", "new", "--views", "0"), "--views"),
+        (("evaluate", "field", "--out", "new", "--disparity", "missing.pfm"), "missing.pfm"),
+        (("evaluate", "field", "--out", "new", "--disparity", "folder"), "folder"),
+        (("evaluate", "field", "--out", "new", "--lpips", "missing"), "missing"),
+        (("evaluate", "field", "--out", "new", "--quality", "best"), "--quality"),
+        (("train", "--steps", "0", "--out", "new.safetensors"), "--steps"),
+        (("train", "--steps", "1", "--seed", "-1", "--out", "new.safetensors"), "--seed"),
+        (("train", "--steps", "1", "--seed", HUGE, "--out", "new.safetensors"), "--seed"),
+        (("train", "--steps", HUGE, "--out", "new.safetensors"), "--steps"),
+        (("train", "--steps", "1", "--learning-rate", "nan", "--out", "new.safetensors"), "--learning-rate"),
+        (("train", "--steps", "1", "--learning-rate", "-1", "--out", "new.safetensors"), "--learning-rate"),
+        (("train", "--steps", "1", "--learning-rate", "2", "--out", "new.safetensors"), "--learning-rate"),
+        (("train", "--steps", "1", "--device", "abacus", "--out", "new.safetensors"), "abacus"),
+        (("train", "--steps", "1", "--checkpoint-every", "0", "--out", "new.safetensors"), "--checkpoint-every"),
+        (("models", "get"), "NAME"),
+        (("models", "get", "unknown"), "unknown"),
+        (("models", "get", "../../unknown"), "unknown"),
+        (("models", "get", "depth-pro"), "--yes"),
+        (("models", "lose"), "lose"),
+        (("bench",), "make bench"),
+    )
+]
+
+OPTION_CASES = (*_values, *_screenshot, *_models, *_contradictions, *_ignored, *_others)

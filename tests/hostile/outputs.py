@@ -1,0 +1,158 @@
+"""Hostile cases of what is written: places where nothing may be, and places where something is already."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.hostile.case import Case, nothing
+from tests.hostile.inputs import LONG_NAME, NOT_UTF8
+
+WRITING: dict[str, tuple[str, ...]] = {
+    "screenshot": ("screenshot", "photo.png", "--disparity", "map.pfm", "--grid", "1", "-o"),
+    "generate": ("generate", "photo.png", "--disparity", "map.pfm", "--grid", "1", "--out"),
+    "evaluate": ("evaluate", "field", "--views", "1", "--quality", "fast", "--out"),
+    "train": ("train", "--steps", "1", "--out"),
+}
+"""What writes, all but where to."""
+
+SUFFIX = {"screenshot": ".png", "generate": "", "evaluate": "", "train": ".safetensors"}
+
+
+def _read_only(folder: Path) -> None:
+    (folder / "folder").chmod(0o500)
+
+
+def _locked(folder: Path) -> None:
+    (folder / "folder").chmod(0)
+
+
+def _link_away(folder: Path) -> None:
+    (folder / "away").symlink_to("no/where")
+
+
+_PLACES: tuple[tuple[str, str, Callable[[Path], None]], ...] = (
+    ("in a missing folder", "missing/new{suffix}", nothing),
+    ("in a file", "text.txt/new{suffix}", nothing),
+    ("in a read-only folder", "folder/new{suffix}", _read_only),
+    ("in a locked folder", "folder/new{suffix}", _locked),
+    ("under a long name", LONG_NAME.replace(".png", "{suffix}"), nothing),
+    ("under no name", "", nothing),
+    ("into a device folder", "/proc/new{suffix}", nothing),
+    ("through a loop", "loop.png/new{suffix}", nothing),
+    ("onto the photo", "photo.png", nothing),
+    ("onto a text", "text.txt", nothing),
+)
+
+_places = [
+    Case(
+        f"{command} {words}",
+        (*words_before, place.replace("{suffix}", SUFFIX[command])),
+        prepare=prepare,
+        is_bound=prepare is not nothing,
+    )
+    for command, words_before in WRITING.items()
+    for words, place, prepare in _PLACES
+]
+
+_screenshot = [
+    Case(f"screenshot {words}", (*WRITING["screenshot"], place, *more), says=says)
+    for words, place, more, says in (
+        ("as JPEG", "new.jpg", (), ".png or .exr"),
+        ("without a suffix", "new", (), ".png or .exr"),
+        ("onto a folder", "folder", (), "folder"),
+        ("onto this folder", ".", (), "."),
+        ("onto an existing picture", "saved.png", (), "--force"),
+        ("onto the photo by force", "photo.png", ("--force",), "photo.png"),
+        ("onto the photo by its whole path", "{folder}/photo.png", ("--force",), "photo.png"),
+        ("onto the photo by a detour", "folder/../photo.png", ("--force",), "photo.png"),
+        ("onto the photo through a link", "link.png", ("--force",), "link.png"),
+        ("onto the photo by its other name", "hard.png", ("--force",), "hard.png"),
+        ("onto the picture it is like", "saved.png", ("--like", "saved.png", "--force"), "saved.png"),
+        ("into a loop", "loop.png", ("--force",), "loop.png"),
+        ("too large", "new.png", ("--size", "16384x16384"), "16384x16384"),
+        ("onto a device", "/dev/full", (), "/dev/full"),
+    )
+] + [
+    Case(
+        "screenshot onto its map", ("screenshot", "photo.png", "--disparity", "text.png", "-o", "text.png", "--force")
+    ),
+    Case("screenshot over a field's view", ("screenshot", "field", "-o", "field/input_Cam004.png", "--force")),
+    Case("screenshot into the field it shows", ("screenshot", "field", "-o", "field/new.png"), says="field"),
+    Case("screenshot into the field through a link", ("screenshot", "field", "-o", "link-to-field/new.png")),
+    Case("screenshot by force", (*WRITING["screenshot"], "saved.png", "--force"), code=0, makes=("saved.png",)),
+    Case(
+        "screenshot through a link",
+        (*WRITING["screenshot"], "dangling-into-folder", "--force"),
+        says=".png or .exr",
+    ),
+    Case("screenshot through a dangling link", (*WRITING["screenshot"], "dangling.png"), code=0, makes=("gone.png",)),
+    Case(
+        "screenshot under a long name that may be",
+        (*WRITING["screenshot"], "n" * 246 + ".png"),
+        code=0,
+        makes=("n" * 246 + ".png",),
+    ),
+    Case("screenshot under a name that is not UTF-8", (*WRITING["screenshot"], NOT_UTF8)),
+    Case(
+        "screenshot under a name of umlauts", (*WRITING["screenshot"], "größe 大.png"), code=0, makes=("größe 大.png",)
+    ),
+    Case("screenshot without a place", ("screenshot", "photo.png"), says="-o"),
+]
+
+_generate = [
+    Case(f"generate {words}", ("generate", photo, *WRITING["generate"][2:], place, *more), prepare=prepare)
+    for words, photo, place, more, prepare in (
+        ("over the field that holds the photo", "field/input_Cam004.png", "field", ("--force",), nothing),
+        ("over it by a detour", "field/input_Cam004.png", "folder/../field", ("--force",), nothing),
+        ("over it through a link", "field/input_Cam004.png", "link-to-field", ("--force",), nothing),
+        ("into it", "field/input_Cam004.png", "field/new", ("--force",), nothing),
+        ("over the folder above", "field/input_Cam004.png", ".", ("--force",), nothing),
+        ("over the folder above by its whole path", "photo.png", "{folder}", ("--force",), nothing),
+        ("over another field", "photo.png", "field", (), nothing),
+        ("over a folder of other things by force", "field/input_Cam004.png", "..", ("--force",), nothing),
+        ("over everything", "photo.png", "/", ("--force",), nothing),
+        (
+            "through a dangling link into nowhere",
+            "photo.png",
+            "away",
+            (),
+            lambda at: (at / "away").symlink_to("no/where"),
+        ),
+    )
+] + [
+    Case("generate into an empty folder", (*WRITING["generate"], "folder"), code=0, makes=("folder",)),
+    Case("generate by force", (*WRITING["generate"], "field", "--force"), code=0, makes=("field",)),
+    Case("generate through a link", (*WRITING["generate"], "link-to-folder"), code=0, makes=("folder",)),
+    Case("generate a long name", (*WRITING["generate"], "n" * 250), code=0, makes=("n" * 250,)),
+    Case("generate without a place", ("generate", "photo.png", "--grid", "3"), says="--out"),
+    Case("generate without a grid", ("generate", "photo.png", "--out", "new"), says="--grid"),
+]
+
+_others = [
+    Case("evaluate into its data", ("evaluate", "field", "--views", "1", "--out", "field/report")),
+    Case("evaluate over its data", ("evaluate", "field", "--views", "1", "--out", "field", "--force")),
+    Case("evaluate over its data through a link", ("evaluate", "field", "--out", "link-to-field", "--force")),
+    Case("train as something else", ("train", "--steps", "1", "--out", "new.png"), says="new.png"),
+    Case("train onto a folder", ("train", "--steps", "1", "--out", "folder"), says="folder"),
+    Case("train on from nothing", ("train", "--steps", "1", "--out", "new.safetensors", "--resume")),
+    Case(
+        "demo in a read-only folder",
+        ("demo",),
+        shell='cd folder && exec "$@"',
+        prepare=_read_only,
+        is_bound=True,
+        says="out",
+    ),
+    Case("demo where out is a file", ("demo",), prepare=lambda at: (at / "out").write_text("in the way"), says="out"),
+]
+
+_full = [
+    Case(
+        f"{command} onto a disk without room", (*WRITING[command], f"new{SUFFIX[command]}"), limits=(f"--fsize={room}",)
+    )
+    for command in ("screenshot", "generate")
+    for room in (0, 500)
+]
+
+OUTPUT_CASES = (*_places, *_screenshot, *_generate, *_others, *_full)

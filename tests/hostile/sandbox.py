@@ -1,0 +1,108 @@
+"""The folder that every hostile case gets a copy of: good files, damaged files, and files that lie."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.types import GridShape, ViewUpdate
+from viewer.app.image_export import export_image
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import SavedSettings, Source
+from viewer.model.state.optics import Optics
+
+HEIGHT, WIDTH = 24, 32
+
+BAD_PICTURES = (
+    "missing.png", "folder", "empty.png", "text.png", "cut.png", "cut.jpg", "cut.exr", "cut.tif", "noise.png",
+    "noise.heic", "bomb.png", "huge.pfm.png", "zero.png", "loop.png", "dangling.png",
+)  # fmt: skip
+"""Of the template: what no photo is."""
+
+BAD_MAPS = (
+    "missing.pfm", "folder", "empty.pfm", "text.pfm", "cut.pfm", "huge.pfm", "zero.pfm", "nan.pfm", "wide.pfm",
+    "pickle.npy", "cut.npy", "words.npy", "bomb.png", "text.png",
+)  # fmt: skip
+"""Of the template: what no disparity map of its photo is."""
+
+
+def make_template(folder: Path) -> None:
+    """Fill the folder."""
+    folder.mkdir()
+    rng = np.random.default_rng(0)
+    pixels = rng.integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8)
+    _make_good(folder, pixels)
+    _make_bad_pictures(folder, pixels)
+    _make_bad_maps(folder)
+    (folder / "folder").mkdir()
+    (folder / "text.txt").write_text("some words")
+
+
+def _make_good(folder: Path, pixels: np.ndarray) -> None:
+    disparity = np.zeros((HEIGHT, WIDTH), np.float32)
+    disparity[8:16, 10:20] = 2.0
+    write_image(folder / "photo.png", pixels)
+    Image.fromarray(pixels).save(folder / "photo.jpg")
+    write_pfm(folder / "map.pfm", disparity)
+    settings = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(WIDTH, HEIGHT))
+    export_image(folder / "saved.png", pixels, settings)
+    huge = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(30_000, 30_000))
+    export_image(folder / "saved-huge.png", pixels, huge)
+    with HciWriter(folder / "field", GridShape(3, 3), 40.0, "field", False) as writer:
+        for row in range(3):
+            for column in range(3):
+                writer.add(ViewUpdate(row, column, pixels, disparity))
+    (folder / "link.png").symlink_to("photo.png")
+    (folder / "hard.png").hardlink_to(folder / "photo.png")
+    (folder / "link-to-folder").symlink_to("folder", target_is_directory=True)
+    (folder / "link-to-field").symlink_to("field", target_is_directory=True)
+    (folder / "dangling-into-folder").symlink_to("folder/target.png")
+
+
+def _make_bad_pictures(folder: Path, pixels: np.ndarray) -> None:
+    (folder / "empty.png").touch()
+    (folder / "text.png").write_text("this is no picture")
+    for kind in ("png", "jpg", "tif"):
+        Image.fromarray(pixels).save(folder / f"cut.{kind}")
+    write_image(folder / "cut.exr", pixels)
+    for path in folder.glob("cut.*"):
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    (folder / "noise.png").write_bytes(b"\x89PNG\r\n\x1a\n" + np.random.default_rng(1).bytes(500))
+    (folder / "noise.heic").write_bytes(b"\x00\x00\x00\x18ftypheic" + np.random.default_rng(2).bytes(500))
+    (folder / "bomb.png").write_bytes(_png(60_000, 60_000))
+    (folder / "huge.pfm.png").write_bytes(_png(2**31 - 1, 2**31 - 1))
+    (folder / "zero.png").write_bytes(_png(0, 0))
+    (folder / "loop.png").symlink_to("loop.png")
+    (folder / "dangling.png").symlink_to("gone.png")
+
+
+def _make_bad_maps(folder: Path) -> None:
+    good = (folder / "map.pfm").read_bytes()
+    (folder / "empty.pfm").touch()
+    (folder / "text.pfm").write_text("no map at all")
+    (folder / "cut.pfm").write_bytes(good[: len(good) // 2])
+    (folder / "huge.pfm").write_bytes(b"Pf\n999999999 999999999\n-1.0\n")
+    (folder / "zero.pfm").write_bytes(b"Pf\n0 0\n-1.0\n")
+    write_pfm(folder / "nan.pfm", np.full((HEIGHT, WIDTH), np.nan, np.float32))
+    write_pfm(folder / "wide.pfm", np.ones((HEIGHT, 5 * WIDTH), np.float32))
+    np.save(folder / "pickle.npy", np.array([{}], dtype=object), allow_pickle=True)
+    np.save(folder / "cut.npy", np.ones((HEIGHT, WIDTH), np.float32))
+    (folder / "cut.npy").write_bytes((folder / "cut.npy").read_bytes()[:-100])
+    np.save(folder / "words.npy", np.full((HEIGHT, WIDTH), "word"))
+
+
+def _png(width: int, height: int) -> bytes:
+    """A PNG of few bytes that claims this size."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
