@@ -20,7 +20,7 @@ from benchmarks.speed.variants import REFERENCE
 from iibr_core.evaluation.consistency import Consistency
 from iibr_core.evaluation.report import markdown_table
 from iibr_core.evaluation.tables import NO_FIGURE, Table, number
-from iibr_core.formats.files import atomic_write
+from iibr_core.formats.outputs import atomic_write
 
 MIB = 2**20
 FRONT_MARK = "●"

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from iibr_core.formats.files import is_file
+from iibr_core.formats.files import is_file, is_folder
 from iibr_core.types import FloatImage, InputError
 
 LAYERS = ((0, 64, 4, 2), (3, 192, 1, 2), (6, 384, 1, 1), (8, 256, 1, 1), (10, 256, 1, 1))
@@ -29,6 +29,8 @@ class Lpips:
 
     def __init__(self, folder: Path) -> None:
         """folder: holds FILES. Raises InputError, naming the file, where one is missing or something else."""
+        if not is_folder(folder):
+            raise InputError(f"{folder}: is no folder; --lpips wants one with {FILES}")
         backbone = next(iter(sorted(folder.glob("alexnet*.pth"))), folder / "alexnet-owt-7be5be79.pth")
         kinds = ("weight", "bias")
         names = [f"features.{number}.{kind}" for number, *_ in LAYERS for kind in kinds]

@@ -26,6 +26,8 @@ except ImportError:  # not on this system: then nothing is locked, and nothing r
 
 TEMPORARY_NAME = re.compile(r"\.iibr-[0-9a-f]{16}(\.\w{1,15})?")
 MOST_NAME_BYTES = 255
+MOST_PATH_BYTES = 4000
+"""Of the 4096 that Linux takes: a temporary name needs some."""
 MOST_LINKS = 40
 FOLDER_LEVELS = 3
 """How deep the pictures of data sets lie below the folder that is named: scene, subfolder, picture."""
@@ -204,7 +206,7 @@ def remove_leftovers(folder: Path) -> None:
 def _remove_around(around: Path) -> None:
     """Remove the folder around a new and an old one. The old one goes back unless the new one took its place."""
     old = next(iter((around / OLD).glob("*")), None)
-    if old is not None and (around / NEW / old.name).exists():
+    if old is not None and os.path.lexists(around / NEW / old.name):
         if os.path.lexists(around.parent / old.name):
             return  # somebody made another one meanwhile: both are kept
         old.rename(around.parent / old.name)
@@ -254,8 +256,10 @@ def _real_place(path: Path) -> Path:
         raise InputError(f"{path}: is no place to write to ({reason_of(error)}); choose another") from error
     if longest > MOST_NAME_BYTES:
         raise InputError(f"{path}: a name has {longest} bytes, {MOST_NAME_BYTES} at most are possible; shorten it")
+    if len(os.fsencode(real)) > MOST_PATH_BYTES:
+        raise InputError(f"{path}: the path is longer than {MOST_PATH_BYTES} bytes; choose another place")
     status_of(real)
-    if real.is_symlink():
+    if os.path.islink(real):
         raise InputError(f"{path}: its links lead in a circle; choose another name")
     return real
 
@@ -275,7 +279,7 @@ def _require_writable(path: Path, folder: Path) -> None:
 def _require_no_dangling_link(folder: Path, real: Path) -> None:
     """A disk that is not there now must not be replaced by a folder of its name."""
     for place in (folder, *folder.parents):
-        if place.is_symlink() and status_of(place) is None and not (place == folder and is_folder(real.parent)):
+        if os.path.islink(place) and status_of(place) is None and not (place == folder and is_folder(real.parent)):
             raise InputError(f"{folder}: {place} is a link to what is not there; choose another place")
 
 
@@ -297,7 +301,7 @@ def _places_of(read: Path) -> Iterator[Path]:
     for _ in range(MOST_LINKS):
         read = Path(os.path.realpath(read.parent), read.name)
         yield read
-        if not read.is_symlink():
+        if not os.path.islink(read):
             break
         read = read.parent / os.readlink(read)
     yield Path(os.path.realpath(read))

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import InputError
-from viewer.app.image_export import export_picture, is_float, picture_path, settings_of
+from viewer.app.image_export import export_picture, is_float, settings_of
+from viewer.app.save_places import picture_path
 from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.jobs import message_of
 from viewer.display.scene_view import SceneView

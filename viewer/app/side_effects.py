@@ -13,8 +13,9 @@ from typing import Any
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import InputError
 from viewer.app.dialogs import Dialog, has_dialogs
-from viewer.app.image_export import export_map, inputs_of_scene, map_path
+from viewer.app.image_export import export_map
 from viewer.app.picture_saver import PictureSaver
+from viewer.app.save_places import inputs_of_scene, map_path
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView

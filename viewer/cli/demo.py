@@ -37,8 +37,7 @@ def demo() -> None:
     try:
         window = App(initial_state(OpenPath(source)), user_folder())
     except InputError as error:
-        print(f"{error}. Rendering without one.")
-        _demo_pictures(source)
+        _demo_pictures(source, str(error))
         return
     try:
         window.run()
@@ -46,7 +45,8 @@ def demo() -> None:
         window.close()
 
 
-def _demo_pictures(source: Source) -> None:
+def _demo_pictures(source: Source, why: str) -> None:
+    """why: there is no window, for people."""
     from viewer.app.contact_sheet import contact_sheet
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image
@@ -54,6 +54,7 @@ def _demo_pictures(source: Source) -> None:
     window, views = DEMO_FOLDER / "demo.png", DEMO_FOLDER / "demo-views.png"
     require_files_in(DEMO_FOLDER, (window.name, views.name), inputs_with_sidecar(source), may_replace=True)
     make_folder(DEMO_FOLDER)
+    print(f"{why}. Rendering without one.")
     with HeadlessViewer() as viewer:
         with show_progress("reading") as show:
             viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total, progress.doing))

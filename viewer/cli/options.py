@@ -148,7 +148,7 @@ def require_model(choice: DepthChoice) -> None:
 def inputs_with_sidecar(source: Source, *more: Path | None) -> tuple[Path, ...]:
     """What a command reads, and nothing may be written onto: the source, the map that lies beside it, and more."""
     from iibr_core.depth.sidecar import find_sidecar
-    from viewer.app.image_export import inputs_of
+    from viewer.app.save_places import inputs_of
 
     beside = find_sidecar(Path(source.path)) if source.depth.start == "auto" and source.depth.file is None else None
     return (*inputs_of(source), *(path for path in (beside, *more) if path is not None))

@@ -155,7 +155,7 @@ def screenshot(
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
-    from viewer.app.image_export import require_picture_place
+    from viewer.app.save_places import require_picture_place
     from viewer.model.state.app_state import Source
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)

@@ -17,7 +17,6 @@ from types import TracebackType
 import numpy as np
 
 from iibr_core.formats.files import entries_of, is_folder
-from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_grid, write_parameters
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.formats.light_fields.view_grid import (
@@ -114,6 +113,8 @@ class HciWriter:
             raise InputError(str(error).replace(str(self._unfinished.path), str(self.folder))) from error
 
     def _write_view(self, update: ViewUpdate) -> None:
+        from iibr_core.formats.images.photo import write_image  # brings numba, for which no refusal should wait
+
         index = update.row * self.grid.columns + update.column
         extension = ".png" if update.colors.dtype == np.uint8 else ".exr"
         write_image(self._unfinished.path / f"input_Cam{index:03d}{extension}", update.colors)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +11,12 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.color import srgb_from_linear
-from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import (
     export_image,
     is_float,
-    map_path,
-    picture_path,
     render_pixels,
     settings_of,
 )
@@ -103,26 +100,6 @@ def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
 def test_absurd_sizes_are_refused(opened: HeadlessViewer, size_px: tuple[int, int]) -> None:
     with pytest.raises(InputError, match=rf"{size_px[0]}x{size_px[1]} px: .* million"):
         render_pixels(opened._scene_view, opened.state, size_px)
-
-
-@pytest.mark.parametrize("path_for", [picture_path, map_path])
-def test_files_are_not_replaced_unasked(tmp_path: Path, path_for: Callable[[SaveTask, tuple[Path, ...]], Path]) -> None:
-    path = tmp_path / "taken.png"
-    path.write_bytes(b"mine")
-    with pytest.raises(AlreadyThereError, match=r"taken\.png"):
-        path_for(SaveTask(str(path), (8, 8)), ())
-    assert path_for(SaveTask(str(path), (8, 8), may_replace=True), ()) == path
-
-
-def test_a_name_without_an_ending_gets_one(tmp_path: Path) -> None:
-    assert picture_path(SaveTask(f" {tmp_path}/a ", (8, 8)), ()) == tmp_path / "a.png"
-    assert map_path(SaveTask(f"{tmp_path}/a", (8, 8)), ()) == tmp_path / "a.pfm"
-
-
-@pytest.mark.parametrize("name", ["", "a.jpg", "missing-folder/a.png"])
-def test_places_that_cannot_be_written_are_told_before_anything_is_drawn(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError):
-        picture_path(SaveTask(str(tmp_path / name) if name else "", (8, 8)), ())
 
 
 def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,9 +13,9 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.image_export import render_pixels
-from viewer.model.actions import Action, DoTask, OpenPath, SetDepthStrength
+from viewer.model.actions import Action, DismissNotice, DoTask, OpenPath, SetDepthStrength
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.app_state import SavePrompt, SaveTask, Source
+from viewer.model.state.app_state import ReadMaskTask, Saved, SavePrompt, SaveTask, Source
 from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.state.saving import CancelSaveTask
 
@@ -101,6 +102,35 @@ def test_a_file_that_waits_to_be_written_is_replaced_only_when_that_is_said(view
     viewer.app.do(DoTask(SaveTask(str(out), (48, 32))))
     viewer.until(lambda app: app.state.prompt == SavePrompt(str(out), (48, 32), already_there=True))
     assert not out.exists()
+
+
+@pytest.mark.parametrize("what", ["picture", "map"])
+@pytest.mark.parametrize("name", ["scene.png", "scene_disparity.npy", "mask.png"])
+def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path: Path, what: Saved, name: str) -> None:
+    """The photo, the map beside it, an aperture: a notice, and no question whether to replace it."""
+    shutil.copy(photo_path, photo_path.with_name("mask.png"))
+    viewer.app.do(DoTask(ReadMaskTask(str(photo_path.with_name("mask.png")))))
+    viewer.until(lambda app: app.state.optics.aperture_shape.mask is not None)
+    path = photo_path.with_name(name)
+    before = path.read_bytes()
+    viewer.app.do(DoTask(SaveTask(str(path), (48, 32), may_replace=True, what=what)))
+    viewer.until(lambda app: bool(app.state.notices))
+    expected = "can be written as .png" if (what, path.suffix) == ("picture", ".npy") else "is read here"
+    assert expected in texts(viewer)[0]
+    viewer.until_idle()
+    assert path.read_bytes() == before
+
+
+def test_a_map_that_was_saved_may_be_saved_again(viewer: Driver, tmp_path: Path) -> None:
+    """It lies beside the photo, but was not read; it is replaced where that is said."""
+    path = tmp_path / "scene_disparity.pfm"
+    for may_replace in (False, True):
+        viewer.app.do(DoTask(SaveTask(str(path), (48, 32), may_replace, "map")))
+        viewer.until(lambda app: len(app.state.notices) > 0)
+        assert texts(viewer) == [f"Saved {path}."]
+        viewer.app.do(DismissNotice(viewer.app.state.notices[0]))
+    viewer.app.do(DoTask(SaveTask(str(path), (48, 32), what="map")))
+    viewer.until(lambda app: app.state.prompt == SavePrompt(str(path), (48, 32), already_there=True, what="map"))
 
 
 @pytest.mark.parametrize("change", ["scene", "depth"])

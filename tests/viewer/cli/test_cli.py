@@ -28,12 +28,15 @@ def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
     return int(ended.value.code or 0)
 
 
-def run_apart(code_or_module: str, *words: object, **environment: str) -> subprocess.CompletedProcess[str]:
+def run_apart(
+    code_or_module: str, *words: object, cwd: Path = ROOT, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Python in a process of its own, without a display."""
+    environment = {"PYTHONPATH": str(ROOT), **environment}
     clean = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     flag = "-m" if code_or_module == "viewer" else "-c"
     command = [sys.executable, flag, code_or_module, *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env={**clean, **environment}, timeout=120)
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env={**clean, **environment}, timeout=120)
 
 
 @pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "plan", "train", "demo"])

@@ -43,6 +43,18 @@ def test_evaluate_judges_all_scenes_of_a_folder(
     assert f"iibr evaluate {data}" in (out / "report.md").read_text()
 
 
+def test_a_report_that_is_there_is_replaced_only_by_force(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path
+) -> None:
+    (out := tmp_path / "report").mkdir()
+    (out / "notes.txt").write_text("mine")
+    words = ("evaluate", data / "row", "--out", out, "--views", 1, "--quality", "fast", "--refine", "off")
+    assert run(monkeypatch, *words) == 2
+    assert "is there already; give --force" in capsys.readouterr().err
+    assert run(monkeypatch, *words, "--force") == 0
+    assert sorted(path.name for path in out.iterdir()) == sorted([*REPORT, "notes.txt"])
+
+
 def test_several_qualities_and_a_disparity_of_ones_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path
 ) -> None:

@@ -82,7 +82,8 @@ def test_ctrl_c_before_the_first_step_promises_nothing(
 ) -> None:
     interrupt_at(monkeypatch, 1)
     assert run(monkeypatch, *WORDS, "--steps", 3, "--out", tmp_path / "w.safetensors") == 130
-    assert capsys.readouterr().err.split("iibr: ")[1] == "interrupted before the first step was done\n"
+    assert capsys.readouterr().err == "iibr: interrupted before the first step was done\n"
+    assert names(tmp_path) == [], "nothing is in the way of the next try"
 
 
 def test_training_that_diverges_is_one_line_that_names_the_step(
@@ -132,6 +133,22 @@ def test_bad_values_are_one_line_and_leave_nothing(
     assert line.startswith("iibr: ")
     assert named in line
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_what_is_there_is_replaced_only_by_force(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str
+) -> None:
+    """The log too, which may be somebody's table."""
+    (tmp_path / name).write_text("mine")
+    words = (*WORDS, "--steps", 1, "--out", tmp_path / "w.safetensors")
+    assert run(monkeypatch, *words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"iibr: {tmp_path / name}: is there already; give --force")
+    assert (tmp_path / name).read_text() == "mine"
+    assert names(tmp_path) == [name]
+    assert run(monkeypatch, *words, "--force") == 0
+    assert names(tmp_path) == WRITTEN
 
 
 def test_a_bug_in_a_batch_is_shown_as_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

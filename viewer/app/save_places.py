@@ -1,0 +1,75 @@
+"""Where pictures and maps may be saved, from the window and the command line: never onto what is read. Light, so that
+it can be asked before anything is loaded.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from iibr_core.formats.outputs import require_file_place
+from iibr_core.types import InputError
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import AppState, SaveTask, Source
+
+SUFFIXES = (".png", ".exr")
+MAX_PIXELS = 100_000_000
+"""Of a picture: as float light it then takes 1.2 GB."""
+
+
+def inputs_of(source: Source) -> tuple[Path, ...]:
+    """What is read to open it, as far as it is named: nothing may be written there. See `require_file_place`."""
+    model = None if source.depth.model is None else os.path.expanduser(source.depth.model)
+    is_model_path = model is not None and os.path.lexists(model)  # else it is a name
+    return tuple(Path(path) for path in (source.path, source.depth.file, model if is_model_path else None) if path)
+
+
+def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
+    """What is read for what is open, for what is being opened, and to compare with."""
+    sources = [about.source for about in (state, state.scene) if about is not None and about.source is not None]
+    origin = state.scene.depth_origin if state.scene is not None else None
+    beside = (origin.file if origin is not None else None, state.inspection.truth and state.inspection.truth.path)
+    found = [path for source in sources for path in inputs_of(source)]
+    return (*found, *(Path(os.path.expanduser(path)) for path in beside if path))
+
+
+def require_picture_place(path: Path, size_px: ScreenSize | None, inputs: Sequence[Path], may_replace: bool) -> None:
+    """Find out before a picture is drawn, which may take minutes, whether it can be written. inputs: what is read.
+
+    Raises AlreadyThereError, and InputError for other endings, sizes beyond MAX_PIXELS, and as `require_file_place`.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: can be written as .png or .exr only")
+    if size_px is not None:
+        require_size(size_px)
+    require_file_place(path, inputs, may_replace)
+
+
+def picture_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
+    """Where this picture goes. Raises as `require_picture_place` does, and InputError without a name."""
+    path = _path_of(task, ".png")
+    require_picture_place(path, task.size_px, inputs, task.may_replace)
+    return path
+
+
+def map_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
+    """Where this disparity map goes. Raises as `require_file_place` does, and InputError without a name."""
+    path = _path_of(task, ".pfm")
+    require_file_place(path, inputs, task.may_replace)
+    return path
+
+
+def require_size(size_px: ScreenSize) -> None:
+    """Raise InputError for a picture (width, height) of no pixel or more than MAX_PIXELS."""
+    width, height = size_px
+    if min(size_px) < 1 or width * height > MAX_PIXELS:
+        raise InputError(f"{width}x{height} px: a picture may have 1 to {MAX_PIXELS // 10**6} million pixels")
+
+
+def _path_of(task: SaveTask, suffix: str) -> Path:
+    """The path asked for; with this suffix where it has none."""
+    path = Path(os.path.expanduser(task.path.strip()))
+    if not path.name:
+        raise InputError(f"no file name was given: write one that ends in {suffix}")
+    return path if path.suffix else path.with_name(f"{path.name}{suffix}")
