@@ -5,6 +5,7 @@ The newest request wins. Rays and images are kept only as long as something is l
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -120,7 +121,7 @@ class ComparisonJob:
             from iibr_core.formats.light_fields.registry import open_light_field
             from iibr_core.formats.light_fields.views import read_stored_view
 
-            truth = read_stored_view(open_light_field(Path(request.truth.path).expanduser()), *request.view)
+            truth = read_stored_view(open_light_field(Path(os.path.expanduser(request.truth.path))), *request.view)
             made = inputs.stored
             if made is None:
                 made = _bytes_of(self._make_view(request, inputs, inputs.quality, should_stop).colors)

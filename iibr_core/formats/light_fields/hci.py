@@ -27,7 +27,7 @@ from iibr_core.formats.light_fields.view_grid import (
     set_view,
 )
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place
+from iibr_core.formats.outputs import UnfinishedFolder, remove_leftovers, require_folder_place
 from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
 
 CAM_NAME = re.compile(r"input_cam(\d{1,9})$", re.IGNORECASE)
@@ -58,6 +58,7 @@ class HciWriter:
     def require_place(folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
         """Raise InputError as `require_folder_place` does, and where the folder holds anything but a light field."""
         if is_folder(folder):
+            remove_leftovers(folder)
             foreign = next((file.name for file in entries_of(folder) if not OWN_FILE.fullmatch(file.name)), None)
             if foreign is not None:
                 raise InputError(f"{folder}: holds other files ({foreign}); choose an empty or new folder with --out")
