@@ -5,18 +5,18 @@ Between two pieces it can be cancelled; results do not depend on how many there 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from iibr_core.runtime.machine import core_count
 from iibr_core.types import ImageSize
 
 ShouldStop = Callable[[], bool]
 
 MOST_BAND_PIXELS = 1 << 17
 """Of a band: small enough that a cancelled job stops within some 30 ms."""
-THREADS = os.cpu_count() or 1
+THREADS = core_count()
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

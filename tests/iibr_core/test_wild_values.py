@@ -294,6 +294,7 @@ READS_OR_TELLS = {
     "atomic_write UnfinishedFolder remove_leftovers",
     "formats.light_fields.numbered_grid": "read_numbered_grid",
     "formats.light_fields.hci": "read_hci HciWriter",
+    "formats.images.downsampling": "downsampled_linear finite_pixels linear_light OddValues Rows",
     "formats.images.heic": "is_heic read_heic read_heic_depth",
     "formats.light_fields.llff": "read_llff",
     "formats.light_fields.middlebury": "read_middlebury",
@@ -306,7 +307,7 @@ READS_OR_TELLS = {
     "formats.maps.pfm": "read_pfm",
     "formats.maps.reader": "read_map",
     "formats.images.oiio_writer": "write_image_file",
-    "formats.images.oiio_reader": "read_size read_orientation read_raster require_whole_png text_attribute "
+    "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
     "complaint_of",
     "formats.light_fields.stanford": "read_stanford",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
@@ -317,6 +318,8 @@ READS_OR_TELLS = {
     "inpainting.background": "background_inpainter",
     "inpainting.protocol": "Inpainter",
     "inpainting.registry": "load_inpainter",
+    "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes "
+    "address_space_left",
     "runtime.kernel_cache": "KernelCache sources_hash",
     "runtime.resources": "resource_folder",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import psutil
 from safetensors import SafetensorError
 
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
@@ -21,14 +20,12 @@ from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, w
 from iibr_core.depth.models.config import Preparation, read_config, read_preparation
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.runtime.machine import core_count, usual_budget_bytes
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress, image_size
 
 if TYPE_CHECKING:
     import torch
-
-MEMORY_SHARE = 4
-"""A model may take this part of the machine's memory where the user says nothing."""
 
 ACTIVATION_BYTES = 1500
 """For each pixel of the input of a model of USUAL_WIDTH; measured: 1,060 with Depth Anything V2 Small at 686x518."""
@@ -71,7 +68,7 @@ def estimate_with(
     report_progress(0, 0, f"looking for what {model.title} said before")
     network_input = None
     if model.package == TRANSFORMERS:
-        network_input = _input_of(model, photo.size, memory_bytes or psutil.virtual_memory().total // MEMORY_SHARE)
+        network_input = _input_of(model, photo.size, memory_bytes or usual_budget_bytes())
     key = estimate_cache.key_of(photo.pixels, model.folder, f"{model.package} {network_input}")
     found = estimate_cache.load(key)
     if found is not None:
@@ -148,6 +145,7 @@ def _run(
     import torch
 
     network = _load_network(model)
+    torch.set_num_threads(min(torch.get_num_threads(), core_count()))
     device = "cuda" if torch.cuda.is_available() else "cpu"
     pixels = _network_tensor(photo.pixels, network_input).to(device)
     doing = f"estimating depth with {model.title}"

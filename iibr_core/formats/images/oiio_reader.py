@@ -13,10 +13,12 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, refuse_bomb, require_file
-from iibr_core.types import ImageSize, InputError
+from iibr_core.types import ImageSize, InputError, image_size
 
 # Some cameras pad their JPEGs; the decoder complains and loses nothing.
 HARMLESS_MESSAGE = "extraneous bytes"
+ROWS_AT_ONCE = 64
+"""Of a file without tiles: a multiple of what most strips hold."""
 PNG_START = b"\x89PNG\r\n\x1a\n"
 
 
@@ -32,6 +34,19 @@ class Raster:
     pixels: NDArray[Any]
     alpha: NDArray[Any] | None
     spec: Any
+
+    is_at_start = True
+    """All rows may be read again, unlike those of a file that is being read (`PictureRows`)."""
+
+    @property
+    def size(self) -> ImageSize:
+        """Of the pixels."""
+        return image_size(self.pixels)
+
+    def read(self, first: int, last: int) -> Raster:
+        """Rows [first, last)."""
+        alpha = None if self.alpha is None else self.alpha[first:last]
+        return Raster(self.pixels[first:last], alpha, self.spec)
 
 
 def read_size(path: Path) -> ImageSize:
@@ -49,14 +64,76 @@ def read_orientation(path: Path) -> int:
     return int(source.spec().get_int_attribute("Orientation", 1))
 
 
+class PictureRows:
+    """A picture file, open to be read from top to bottom, some rows at a time: no more of it is in memory than that,
+    as far as its format allows.
+
+    spec: OpenImageIO's header. size: of the picture. is_at_start: whether nothing was read yet.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read the header. Raises InputError as `read_raster` does."""
+        self._path = path
+        self._source = _open(path)
+        self.spec = self._source.spec()
+        self.size = ImageSize(self.spec.height, self.spec.width)
+        self._colors, self._alpha_at = _channels(path, self.spec)
+        self._type = _reading_type(self.spec.format)
+        self.is_at_start = True
+        self._first, self._kept = 0, np.empty((0, self.size.width, self._channel_count), self._type)
+
+    @property
+    def _channel_count(self) -> int:
+        return max(self._colors, self._alpha_at + 1)
+
+    def read(self, first: int, last: int) -> Raster:
+        """Rows [first, last): none that lie above those of the call before, none left out. Raises InputError.
+
+        Its alpha is None where these rows are opaque.
+        """
+        self.is_at_start = False
+        self._kept, self._first = self._kept[max(first - self._first, 0) :], first
+        end = first + len(self._kept)
+        if last > end:
+            step = self.spec.tile_height or ROWS_AT_ONCE
+            # Whole rows of tiles and strips, or they would be decoded again for the rows that follow.
+            until = min(-(-last // step) * step, self.size.height)
+            rows = self._decode(end, until)
+            self._kept = np.concatenate([self._kept, rows]) if len(self._kept) else rows
+        rows = self._kept[: last - first]
+        alpha = np.ascontiguousarray(rows[..., self._alpha_at]) if self._alpha_at >= 0 else None
+        if alpha is not None and (alpha >= (_full(alpha.dtype))).all():
+            alpha = None
+        return Raster(rows[..., : self._colors], alpha, self.spec)
+
+    def _decode(self, first: int, last: int) -> NDArray[Any]:
+        """Rows [first, last) of all channels that are wanted."""
+        source, spec, channels = self._source, self.spec, (0, self._channel_count, self._type)
+        # A header may place its picture anywhere; rows are counted from there.
+        top, bottom = spec.y + first, spec.y + last
+        if spec.tile_width:
+            rows = source.read_tiles(spec.x, spec.x + spec.width, top, bottom, spec.z, spec.z + 1, *channels)
+        else:
+            rows = source.read_scanlines(top, bottom, spec.z, *channels)
+        message = complaint_of(source)
+        if rows is None or (message and HARMLESS_MESSAGE not in message):
+            reason = reason_of(message)
+            raise InputError(f"{self._path}: damaged or cut off ({reason}); get the whole file again")
+        return np.asarray(rows).reshape(last - first, self.size.width, self._channel_count)
+
+
 def read_raster(path: Path) -> Raster:
     """Decode the first picture of a file, as it is stored: no colour conversion, no orientation.
 
     Alpha stays unmultiplied where the file has it so; palettes and CMYK come out as RGB. Raises InputError if the file
     is missing, no picture, cut off, or larger than MAX_FILE_PIXELS.
     """
-    source = _open(path)
-    spec = source.spec()
+    rows = PictureRows(path)
+    return rows.read(0, rows.size.height)
+
+
+def _channels(path: Path, spec: Any) -> tuple[int, int]:
+    """How many channels are colours, and which is alpha, -1 for none."""
     try:
         names = [name.upper() for name in spec.channelnames]
     except UnicodeDecodeError as error:
@@ -65,14 +142,7 @@ def read_raster(path: Path) -> Raster:
     color_count = 3 if spec.nchannels - (alpha_index >= 0) >= 3 else 1
     if alpha_index >= 0 and alpha_index < color_count:
         raise InputError(f"{path}: channels {spec.channelnames} are neither grey nor RGB; convert it to RGB")
-    pixels = source.read_image(0, 0, 0, max(color_count, alpha_index + 1), _reading_type(spec.format))
-    message = complaint_of(source)
-    if pixels is None or (message and HARMLESS_MESSAGE not in message):
-        raise InputError(f"{path}: damaged or cut off ({reason_of(message)}); get the whole file again")
-    alpha = np.ascontiguousarray(pixels[..., alpha_index]) if alpha_index >= 0 else None
-    if alpha is not None and (alpha >= (np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1)).all():
-        alpha = None
-    return Raster(pixels[..., :color_count], alpha, spec)
+    return color_count, alpha_index
 
 
 def _open(path: Path) -> Any:
@@ -109,6 +179,10 @@ def require_whole_png(path: Path) -> None:
             kind = header[4:]
             if file.seek(int.from_bytes(header[:4], "big") + 4, 1) > end or len(header) < 8:
                 raise InputError(f"{path}: damaged or cut off (it ends at byte {end}); get the whole file again")
+
+
+def _full(dtype: Any) -> int:
+    return np.iinfo(dtype).max if dtype.kind == "u" else 1
 
 
 def _reading_type(stored: Any) -> str:

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file
+from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
 from iibr_core.formats.images.heic import is_heic, read_heic
-from iibr_core.formats.images.oiio_reader import Raster, read_raster, text_attribute
+from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute
 from iibr_core.formats.images.oiio_writer import write_image_file
-from iibr_core.runtime.jit import kernel
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo, image_size
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
@@ -27,7 +27,8 @@ FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)  # "35 mm equivalent" compares diagona
 MM_PER_RESOLUTION_UNIT = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # Exif 2.3, FocalPlaneResolutionUnit
 # Compression level 1 is 8 times faster than the default 6, 10 % larger; filter 64 is the average.
 PNG_SETTINGS: Mapping[str, str | int | float] = {"png:compressionLevel": 1, "png:filter": 64}
-BAND_ROWS = 32
+
+ENCODED_ROWS = 64
 
 
 def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float = DEFAULT_FOV_DEG) -> Photo:
@@ -41,24 +42,25 @@ def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float 
     if max_pixels < 1:
         raise InputError(f"--max-pixels {max_pixels}: must be 1 or more")
     require_file(path)
-    raster = read_heic(path) if is_heic(path) else read_raster(path)
-    notes = _color_notes(raster.spec) + _alpha_notes(raster)
-    raster, finite_notes = _finite(raster)
-    stored_size = image_size(raster.pixels)
+    rows = _open_rows(path)
+    stored_size, spec = rows.size, rows.spec
     size = size_within(stored_size, max_pixels)
     if size == stored_size:
-        encoded = _encode(raster)
+        encoded, is_opaque, odd = _encode(rows.read(0, size.height))
     else:
-        encoded = srgb_from_linear(_downsampled_linear(raster, size))
+        linear, is_opaque, odd = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(path), size)
+        encoded = _encode_in_place(linear)
+    notes = _color_notes(spec) + _alpha_notes(is_opaque)
+    if size != stored_size:
         said = f"{stored_size} to {size}"
         notes += (f"Made smaller by area averaging, from {said} (--max-pixels {max_pixels}).",)
-    pixels = upright(encoded, raster.spec.get_int_attribute("Orientation", 1))
-    focal_px = _exif_focal_px(raster.spec)
+    pixels = upright(encoded, spec.get_int_attribute("Orientation", 1))
+    focal_px = _exif_focal_px(spec)
     if focal_px is None:
         focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
     else:
         focal_px *= math.sqrt(size.height * size.width / (stored_size.height * stored_size.width))
-    return Photo(pixels, focal_px, path.stem, bool(pixels.max() > 1), notes + finite_notes)
+    return Photo(pixels, focal_px, path.stem, bool(pixels.max() > 1), notes + _odd_notes(odd))
 
 
 def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | int | float] | None = None) -> None:
@@ -101,85 +103,41 @@ def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     return np.ascontiguousarray(pixels)
 
 
-def _encode(raster: Raster) -> FloatImage:
-    """sRGB-encoded (H, W, 3) at the stored size. Opaque integer files pass untouched: they are encoded already."""
+def _open_rows(path: Path) -> PictureRows | Raster:
+    return read_heic(path) if is_heic(path) else PictureRows(path)
+
+
+def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
+    """sRGB-encoded (H, W, 3) at the stored size, whether it is opaque, and what of it was not finite.
+
+    Opaque integer files pass untouched: they are encoded already.
+    """
     if raster.pixels.dtype.kind == "u" and raster.alpha is None:
         encoded = raster.pixels.astype(np.float32) * np.float32(1 / np.iinfo(raster.pixels.dtype).max)
-        return np.ascontiguousarray(np.broadcast_to(encoded, (*encoded.shape[:2], 3)))
-    return srgb_from_linear(_linear(raster, slice(None)))
+        whole = np.ascontiguousarray(np.broadcast_to(encoded, (*encoded.shape[:2], 3)))
+        return whole, True, OddValues(0, 0.0)
+    pixels, odd = finite_pixels(raster.pixels)
+    return _encode_in_place(linear_light(Raster(pixels, raster.alpha, raster.spec))), raster.alpha is None, odd
 
 
-def _linear(raster: Raster, rows: slice) -> FloatImage:
-    """Linear light over black, (rows, W, 3), of some rows of a raster."""
-    pixels = raster.pixels[rows]
-    if pixels.dtype.kind == "u":
-        steps = np.iinfo(pixels.dtype).max
-        linear = linear_from_srgb(np.arange(steps + 1, dtype=np.float32) / steps)[pixels]
-    else:
-        linear = np.maximum(pixels, 0)
-    if raster.alpha is not None and raster.spec.get_int_attribute("oiio:UnassociatedAlpha"):
-        full = np.iinfo(raster.alpha.dtype).max if raster.alpha.dtype.kind == "u" else 1
-        alpha = np.nan_to_num(raster.alpha[rows].astype(np.float32) / full)
-        linear = linear * np.clip(alpha, 0, 1)[..., None]
-    return np.ascontiguousarray(np.broadcast_to(linear, (*linear.shape[:2], 3)), np.float32)
+def _encode_in_place(linear: FloatImage) -> FloatImage:
+    """The same array, sRGB-encoded; a few rows at a time, as that takes some times their memory."""
+    for first in range(0, len(linear), ENCODED_ROWS):
+        rows = linear[first : first + ENCODED_ROWS]
+        rows[:] = srgb_from_linear(rows)
+    return linear
 
 
-def _downsampled_linear(raster: Raster, size: ImageSize) -> FloatImage:
-    """Area averages of linear light, in bands of rows so that a huge file never exists as floats."""
-    stored_height = raster.pixels.shape[0]
-    result = np.empty((*size, 3), np.float32)
-    for top in range(0, size.height, BAND_ROWS):
-        bottom = min(top + BAND_ROWS, size.height)
-        first = top * stored_height // size.height
-        last = min(stored_height, -(-bottom * stored_height // size.height))
-        _average_areas(_linear(raster, slice(first, last)), first, stored_height / size.height, top, result[top:bottom])
-    return result
+def _odd_notes(odd: OddValues) -> tuple[str, ...]:
+    if not odd.pixels:
+        return ()
+    largest = odd.largest if math.isfinite(odd.largest) else 1.0
+    said = f"NaN became black, infinity the largest value there is ({largest:g})"
+    return (f"{odd.pixels} pixels held NaN or infinity: {said}.",)
 
 
-@kernel
-def _average_areas(band, band_top, row_step, result_top, result):
-    """Average band (rows, W, 3) over the area of each pixel of result (rows, w, 3).
-
-    Pixel i of the result covers rows i * row_step .. (i + 1) * row_step of the whole source; band_top and result_top
-    are the first rows of the two in their wholes.
-    """
-    column_step = band.shape[1] / result.shape[1]
-    for y in range(result.shape[0]):
-        # Exact area averages: border rows and columns count by the share that lies inside.
-        y0 = (result_top + y) * row_step - band_top
-        y1 = min(y0 + row_step, float(band.shape[0]))
-        for x in range(result.shape[1]):
-            x0 = x * column_step
-            x1 = min(x0 + column_step, float(band.shape[1]))
-            red, green, blue, area = 0.0, 0.0, 0.0, 0.0
-            for row in range(max(int(y0), 0), min(math.ceil(y1), band.shape[0])):
-                covered_rows = min(y1, row + 1.0) - max(y0, float(row))
-                for column in range(int(x0), min(math.ceil(x1), band.shape[1])):
-                    weight = covered_rows * (min(x1, column + 1.0) - max(x0, float(column)))
-                    red += weight * band[row, column, 0]
-                    green += weight * band[row, column, 1]
-                    blue += weight * band[row, column, 2]
-                    area += weight
-            result[y, x, 0] = red / area
-            result[y, x, 1] = green / area
-            result[y, x, 2] = blue / area
-
-
-def _finite(raster: Raster) -> tuple[Raster, tuple[str, ...]]:
-    """Replace NaN by 0 and infinity by the largest finite value of the picture."""
-    pixels = raster.pixels
-    if pixels.dtype.kind == "u" or np.isfinite(pixels).all():
-        return raster, ()
-    finite = np.isfinite(pixels)
-    largest = float(pixels[finite].max()) if finite.any() else 1.0
-    cleaned = np.nan_to_num(pixels, nan=0.0, posinf=max(largest, 0.0), neginf=0.0)
-    count = int((~finite).any(axis=2).sum())
-    note = f"{count} pixels held NaN or infinity: NaN became black, infinity the largest value there is ({largest:g})."
-    return Raster(cleaned, raster.alpha, raster.spec), (note,)
-
-
-def _alpha_notes(raster: Raster) -> tuple[str, ...]:
-    return () if raster.alpha is None else ("Transparency was dropped: the photo is laid over black.",)
+def _alpha_notes(is_opaque: bool) -> tuple[str, ...]:
+    return () if is_opaque else ("Transparency was dropped: the photo is laid over black.",)
 
 
 def _color_notes(spec: Any) -> tuple[str, ...]:

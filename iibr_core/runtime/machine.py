@@ -1,0 +1,101 @@
+"""How large the machine is for this process: a container, a scheduler or a limit may grant less than the host has."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+
+CGROUPS, OWN_CGROUPS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
+USUAL_SHARE = 4
+"""This part of the memory is taken where the user says nothing."""
+
+
+def core_count() -> int:
+    """Cores that this process may use at the same time, 1 at least."""
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, math.ceil(min(allowed, cgroup_cores())))
+
+
+def memory_bytes() -> int:
+    """Memory that this process may fill: the machine's, or what limits of its group and its own leave of it."""
+    return int(min(psutil.virtual_memory().total, cgroup_memory_bytes(), own_limit_bytes()))
+
+
+def usual_budget_bytes() -> int:
+    """What this program takes at most where the user says nothing."""
+    return memory_bytes() // USUAL_SHARE
+
+
+def cgroup_memory_bytes(mount: Path = CGROUPS, own: Path = OWN_CGROUPS) -> float:
+    """The memory limit of the control groups that this process is in (versions 1 and 2), infinite without."""
+    limits = [_number(folder / "memory.max") for folder in _folders(mount, own, "")]
+    limits += [_number(folder / "memory.limit_in_bytes") for folder in _folders(mount, own, "memory")]
+    return min(limits, default=math.inf)
+
+
+def cgroup_cores(mount: Path = CGROUPS, own: Path = OWN_CGROUPS) -> float:
+    """So many cores' time the control groups of this process grant it, infinite without a limit."""
+    limits = []
+    for folder in _folders(mount, own, ""):
+        quota, _, period = _text(folder / "cpu.max").partition(" ")
+        limits.append(_share(quota, period))
+    for folder in _folders(mount, own, "cpu"):
+        limits.append(_share(_text(folder / "cpu.cfs_quota_us"), _text(folder / "cpu.cfs_period_us")))
+    return min(limits, default=math.inf)
+
+
+def own_limit_bytes() -> float:
+    """The smallest of the limits on this process's memory (`ulimit -v`, `ulimit -d`), infinite without."""
+    if sys.platform == "win32":
+        return math.inf
+    import resource
+
+    softs = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
+    return min((soft for soft in softs if soft != resource.RLIM_INFINITY), default=math.inf)
+
+
+def address_space_left() -> float:
+    """Bytes of address space that this process may still map, infinite without a limit (`ulimit -v`)."""
+    if sys.platform == "win32":
+        return math.inf
+    import resource
+
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return math.inf if limit == resource.RLIM_INFINITY else limit - psutil.Process().memory_info().vms
+
+
+def _folders(mount: Path, own: Path, controller: str) -> Iterator[Path]:
+    """The folders of a controller's groups, from this process's own up to the top; controller "": of version 2."""
+    for line in _text(own).splitlines():
+        _, _, rest = line.partition(":")
+        names, _, path = rest.partition(":")
+        if controller not in names.split(","):
+            continue
+        tops = [mount / names, mount / controller] if controller else [mount, mount / "unified"]
+        for top in tops:
+            # A container may see its own group as the top, under the path that the host knows it by.
+            inner = Path(path.strip().lstrip("/"))
+            yield from (top / each for each in (inner, *inner.parents))
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text().strip()
+    except (OSError, ValueError):
+        return ""
+
+
+def _number(path: Path) -> float:
+    text = _text(path)
+    return float(text) if text.isdigit() else math.inf
+
+
+def _share(quota: str, period: str) -> float:
+    """Microseconds of time in each period; "max", -1 and what cannot be read are no limit."""
+    is_limit = quota.isdigit() and period.isdigit() and int(quota) > 0 and int(period) > 0
+    return int(quota) / int(period) if is_limit else math.inf
