@@ -318,6 +318,7 @@ READS_OR_TELLS = {
     "inpainting.background": "background_inpainter",
     "inpainting.protocol": "Inpainter",
     "inpainting.registry": "load_inpainter",
+    "runtime.allocator": "limit_arenas give_back_memory",
     "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes "
     "address_space_left",
     "runtime.kernel_cache": "KernelCache sources_hash",

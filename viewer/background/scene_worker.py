@@ -16,6 +16,7 @@ import numpy as np
 from iibr_core.color import stored_from_encoded
 from iibr_core.formats.files import is_folder
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
@@ -98,10 +99,13 @@ def results_of(
     report_progress: is told what it does until there is a scene. Raises InputError for a file that cannot be opened,
     Cancelled where should_stop says so while it is read.
     """
-    if is_folder(Path(request.source.path)):
-        yield from _results_of_folder(request, should_stop)
-    else:
-        yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
+    try:
+        if is_folder(Path(request.source.path)):
+            yield from _results_of_folder(request, should_stop)
+        else:
+            yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
+    finally:
+        give_back_memory()
 
 
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:

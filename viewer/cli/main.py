@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import InputError
 from viewer.cli.demo import demo
 from viewer.cli.evaluate import evaluate
@@ -39,6 +40,7 @@ app.add_typer(models, name="models")
 
 def main() -> None:
     """Run the command line. Bad input ends in one line on stderr and exit code 2, interruption in one and 130."""
+    limit_arenas()
     try:
         sys.exit(app(standalone_mode=False) or 0)
     except UsageError as error:
