@@ -19,6 +19,8 @@ SIDECAR_EXTENSIONS = (".pfm", ".exr", ".npy", ".png")
 def find_sidecar(photo_path: Path) -> Path | None:
     """The map beside a photo `name.*`: `name_disparity` before `name_depth`; each as .pfm, .exr, .npy, .png in turn."""
     photo_path = Path(photo_path)
+    if not photo_path.name:
+        return None
     for kind in SIDECAR_KINDS:
         for extension in SIDECAR_EXTENSIONS:
             candidate = photo_path.with_name(photo_path.stem + kind + extension)

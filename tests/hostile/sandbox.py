@@ -60,7 +60,6 @@ def _make_good(folder: Path, pixels: np.ndarray) -> None:
             for column in range(3):
                 writer.add(ViewUpdate(row, column, pixels, disparity))
     (folder / "link.png").symlink_to("photo.png")
-    (folder / "hard.png").hardlink_to(folder / "photo.png")
     (folder / "link-to-folder").symlink_to("folder", target_is_directory=True)
     (folder / "link-to-field").symlink_to("field", target_is_directory=True)
     (folder / "dangling-into-folder").symlink_to("folder/target.png")

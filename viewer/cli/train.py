@@ -25,7 +25,7 @@ EXIT_INTERRUPTED = 130
 
 
 def train(
-    steps: Annotated[int, typer.Option(min=1, help="Batches of rays to learn from.")],
+    steps: Annotated[int, typer.Option(min=1, max=10**9, help="Batches of rays to learn from.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="Weights to write (.safetensors).")],
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="The same seed gives the same weights.")] = 0,
     learning_rate: Annotated[float, typer.Option(max=1.0, help="Of the first step; it falls to 0 over all.")] = 1e-4,

@@ -19,6 +19,8 @@ from iibr_core.types import ImageSize, InputError, image_size
 HARMLESS_MESSAGE = "extraneous bytes"
 ROWS_AT_ONCE = 64
 """Of a file without tiles: a multiple of what most strips hold."""
+MOST_PNG_SIDE = 1_000_000
+"""As libpng has it."""
 PNG_START = b"\x89PNG\r\n\x1a\n"
 
 
@@ -164,15 +166,20 @@ def _open(path: Path) -> Any:
 
 
 def require_whole_png(path: Path) -> None:
-    """Raise InputError where a PNG lacks its end, found by walking its chunks.
+    """Raise InputError where a PNG lacks its end, found by walking its chunks, or claims an absurd size.
 
-    libpng reports a cut-off file on stderr, where it would spoil our one line, and a disk that is full not at all.
+    libpng reports such files on stderr, where it would spoil our one line, and a disk that is full not at all.
     """
     with open_binary(path) as file:
         end = path.stat().st_size
         start = file.read(len(PNG_START))
         if start != PNG_START[: len(start)]:
             return  # something else under that name: the decoders find out
+        header = file.read(16)
+        width, height = (int.from_bytes(header[at : at + 4], "big") for at in (8, 12))
+        if not (1 <= width <= MOST_PNG_SIDE and 1 <= height <= MOST_PNG_SIDE):
+            raise InputError(f"{path}: {width}x{height} pixels, a PNG has 1 to {MOST_PNG_SIDE:,} a side; save it anew")
+        file.seek(len(PNG_START))
         kind = b""
         while kind != b"IEND":
             header = file.read(8)
