@@ -50,8 +50,8 @@ _screenshot = [
     Case(f"screenshot {option} {value!r}", ("screenshot", "photo.png", "-o", "new.png", option, value), says=option)
     for option, values in (
         ("--view", ("", "1", "1,2,3", "a,b", "nan,0", "99,99", "-1e300,0")),
-        ("--focus", ("", "x", "nan", "1e300")),
-        ("--aperture", ("", "x", "nan", "-1", "1e300")),
+        ("--focus", ("", "x", "nan", "inf")),
+        ("--aperture", ("", "x", "nan", "-1")),
         ("--size", ("", "12", "0x5", "axb", "99999x1", f"{HUGE}x1")),
         ("--backend", ("", "vulkan")),
         ("--quality", ("", "best", "Exact")),
@@ -60,6 +60,13 @@ _screenshot = [
         ("--focus-disparity", ("", "inf")),
     )
     for value in values
+]
+
+_clamped = [
+    Case(
+        f"screenshot {option} {value}", ("screenshot", "photo.png", "-o", "new.png", option, value), 0, "", ("new.png",)
+    )
+    for option, value in (("--focus", "1e300"), ("--focus", "-1e300"), ("--aperture", "1e300"))
 ]
 
 _models = [
@@ -143,4 +150,4 @@ _others = [
     )
 ]
 
-OPTION_CASES = (*_values, *_screenshot, *_models, *_contradictions, *_ignored, *_others)
+OPTION_CASES = (*_values, *_screenshot, *_clamped, *_models, *_contradictions, *_ignored, *_others)

@@ -46,9 +46,7 @@ if TYPE_CHECKING:
     from iibr_core.depth.choice import DepthOrigin
     from viewer.model.actions import Action
     from viewer.model.state.app_state import Scene, Source
-
-TOLD_ROUNDED = 1e-3
-"""Limits are told with a few digits; who types one may be off by this share of the range."""
+    from viewer.model.state.optics import Optics
 
 
 class Backend(StrEnum):
@@ -75,20 +73,29 @@ class _LensOptions:
         return actions + ([] if self.aperture is None else [SetAperture(self.aperture)])
 
     def require_within(self, scene: Scene) -> None:
-        """Raise InputError for what this scene does not reach, rather than show the nearest that it does."""
-        from viewer.model.lens.limits import aperture_limit, eye_limits, focus_limits
+        """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.
+        Where there is a single view, it is what every viewpoint shows.
+        """
+        from viewer.model.lens.limits import eye_limits
 
-        asked: list[tuple[str, float | None, tuple[float, float]]] = [
-            ("--focus", self.focus, focus_limits(scene)),
-            ("--aperture", self.aperture, (0.0, aperture_limit(scene.grid))),
-        ]
-        if self.view is not None:
-            asked += [("--view, S", self.view.s, eye_limits(scene.grid.columns))]
-            asked += [("--view, T", self.view.t, eye_limits(scene.grid.rows))]
-        for option, value, (low, high) in asked:
-            slack = TOLD_ROUNDED * (high - low)
-            if value is not None and not low - slack <= value <= high + slack:
-                raise InputError(f"{option} {value:g}: for {scene.name} it goes from {low:g} to {high:g}")
+        if self.view is None or scene.grid == (1, 1):
+            return
+        for axis, value, views in (("S", self.view.s, scene.grid.columns), ("T", self.view.t, scene.grid.rows)):
+            low, high = eye_limits(views)
+            if not low <= value <= high:
+                raise InputError(f"--view: {axis} is {value:g}, for {scene.name} it goes from {low:g} to {high:g}")
+
+    def notes(self, optics: Optics) -> tuple[str, ...]:
+        """What was asked for beyond what the scene has, and what was taken instead."""
+        asked = (
+            ("--focus", self.focus, optics.focus_disparity),
+            ("--aperture", self.aperture, optics.aperture_diameter),
+        )
+        return tuple(
+            f"{option} {value:g} is beyond what the scene has: {taken:g} was taken."
+            for option, value, taken in asked
+            if value is not None and value != taken
+        )
 
 
 @dataclass(frozen=True)
@@ -160,8 +167,8 @@ def screenshot(
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     shot = _Shot(Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint), depth_strength, size)
-    require_existing(shot.source)
     require_heeded(context, path)
+    require_existing(shot.source)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
     require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)
@@ -210,4 +217,5 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
         output, pixels, None if ui else settings_of(viewer.state, ScreenSize(pixels.shape[1], pixels.shape[0]))
     )
     scene = viewer.state.scene
-    return (scene.notes, scene.depth_origin) if scene is not None else ((), None)
+    clamped = shot.lens.notes(viewer.state.optics)
+    return (scene.notes + clamped, scene.depth_origin) if scene is not None else ((), None)

@@ -59,8 +59,8 @@ def view(
     path = path.absolute() if path else demo_photo()
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     source = Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint)
-    require_existing(source)
     require_heeded(context, path)
+    require_existing(source)
     if ground_truth is not None and not is_folder(ground_truth):
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
     from viewer.app.main_loop import initial_state, run
