@@ -138,7 +138,7 @@ _generate = [
     Case("generate into an empty folder", (*WRITING["generate"], "folder"), code=0, makes=("folder",)),
     Case("generate by force", (*WRITING["generate"], "field", "--force"), code=0, makes=("field",)),
     Case("generate through a link", (*WRITING["generate"], "link-to-folder"), code=0, makes=("folder",)),
-    Case("generate a long name", (*WRITING["generate"], "n" * 250), code=0, makes=("n" * 250,)),
+    Case("generate under a long name that may be", (*WRITING["generate"], "n" * 250), code=0, makes=("n" * 250,)),
     Case("generate without a place", ("generate", "photo.png", "--grid", "3"), says="--out"),
     Case("generate without a grid", ("generate", "photo.png", "--out", "new"), says="--grid"),
 ]
@@ -163,7 +163,7 @@ _others = [
 
 _full = [
     Case(
-        f"{command} onto a disk without room",
+        f"{command} onto a disk with room for {room} bytes",
         (*WRITING[command], f"new{SUFFIX[command]}"),
         limits=(f"--fsize={room}",),
         # Or Python, which does not see that they are cut off, keeps bytes of modules that are no good to anybody.
