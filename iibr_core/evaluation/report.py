@@ -36,7 +36,7 @@ def write_report(folder: Path, results: Sequence[EvaluationResult], command: str
     make_folder(folder)
     for name, text in zip(FILES, texts):
         with atomic_write(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def json_of(results: Sequence[EvaluationResult], command: str) -> str:

@@ -38,6 +38,11 @@ def reason_of(failure: Exception | str) -> str:
     return type(failure).__name__ if isinstance(failure, Exception) else "no reason given"
 
 
+def shown_name(name: str) -> str:
+    """A file's name for people and for files of UTF-8: bytes in it that are no text become the sign for that."""
+    return os.fsencode(name).decode("utf-8", "replace")
+
+
 def status_of(path: Path) -> os.stat_result | None:
     """What is at `path`, links followed; None where nothing is, or nothing can be of such a name.
 

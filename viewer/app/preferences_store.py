@@ -54,11 +54,12 @@ def store_preferences(state: AppState, folder: Path) -> None:
     """Write preferences and recent files. Raises InputError where that cannot be."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        # absolute: the program may be started elsewhere the next time
+        recent = [os.path.abspath(path) for path in state.recent]
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror or error}); preferences are not kept") from error
     _write(folder / PREFERENCES_FILE, dataclasses.asdict(state.preferences))
-    # absolute: the program may be started elsewhere the next time
-    _write(folder / RECENT_FILE, [os.path.abspath(path) for path in state.recent])
+    _write(folder / RECENT_FILE, recent)
 
 
 def _write(path: Path, value: Any) -> None:
@@ -136,4 +137,5 @@ def _recent(kept: Any) -> tuple[str, ...]:
         return ()
     if not isinstance(kept, list) or not all(isinstance(path, str) and path for path in kept):
         raise InputError(f"{RECENT_FILE}: damaged (no list of paths)")
-    return tuple(dict.fromkeys(kept))[:RECENT_KEPT]
+    # JSON may hold halves of characters, which panels cannot show.
+    return tuple(dict.fromkeys(path.encode(errors="replace").decode() for path in kept))[:RECENT_KEPT]

@@ -93,10 +93,13 @@ class Window:
 
     def poll(self, wait_s: float) -> None:
         """Handle what has happened; with nothing to handle, sleep at most this long."""
-        if wait_s > 0:
-            glfw.wait_events_timeout(wait_s)
-        else:
-            glfw.poll_events()
+        try:
+            if wait_s > 0:
+                glfw.wait_events_timeout(wait_s)
+            else:
+                glfw.poll_events()
+        except UnicodeDecodeError as error:  # what was dropped has a name that is not UTF-8: it is told as not found
+            self._dropped.append(error.object.decode(errors="replace"))
 
     def on_drop(self, _: Any, paths: Any) -> None:
         """GLFW calls this when files are dropped."""

@@ -154,6 +154,17 @@ def inputs_with_sidecar(source: Source, *more: Path | None) -> tuple[Path, ...]:
     return (*inputs_of(source), *(path for path in (beside, *more) if path is not None))
 
 
+def require_utf8(*names: object) -> None:
+    """Raise InputError for names of files that panels cannot show. What is None counts as a name that they can."""
+    for name in map(str, names):
+        try:
+            name.encode()
+        except UnicodeEncodeError:
+            raise InputError(
+                f"{name}: its name is not UTF-8 here, and cannot be shown: rename it, or set LC_ALL=C.UTF-8"
+            ) from None
+
+
 def memory_from_text(text: str) -> int:
     """Bytes from "2G", "500M" or "1000000". Raises BadParameter."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)

@@ -36,6 +36,7 @@ from viewer.cli.options import (
     number_option,
     require_existing,
     require_heeded,
+    require_utf8,
     size_from_text,
     view_from_text,
 )
@@ -169,6 +170,8 @@ def screenshot(
     shot = _Shot(Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint), depth_strength, size)
     require_heeded(context, path)
     require_existing(shot.source)
+    if ui:
+        require_utf8(path, disparity, depth_model)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
     require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)

@@ -27,6 +27,7 @@ from viewer.cli.options import (
     depth_choice,
     require_existing,
     require_heeded,
+    require_utf8,
 )
 
 
@@ -56,6 +57,7 @@ def view(
     """
     from viewer.model.state.app_state import Source
 
+    require_utf8(path, disparity, depth_model, ground_truth)
     path = path.absolute() if path else demo_photo()
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     source = Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint)

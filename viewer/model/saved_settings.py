@@ -112,10 +112,11 @@ def settings_text_in(path: Path) -> str:
     import OpenImageIO as oiio
 
     from iibr_core.formats.files import require_file
+    from iibr_core.formats.images.oiio_names import oiio_name
     from iibr_core.formats.images.oiio_reader import complaint_of
 
     require_file(path)
-    source = oiio.ImageInput.open(str(path))
+    source = oiio.ImageInput.open(oiio_name(path))
     if source is None:
         raise InputError(f"{path}: is no picture ({' '.join(complaint_of(oiio).split())[:120] or 'no reason given'})")
     try:

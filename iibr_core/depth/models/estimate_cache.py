@@ -44,7 +44,7 @@ def key_of(pixels: FloatImage, model_folder: Path, options: str) -> str:
     digest.update(np.ascontiguousarray(pixels).data)
     for path in (model_folder / CONFIG, model_folder / PREPROCESSOR, *weight_files(model_folder)):
         with contextlib.suppress(OSError), path.open("rb") as file:
-            digest.update(path.name.encode())
+            digest.update(os.fsencode(path.name))
             digest.update(hashlib.file_digest(file, "blake2b").digest())
     return digest.hexdigest()
 

@@ -13,6 +13,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, refuse_bomb, require_file
+from iibr_core.formats.images.oiio_names import oiio_name
 from iibr_core.types import ImageSize, InputError, image_size
 
 # Some cameras pad their JPEGs; the decoder complains and loses nothing.
@@ -59,7 +60,7 @@ def read_size(path: Path) -> ImageSize:
 
 def read_orientation(path: Path) -> int:
     """Exif's Orientation, 1..8, from a picture file's header; 1 where it tells none or cannot be read."""
-    source = oiio.ImageInput.open(str(path))
+    source = oiio.ImageInput.open(oiio_name(path))
     if source is None:
         complaint_of(oiio)
         return 1
@@ -153,7 +154,7 @@ def _open(path: Path) -> Any:
         require_whole_png(path)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
-    source = oiio.ImageInput.open(str(path), hints)
+    source = oiio.ImageInput.open(oiio_name(path), hints)
     if source is None:
         raise InputError(f"{path}: cannot be read as a picture ({reason_of(complaint_of(oiio))})")
     spec = source.spec()

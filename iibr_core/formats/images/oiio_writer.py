@@ -12,6 +12,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import reason_of
+from iibr_core.formats.images.oiio_names import oiio_name
 from iibr_core.formats.images.oiio_reader import complaint_of, require_whole_png
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
@@ -35,9 +36,10 @@ def write_image_file(
     if channels:
         spec.channelnames = channels
     with atomic_write(path) as temporary:
-        target = oiio.ImageOutput.create(str(temporary))
+        name = oiio_name(temporary)
+        target = oiio.ImageOutput.create(name)
         # Writing to an output that did not open crashes OpenImageIO.
-        if target is None or not (target.open(str(temporary), spec) and target.write_image(values) and target.close()):
+        if target is None or not (target.open(name, spec) and target.write_image(values) and target.close()):
             reason = reason_of(complaint_of(oiio if target is None else target))
             raise InputError(f"{path}: cannot be written ({reason}); choose another place")
         if not _is_whole(temporary, spec.height):
@@ -52,7 +54,7 @@ def _is_whole(path: Path, height: int) -> bool:
         return False
     if path.suffix.lower() == ".png":
         return True
-    source = oiio.ImageInput.open(str(path))
+    source = oiio.ImageInput.open(oiio_name(path))
     last_row = source and source.read_scanline(height - 1, 0)
     complaint_of(source or oiio)  # or it is told on stderr
     return last_row is not None

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
-from iibr_core.formats.files import require_file
+from iibr_core.formats.files import require_file, shown_name
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
 from iibr_core.formats.images.heic import is_heic, read_heic
 from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute
@@ -60,7 +60,7 @@ def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float 
         focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
     else:
         focal_px *= math.sqrt(size.height * size.width / (stored_size.height * stored_size.width))
-    return Photo(pixels, focal_px, path.stem, bool(pixels.max() > 1), notes + _odd_notes(odd))
+    return Photo(pixels, focal_px, shown_name(path.stem), bool(pixels.max() > 1), notes + _odd_notes(odd))
 
 
 def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | int | float] | None = None) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import is_file, is_folder
+from iibr_core.formats.files import is_file, is_folder, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.light_fields.scene import MOST_VIEWS, KnownView, MultiView, pictures_in
 from iibr_core.formats.maps.npy import read_array
@@ -58,7 +58,7 @@ def read_llff(folder: Path) -> MultiView | None:
     )
     reach = (focal_px * step / float(depths[1]), focal_px * step / float(depths[0]))
     layout = f"LLFF, {len(views)} photos"
-    return MultiView(folder.resolve().name, layout, views, {}, reach, notes, central, focal_px=focal_px)
+    return MultiView(shown_name(folder.resolve().name), layout, views, {}, reach, notes, central, focal_px=focal_px)
 
 
 def _read_poses(path: Path, pictures: int) -> tuple[Doubles, Doubles, Doubles, Doubles]:

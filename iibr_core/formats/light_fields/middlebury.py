@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from iibr_core.formats.files import is_file
+from iibr_core.formats.files import is_file, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.light_fields.scene import (
     KnownDisparity,
@@ -46,7 +46,7 @@ def read_middlebury(folder: Path) -> MultiView | None:
     numbers = sorted(number for _, number in named)
     views = tuple(KnownView(f"{kind}{n}", ViewOffset(0.0, float(n)), named[kind, n]) for n in numbers)
     known = {numbers.index(n): disparity for n, disparity in maps.items() if n in numbers}
-    return on_grid(MultiView(folder.resolve().name, layout, views, known), [(0, n) for n in numbers])
+    return on_grid(MultiView(shown_name(folder.resolve().name), layout, views, known), [(0, n) for n in numbers])
 
 
 def _float_maps(folder: Path) -> dict[int, KnownDisparity]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import is_folder
+from iibr_core.formats.files import is_folder, shown_name
 from iibr_core.formats.light_fields.scene import KnownView, MultiView, on_grid, pictures_in
 from iibr_core.types import InputError, ViewOffset
 
@@ -40,7 +40,7 @@ def read_stanford(folder: Path) -> MultiView | None:
         for (path, _), (row, column), (t, s) in zip(named, index, offsets)
     )
     shape = f"{len(np.unique(index[:, 1]))}x{len(np.unique(index[:, 0]))}"
-    scene = MultiView(folder.resolve().name, f"Stanford archive, {shape}", views, notes=notes)
+    scene = MultiView(shown_name(folder.resolve().name), f"Stanford archive, {shape}", views, notes=notes)
     return on_grid(scene, [(-int(row), int(column)) for row, column in index])
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from iibr_core.formats.files import entries_of, is_folder
+from iibr_core.formats.files import entries_of, is_folder, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_focal_px, stated_range_px
 from iibr_core.formats.light_fields.scene import (
@@ -80,7 +80,7 @@ def grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridIn
     maps = {places.index(at): known for at, known in _maps(folder, grid).items()}
     parameters = read_parameters(folder)
     return MultiView(
-        folder.resolve().name,
+        shown_name(folder.resolve().name),
         layout,
         views,
         maps,
