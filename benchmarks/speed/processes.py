@@ -54,7 +54,7 @@ def first_picture_target(scene: BenchScene) -> SpeedTarget:
         words = ["screenshot", str(photo), "--grid", "1", "-o", str(Path(folder) / "picture.png")]
         for _ in range(FIRST_PICTURES):
             start = time.perf_counter()
-            subprocess.run([sys.executable, "-m", "viewer", *words], check=True, capture_output=True)
+            subprocess.run([sys.executable, "-P", "-m", "viewer", *words], check=True, capture_output=True)
             seconds.append(time.perf_counter() - start)
     said = f"{min(seconds):.2f} s, the least of {len(seconds)}"
     what = "photo and disparity: process start to first picture"

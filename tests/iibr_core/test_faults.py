@@ -107,7 +107,7 @@ def generating(folder, *options):
     write_image(folder / "photo.png", NOISE)
     words = ["generate", "photo.png", "--grid", "31", "--out", "field", "--depth", "flat", *options]
     process = subprocess.Popen(
-        [sys.executable, "-m", "viewer", *words],
+        [sys.executable, "-P", "-m", "viewer", *words],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": os.getcwd()},
         stderr=subprocess.PIPE,

@@ -219,6 +219,7 @@ def test_a_refused_gl_context_is_one_line(tmp_path: Path) -> None:
     photo = write_scene(tmp_path)
     command = [
         sys.executable,
+        "-P",
         "-m",
         "viewer",
         "screenshot",

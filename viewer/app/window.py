@@ -155,5 +155,13 @@ def _open(title: str, place: tuple[int, int, int, int] | None) -> Any:
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
     glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
     glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
-    size = place[2:] if place is not None else WINDOW_SIZE
-    return glfw.create_window(*size, title, None, None)
+    return glfw.create_window(*_size_within_screens(place), title, None, None)
+
+
+def _size_within_screens(place: tuple[int, int, int, int] | None) -> tuple[int, int]:
+    """No larger than the largest screen: a window of absurd size takes all memory, or is refused."""
+    if place is None:
+        return WINDOW_SIZE
+    areas = [glfw.get_monitor_workarea(monitor) for monitor in glfw.get_monitors()] or [(0, 0, *WINDOW_SIZE)]
+    widest, highest = (max(area[side] for area in areas) for side in (2, 3))
+    return min(place[2], max(widest, WINDOW_SIZE[0])), min(place[3], max(highest, WINDOW_SIZE[1]))

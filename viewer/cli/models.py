@@ -61,7 +61,8 @@ def get(
         print("Nothing was downloaded.", file=sys.stderr)
         raise typer.Exit(EXIT_DECLINED)
     folder = fetch(model)
-    print(f"{folder} ({bytes_of(folder) / 1e6:,.0f} MB). Use it: iibr view PHOTO --depth-model {model.name}")
+    print(f"{folder} ({bytes_of(folder) / 1e6:,.0f} MB, commit {folder.name})")
+    print(f"Use it: iibr view PHOTO --depth-model {model.name}")
     if not is_installed(model.package):
         print(f"It also needs the package {model.package}: {model.install}")
 

@@ -5,14 +5,18 @@ Only safetensors files are ever fetched or read: pickled weights run code.
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
+import json
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.files import is_file, is_folder
+from iibr_core.formats.files import is_file, is_folder, reason_of
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 
 TRANSFORMERS = "transformers"
@@ -22,7 +26,8 @@ INSTALL_HINT = "pip install 'iibr[depth]'"
 @dataclass(frozen=True)
 class KnownModel:
     """A published model. repository: on the Hugging Face hub. megabytes: of its weights, about. package: that runs it,
-    as Python imports it; install: how to get that.
+    as Python imports it; install: how to get that. revision: the full commit that is downloaded; without one, the
+    newest, which is written down (LOCK).
     """
 
     name: str
@@ -32,7 +37,11 @@ class KnownModel:
     licence: str
     package: str = TRANSFORMERS
     install: str = INSTALL_HINT
+    revision: str | None = None
 
+
+LOCK = "iibr-lock.json"
+"""Beside a downloaded model: its commit, and the SHA-256 of each of its files."""
 
 USUAL_MODEL = "depth-anything-v2-small"
 
@@ -164,7 +173,9 @@ def cached_folder(model: KnownModel) -> Path | None:
         return None
     from huggingface_hub import try_to_load_from_cache
 
-    found = try_to_load_from_cache(model.repository, "config.json")
+    locks = sorted(repository.glob(f"snapshots/*/{LOCK}"), key=lambda lock: lock.stat().st_mtime_ns)
+    revision = model.revision or (locks[-1].parent.name if locks else None)
+    found = try_to_load_from_cache(model.repository, "config.json", revision=revision)
     folder = Path(found).parent if isinstance(found, str) else None
     return folder if folder is not None and any(weight_files(folder)) else None
 
@@ -180,22 +191,27 @@ def bytes_of(folder: Path) -> int:
 
 
 def fetch(model: KnownModel) -> Path:
-    """Download a model into the local Hugging Face cache, its bars on stderr. Returns its folder.
+    """Download a model into the local Hugging Face cache, its bars on stderr: one commit, written down with what came.
+    Returns its folder, named by the commit.
 
     Raises InputError where that fails: no network, no right to it, no safetensors.
     """
     if not is_installed("huggingface_hub"):
         raise InputError(f"downloading needs the package huggingface_hub: {INSTALL_HINT}")
-    from huggingface_hub import snapshot_download
-    from huggingface_hub.errors import GatedRepoError, HfHubHTTPError
+    from huggingface_hub import model_info, snapshot_download
+    from huggingface_hub.errors import GatedRepoError
 
     try:
-        folder = Path(snapshot_download(model.repository, allow_patterns=["*.json", "*.safetensors"]))
+        commit = model.revision or model_info(model.repository).sha
+        if not _is_commit(commit):
+            raise ValueError(f"{commit} is no commit")
+        patterns = ["*.json", "*.safetensors"]
+        folder = Path(snapshot_download(model.repository, revision=commit, allow_patterns=patterns))
     except GatedRepoError as error:
         raise InputError(
             f"{model.repository}: its owner asks you to accept a licence on huggingface.co first"
         ) from error
-    except (OSError, HfHubHTTPError, ValueError) as error:
+    except Exception as error:  # whatever the library's ways to the network raise: they change with its versions
         reason = str(error).strip().partition("\n")[0].removeprefix("Got: ")[:120] or type(error).__name__
         raise InputError(
             f"{model.name} cannot be downloaded ({reason}); check the network, or copy the folder of "
@@ -203,7 +219,41 @@ def fetch(model: KnownModel) -> Path:
         ) from error
     if not any(weight_files(folder)):
         raise InputError(f"{model.repository} publishes no safetensors weights; pickled ones are not taken")
+    _write_lock(folder)
     return folder
+
+
+def require_unchanged(folder: Path) -> None:
+    """Raise InputError where a file of a downloaded model is not what came. Models from elsewhere have no lock."""
+    if not (folder / LOCK).is_file():
+        return
+    try:
+        locked = json.loads((folder / LOCK).read_text("utf-8"))["sha256"]
+        changed = sorted(locked.items() ^ _digests(folder).items())
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(f"{folder / LOCK}: damaged ({reason_of(error)}); delete {folder} and get it again") from error
+    if changed:
+        raise InputError(f"{folder}: {changed[0][0]} changed since it was downloaded; delete {folder} and get it again")
+
+
+def _is_commit(text: str | None) -> bool:
+    return re.fullmatch("[0-9a-f]{40}", text or "") is not None
+
+
+def _write_lock(folder: Path) -> None:
+    lock = {"commit": folder.name, "sha256": _digests(folder)}
+    with atomic_write(folder / LOCK) as temporary:
+        temporary.write_text(json.dumps(lock, indent=1) + "\n", "utf-8")
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """SHA-256 by name of all that is read of a model: weights and JSON, in folders of its own too."""
+    digests = {}
+    for path in (path for ending in ("json", "safetensors") for path in folder.rglob(f"*.{ending}")):
+        if path.name != LOCK:
+            with path.open("rb") as file:
+                digests[path.relative_to(folder).as_posix()] = hashlib.file_digest(file, "sha256").hexdigest()
+    return digests
 
 
 def _model_in(folder: Path) -> LocalModel:

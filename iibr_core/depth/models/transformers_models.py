@@ -16,7 +16,7 @@ from safetensors import SafetensorError
 
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
-from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
+from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, require_unchanged, weight_files
 from iibr_core.depth.models.config import Preparation, read_config, read_preparation
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.maps.resample import resample_surfaces
@@ -65,6 +65,7 @@ def estimate_with(
     be used or its result is of no use, Cancelled where should_stop says so.
     """
     _require_weights(model.folder)
+    require_unchanged(model.folder)
     report_progress(0, 0, f"looking for what {model.title} said before")
     network_input = None
     if model.package == TRANSFORMERS:

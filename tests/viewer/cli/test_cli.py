@@ -35,7 +35,7 @@ def run_apart(
     environment = {"PYTHONPATH": str(ROOT), **environment}
     clean = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     flag = "-m" if code_or_module == "viewer" else "-c"
-    command = [sys.executable, flag, code_or_module, *map(str, words)]
+    command = [sys.executable, "-P", flag, code_or_module, *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env={**clean, **environment}, timeout=120)
 
 

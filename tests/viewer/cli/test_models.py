@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
 
-from iibr_core.depth.models.catalog import KNOWN_MODELS
-from iibr_core.types import GridShape
+from iibr_core.depth.models.catalog import KNOWN_MODELS, LOCK, require_unchanged
+from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import write_scene
 from viewer.background.jobs import ProgressReport
 from viewer.background.scene_worker import SceneReady, SceneRequest, SceneWorker, results_of
@@ -21,11 +26,13 @@ from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.optics import CENTRE
 
 
-def run_models(home: Path, *words: str, typed: str = "") -> subprocess.CompletedProcess[str]:
-    """In a process of its own: the hub library reads its address once. Nobody listens at this one."""
-    environment = {**os.environ, "HF_ENDPOINT": "http://127.0.0.1:9", "HF_HOME": str(home)}
+def run_models(
+    home: Path, *words: str, typed: str = "", endpoint: str = "http://127.0.0.1:9"
+) -> subprocess.CompletedProcess[str]:
+    """In a process of its own: the hub library reads its address once. Nobody listens at the usual one."""
+    environment = {**os.environ, "HF_ENDPOINT": endpoint, "HF_HOME": str(home)}
     return subprocess.run(
-        [sys.executable, "-m", "viewer", "models", *words],
+        [sys.executable, "-P", "-m", "viewer", "models", *words],
         env=environment,
         input=typed,
         capture_output=True,
@@ -63,6 +70,81 @@ def test_nothing_is_fetched_unless_the_user_says_yes(tmp_path: Path, typed: str)
     assert done.returncode == 1
     assert "Nothing was downloaded" in done.stderr
     assert "cannot be downloaded" not in done.stderr
+
+
+def test_where_nobody_answers_get_names_the_option(tmp_path: Path) -> None:
+    done = run_models(tmp_path, "get", "depth-pro")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "--yes" in line
+
+
+COMMIT = "0123456789abcdef" * 2 + "01234567"
+PUBLISHED = {
+    "config.json": b'{"model_type": "dpt"}',
+    "model.safetensors": bytes(100),
+    "pytorch_model.bin": b"runs code",
+}
+
+
+class Hub(BaseHTTPRequestHandler):
+    """As much of the hub as a download asks for."""
+
+    def do_HEAD(self) -> None:
+        self.do_GET()
+
+    def do_GET(self) -> None:
+        path = self.path.partition("?")[0]
+        name = path.rpartition("/")[2]
+        files = [{"type": "file", "path": name, "size": len(data), "oid": name} for name, data in PUBLISHED.items()]
+        about = {"id": "a/b", "sha": COMMIT, "siblings": [{"rfilename": name} for name in PUBLISHED]}
+        if not path.startswith("/api/"):
+            body = PUBLISHED[name]
+        else:
+            body = json.dumps(files if "/tree/" in path else about).encode()
+        self.send_response(200)
+        for header in (("ETag", f'"{name}"'), ("X-Repo-Commit", COMMIT), ("Content-Length", str(len(body)))):
+            self.send_header(*header)
+        self.end_headers()
+        if self.command == "GET":
+            self.wfile.write(body)
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture
+def hub() -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Hub) as server:
+        threading.Thread(target=server.serve_forever).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+
+
+def test_a_download_is_one_commit_without_pickles_and_is_known_again(tmp_path: Path, hub: str) -> None:
+    done = run_models(tmp_path, "get", "depth-pro", "--yes", endpoint=hub)
+    assert done.returncode == 0, done.stderr
+    assert COMMIT in done.stdout
+    folder = next(path for path in tmp_path.rglob(COMMIT) if path.parent.name == "snapshots")
+    assert {path.name for path in folder.iterdir()} == {"config.json", "model.safetensors", LOCK}
+    assert json.loads((folder / LOCK).read_text())["commit"] == COMMIT
+    require_unchanged(folder)
+    (known,) = (line for line in run_models(tmp_path).stdout.splitlines() if line.startswith("depth-pro"))
+    assert "not here" not in known
+    (folder / "model.safetensors").resolve().write_bytes(bytes(99) + b"x")
+    with pytest.raises(InputError, match=r"model\.safetensors changed since it was downloaded"):
+        require_unchanged(folder)
+
+
+def test_models_are_pinned_to_whole_commits() -> None:
+    assert all(model.revision is None or re.fullmatch("[0-9a-f]{40}", model.revision) for model in KNOWN_MODELS)
+
+
+@pytest.mark.parametrize("text", ["", "[", "[]", "{}", '{"sha256": 3}', '{"sha256": []}', "\xff"])
+def test_a_damaged_lock_is_one_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / LOCK).write_text(text, "latin-1")
+    with pytest.raises(InputError, match=LOCK):
+        require_unchanged(tmp_path)
 
 
 def test_an_unknown_model_is_one_line_with_those_known(tmp_path: Path) -> None:
@@ -108,8 +190,6 @@ def test_the_scene_tells_where_its_depth_came_from(tmp_path: Path) -> None:
 
 
 def test_the_worker_tells_what_it_is_busy_with_before_the_scene(tmp_path: Path) -> None:
-    import threading
-
     woken = threading.Semaphore(0)
     worker = SceneWorker(woken.release)
     worker.submit(SceneRequest(1, Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))))
