@@ -93,10 +93,11 @@ def _interrupt_again(lost: Any) -> None:
     if not isinstance(lost.exc_value, KeyboardInterrupt):
         sys.__unraisablehook__(lost)
         return
-    from _thread import interrupt_main
+    from signal import SIGINT
     from threading import Timer
 
-    again = Timer(INTERRUPT_AGAIN_S, interrupt_main)
+    # The system's own signal: it ends whatever the main thread waits for by then.
+    again = Timer(INTERRUPT_AGAIN_S, os.kill, (os.getpid(), SIGINT))
     again.daemon = True
     again.start()
 

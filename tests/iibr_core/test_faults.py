@@ -120,7 +120,7 @@ def generating(folder, *options):
     return process
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_process_asked_to_end_leaves_nothing(tmp_path, number):
     process = generating(tmp_path)
     process.send_signal(number)

@@ -283,13 +283,14 @@ READS_OR_TELLS = {
     "depth.models.estimate_cache": "cache_folder key_of load",
     "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
     "depth.models.config": "read_config package_for read_preparation",
-    "depth.models.catalog": "known_model model_to_use is_installed cached_folder weight_files bytes_of fetch",
+    "depth.models.catalog": "known_model model_to_use is_installed cached_folder weight_files bytes_of fetch "
+    "require_unchanged",
     "depth.models.package_models": "run_package",
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
-    "formats.files": "reason_of status_of is_file is_folder entries_of require_file open_binary refuse_bomb",
+    "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
     "atomic_write UnfinishedFolder remove_leftovers",
     "formats.light_fields.numbered_grid": "read_numbered_grid",
@@ -307,6 +308,7 @@ READS_OR_TELLS = {
     "formats.maps.pfm": "read_pfm",
     "formats.maps.reader": "read_map",
     "formats.images.oiio_writer": "write_image_file",
+    "formats.images.oiio_names": "oiio_name",
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
     "complaint_of",
     "formats.light_fields.stanford": "read_stanford",

@@ -96,6 +96,11 @@ def test_a_file_written_before_is_read_without_a_word(tmp_path: Path) -> None:
     assert state.notices == ()
 
 
+def test_halves_of_characters_in_recent_paths_are_replaced(tmp_path: Path) -> None:
+    (tmp_path / RECENT_FILE).write_text(r'["/a\udcff.png", "/b.png"]')
+    assert load_preferences(AppState(), tmp_path).recent == ("/a?.png", "/b.png")
+
+
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="file") as error:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
+from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model.state.app_state import Source
 from viewer.model.state.optics import Optics
@@ -173,3 +176,21 @@ def test_a_missing_file_leaves_an_empty_window_with_a_notice(open_window: Opener
     driver.until(lambda app: bool(app.state.notices))
     assert "gone.png" in driver.app.state.notices[0].text
     assert driver.app.state.source == Source(str(tmp_path / "gone.png"))
+
+
+@pytest.mark.parametrize("kept", [[0, 0, 40_000, 40_000], [-90_000, 90_000, 100_000, 200], [0, 0, 1e308, float("nan")]])
+def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(
+    open_window: Callable[..., Driver], tmp_path: Path, kept: list[float]
+) -> None:
+    (tmp_path / PREFERENCES_FILE).write_text(json.dumps({"window": kept}))
+    window = open_window(None, kept_in=tmp_path).app.window
+    _, _, width, height = glfw.get_monitor_workarea(glfw.get_primary_monitor())
+    assert 200 <= window.size.width <= width
+    assert 150 <= window.size.height <= height
+
+
+def test_a_dropped_name_that_is_no_text_is_told_as_not_found(viewer: Driver) -> None:
+    """As GLFW hands it over; its wrapper raises in the midst of the loop."""
+    ((_, callback),) = glfw._window_drop_callback_repository.values()
+    callback(viewer.app.window.handle, 1, (ctypes.c_char_p * 1)(b"/gone/\xff.png"))
+    viewer.until(lambda app: any("no such file" in notice.text for notice in app.state.notices))
