@@ -170,7 +170,7 @@ _full = [
         environment={"PYTHONDONTWRITEBYTECODE": "1"},
     )
     for command in ("screenshot", "generate")
-    for room in (0, 500)
+    for room in (200, 500)
 ]
 
 OUTPUT_CASES = (*_places, *_missing_folders, *_screenshot, *_generate, *_others, *_full)
