@@ -31,6 +31,8 @@ WORKING_BYTES = 18
 """Of one pixel of a view in the making: float colours, disparity, flags."""
 CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
 """Of one pixel of the band of rows in the making: its candidates and weights; hypotheses and features if ambiguous."""
+NUMBER_BYTES, HOLE_BYTES = 4, 148
+"""Of one pixel of a view while its holes are filled; of one in a hole, more: what surrounds it in all directions."""
 
 
 class Workload(NamedTuple):
@@ -83,7 +85,7 @@ NO_COST = CostEstimates(*3 * [CostEstimate(0.0, 0)])
 class ParallaxStatistics:
     """How content moves in the outermost view, px. step (H, W): the largest difference between neighbours near each
     pixel. change (H, W): from least to most around it. softness: see `DisparityStatistics`. most_px: of all content.
-    frame_px: of what lies at the frame.
+    frame_px: of what lies at the frame. hole_share: of the pixels, those it shows and the photo hides, at most.
     """
 
     step: FloatImage
@@ -91,6 +93,7 @@ class ParallaxStatistics:
     softness: float
     most_px: float
     frame_px: float
+    hole_share: float
 
     @property
     def edge_share(self) -> float:
@@ -134,7 +137,20 @@ def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatist
         around.softness,
         float(np.abs(moved).max()),
         float(np.abs(frame).max()),
+        _hole_share(moved),
     )
+
+
+def _hole_share(moved: FloatImage) -> float:
+    """At most that share of a view is hidden in the photo, content moving by so much (H, W) both ways."""
+    share = 0.0
+    for axis in (0, 1):
+        steps = np.abs(np.diff(moved, axis=axis))
+        # What one edge discloses its opposite hides: half of the steps count.
+        share += 0.5 * float(steps.sum(where=steps > STILL_PX, dtype=np.float64)) / moved.size
+        ends = moved.take([0, -1], axis)
+        share += float(np.abs(ends).max()) / moved.shape[axis]
+    return min(share, 1.0)
 
 
 def largest_offset(grid: GridShape) -> float:
@@ -185,4 +201,5 @@ def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Qualit
     asked = {"fast": 0.0, "balanced": statistics.ambiguous_share(1.0), "exact": 1.0}[quality]
     ray = RAY_BYTES + (STATISTICS_BYTES if quality != "fast" else 0)
     in_flight = pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + asked * AMBIGUOUS_BYTES)
-    return round(pixels * ray * (2 + _inpainted_views(statistics, grid)) + CORES * in_flight)
+    filling = pixels * (NUMBER_BYTES + statistics.hole_share * HOLE_BYTES) if statistics.has_disocclusion else 0.0
+    return round(pixels * ray * (2 + _inpainted_views(statistics, grid)) + CORES * in_flight + filling)

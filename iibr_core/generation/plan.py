@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
-import psutil
 
 from iibr_core.generation.cost_model import (
     NO_COST,
@@ -17,14 +16,23 @@ from iibr_core.generation.cost_model import (
     largest_offset,
     measure_parallax,
 )
-from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, Disparity, GridShape, InputError, Photo
+from iibr_core.generation.memory_model import (
+    LEAST_PIXELS,
+    Budget,
+    budget_of,
+    largest_side,
+    mebibytes,
+    process_bytes,
+    view_bytes,
+    whole_bytes,
+)
+from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, Disparity, GridShape, InputError, Photo, Quality
 
 STEP_PX = 4.0
 """For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity."""
 MOST_VIEWS_A_SIDE = 9
 ROBUST_PERCENTILES = (1.0, 99.0)
 """A few wild disparities must not set the baseline."""
-DISPARITY_BYTES = 4
 
 
 @dataclass(frozen=True)
@@ -32,13 +40,14 @@ class PlanOverrides:
     """What the user decided; None leaves the choice to the plan.
 
     depth_strength multiplies the parallax the plan chose; focus_disparity (px per view step, as given) is the plane
-    that stays still.
+    that stays still. memory_bytes: what the whole process may take. quality: that memory is counted for.
     """
 
     grid: GridShape | None = None
     depth_strength: float = 1.0
     focus_disparity: float | None = None
     memory_bytes: int | None = None
+    quality: Quality = DEFAULT_QUALITY
 
 
 @dataclass(frozen=True)
@@ -77,7 +86,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
     wanted = overrides or PlanOverrides()
     if not np.isfinite(wanted.depth_strength):
         raise InputError(f"--depth-strength {wanted.depth_strength}: give a finite number")
-    budget = _memory_budget(wanted.memory_bytes)
+    budget = budget_of(wanted.memory_bytes)
     low, high = (float(p) for p in np.percentile(disparity.values, ROBUST_PERCENTILES))
     zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
     width = photo.size.width
@@ -91,7 +100,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
     else:
         most_moved = 0.5 * parallax_px / (high - low) if parallax_px else 0.0
         statistics = measure_parallax(disparity.values - np.float32(zero), most_moved)
-        grid = _grid_for(parallax_px, statistics, _view_bytes(photo), budget)
+        grid = _grid_for(parallax_px, statistics, photo, budget, wanted.quality)
         reasons.append(_grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
     scale = parallax_px / steps / (high - low) * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
@@ -99,37 +108,55 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
         reasons.append(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
-    return _complete_plan(photo, disparity, grid, float(scale), zero, budget, reasons)
+    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons)
+    _require_room(plan, photo, budget, wanted.quality, keeps_views=True)
+    return plan
 
 
-def plan_literal(photo: Photo, disparity: Disparity, grid: GridShape, memory_bytes: int | None = None) -> ScenePlan:
+def plan_literal(
+    photo: Photo,
+    disparity: Disparity,
+    grid: GridShape,
+    memory_bytes: int | None = None,
+    quality: Quality = DEFAULT_QUALITY,
+) -> ScenePlan:
     """Plan for `iibr generate --grid`: the given disparity is taken as it is, views at integer steps.
 
-    Raises InputError if the grid has no view or generating it does not fit into memory.
+    Raises InputError if the grid has no view or generating it in this quality, each view written and forgotten, does
+    not fit into memory.
     """
     reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
-    return _complete_plan(photo, disparity, grid, 1.0, 0.0, _memory_budget(memory_bytes), reasons)
+    budget = budget_of(memory_bytes)
+    plan = _complete_plan(photo, disparity, grid, 1.0, 0.0, reasons)
+    _require_room(plan, photo, budget, quality, keeps_views=False)
+    return plan
 
 
-def _memory_budget(memory_bytes: int | None) -> int:
-    budget = psutil.virtual_memory().total // 4 if memory_bytes is None else memory_bytes
-    if budget <= 0:
-        raise InputError(f"--memory {memory_bytes}: give a positive number of bytes")
-    return budget
+def _require_room(plan: ScenePlan, photo: Photo, budget: Budget, quality: Quality, keeps_views: bool) -> None:
+    """Raise InputError where the whole does not fit, telling what would."""
+    pixels, making = photo.size.height * photo.size.width, plan.costs.of(quality).peak_bytes
+    needed = whole_bytes(pixels, plan.field_bytes, making, keeps_views)
+    what = f"{plan.grid.columns} x {plan.grid.rows} views of {photo.name} ({photo.size})"
+    side = largest_side(budget, needed - plan.field_bytes, view_bytes(pixels, photo.is_hdr)) if keeps_views else 0
+    fits = f"at most --grid {side}, or " if side > 1 else ""
+    # Nearly all of it grows with the pixels.
+    process = process_bytes(keeps_views)
+    fitting = max(int(0.95 * pixels * (budget.bytes - process) / (needed - process)), 0)
+    lower = f"lower --max-pixels to {fitting}" if fitting > LEAST_PIXELS else "lower --max-pixels"
+    budget.require(needed, what, f"{fits}raise --memory or {lower}")
 
 
-def _view_bytes(photo: Photo) -> int:
-    height, width = photo.size
-    return height * width * (3 * (2 if photo.is_hdr else 1) + DISPARITY_BYTES)
-
-
-def _grid_for(parallax_px: float, statistics: ParallaxStatistics, view_bytes: int, budget: int) -> GridShape:
+def _grid_for(
+    parallax_px: float, statistics: ParallaxStatistics, photo: Photo, budget: Budget, quality: Quality
+) -> GridShape:
     """The smallest odd grid whose neighbouring views differ by at most STEP_PX, as far as memory allows."""
     if parallax_px < STILL_PX:
         return GridShape(1, 1)
     side = min(max(ceil(parallax_px / STEP_PX) // 2 * 2 + 1, 3), MOST_VIEWS_A_SIDE)
-    beside = estimate_costs(statistics, GridShape(side, side)).of(DEFAULT_QUALITY).peak_bytes
-    while side > 3 and side * side * view_bytes > budget - beside:
+    making = estimate_costs(statistics, GridShape(side, side)).of(quality).peak_bytes
+    pixels = photo.size.height * photo.size.width
+    each_view = view_bytes(pixels, photo.is_hdr)
+    while side > 3 and whole_bytes(pixels, side * side * each_view, making, keeps_views=True) > budget.bytes:
         side -= 2
     return GridShape(side, side)
 
@@ -142,7 +169,7 @@ def _grid_reason(grid: GridShape, parallax_px: float) -> str:
 
 
 def _complete_plan(
-    photo: Photo, disparity: Disparity, grid: GridShape, scale: float, zero: float, budget: int, reasons: list[str]
+    photo: Photo, disparity: Disparity, grid: GridShape, scale: float, zero: float, reasons: list[str]
 ) -> ScenePlan:
     """The plan with what follows from grid and scale."""
     if grid.rows < 1 or grid.columns < 1:
@@ -150,12 +177,8 @@ def _complete_plan(
     field = (disparity.values - np.float32(zero)) * np.float32(scale)
     statistics = measure_parallax(field, largest_offset(grid))
     costs = estimate_costs(statistics, grid)
-    field_bytes, peak_bytes = grid.rows * grid.columns * _view_bytes(photo), costs.of(DEFAULT_QUALITY).peak_bytes
-    if peak_bytes > budget:
-        raise InputError(
-            f"generating from {photo.name} takes {peak_bytes / 2**20:.0f} MiB, the budget is {budget / 2**20:.0f} MiB:"
-            " raise --memory or lower --max-pixels"
-        )
+    pixels, peak_bytes = photo.size.height * photo.size.width, costs.of(DEFAULT_QUALITY).peak_bytes
+    field_bytes = grid.rows * grid.columns * view_bytes(pixels, photo.is_hdr)
     return ScenePlan(
         grid,
         scale,
@@ -165,23 +188,24 @@ def _complete_plan(
         statistics.has_disocclusion,
         field_bytes,
         peak_bytes,
-        (*reasons, *_cost_reasons(statistics, costs, field_bytes)),
+        (*reasons, *_cost_reasons(statistics, costs, field_bytes, whole_bytes(pixels, field_bytes, peak_bytes, True))),
         costs,
     )
 
 
-def _cost_reasons(statistics: ParallaxStatistics, costs: CostEstimates, field_bytes: int) -> list[str]:
+def _cost_reasons(statistics: ParallaxStatistics, costs: CostEstimates, field_bytes: int, in_all: int) -> list[str]:
     inpainted = (
         "holes behind them are inpainted."
         if statistics.has_disocclusion
         else "nothing is disoccluded, so nothing is inpainted."
     )
-    memory = f"{field_bytes / 2**20:.0f} MiB for the views, {costs.of(DEFAULT_QUALITY).peak_bytes / 2**20:.0f} MiB"
+    making = costs.of(DEFAULT_QUALITY).peak_bytes
     return [
         f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}",
         f"Making all views takes about {_seconds(costs.fast.seconds)} in fast, {_seconds(costs.balanced.seconds)} in"
         f" balanced and {_seconds(costs.exact.seconds)} in exact quality.",
-        f"Memory: {memory} to make them.",
+        f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(making)} to make them,"
+        f" {mebibytes(in_all)} in all.",
     ]
 
 

@@ -12,7 +12,11 @@ import psutil
 
 CGROUPS, OWN_CGROUPS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 USUAL_SHARE = 4
-"""This part of the memory is taken where the user says nothing."""
+"""This part of the memory is taken where the user says nothing, ..."""
+LEAST_USUAL_BYTES, MOST_USUAL_SHARE = 3 * 2**29, 0.8
+"""... but so much on small machines, as far as they have it."""
+MAPPED_BYTES = 600 * 2**20
+"""Of address space: libraries, stacks and heaps map it and never fill it."""
 
 
 def core_count() -> int:
@@ -28,7 +32,8 @@ def memory_bytes() -> int:
 
 def usual_budget_bytes() -> int:
     """What this program takes at most where the user says nothing."""
-    return memory_bytes() // USUAL_SHARE
+    whole = memory_bytes()
+    return max(whole // USUAL_SHARE, min(LEAST_USUAL_BYTES, int(MOST_USUAL_SHARE * whole)))
 
 
 def cgroup_memory_bytes(mount: Path = CGROUPS, own: Path = OWN_CGROUPS) -> float:
@@ -50,23 +55,16 @@ def cgroup_cores(mount: Path = CGROUPS, own: Path = OWN_CGROUPS) -> float:
 
 
 def own_limit_bytes() -> float:
-    """The smallest of the limits on this process's memory (`ulimit -v`, `ulimit -d`), infinite without."""
+    """What the limits on this process (`ulimit -v`, `ulimit -d`) let it fill, infinite without.
+
+    Not above 0 where they are smaller than what is mapped and never filled.
+    """
     if sys.platform == "win32":
         return math.inf
     import resource
 
-    softs = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
-    return min((soft for soft in softs if soft != resource.RLIM_INFINITY), default=math.inf)
-
-
-def address_space_left() -> float:
-    """Bytes of address space that this process may still map, infinite without a limit (`ulimit -v`)."""
-    if sys.platform == "win32":
-        return math.inf
-    import resource
-
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    return math.inf if limit == resource.RLIM_INFINITY else limit - psutil.Process().memory_info().vms
+    softs = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
+    return min((soft - MAPPED_BYTES for soft in softs if soft != resource.RLIM_INFINITY), default=math.inf)
 
 
 def _folders(mount: Path, own: Path, controller: str) -> Iterator[Path]:

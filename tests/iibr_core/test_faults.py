@@ -152,9 +152,7 @@ def test_memory_budgets_are_kept_by_refusing():
         lambda: plan_literal(photo, disparity, GridShape(9, 9), 100_000),
         lambda: plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=100_000)),
     ):
-        with pytest.raises(
-            InputError, match=r"takes \d+ MiB, the budget is 0 MiB: raise --memory or lower --max-pixels"
-        ):
+        with pytest.raises(InputError, match=r"takes \d+ MiB, --memory is 1 MiB: raise --memory or lower --max-pixels"):
             plan()
 
 

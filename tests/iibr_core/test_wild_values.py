@@ -296,7 +296,7 @@ READS_OR_TELLS = {
     "formats.light_fields.numbered_grid": "read_numbered_grid",
     "formats.light_fields.hci": "read_hci HciWriter",
     "formats.images.downsampling": "downsampled_linear finite_pixels linear_light OddValues Rows",
-    "formats.images.heic": "is_heic read_heic read_heic_depth",
+    "formats.images.heic": "is_heic read_heic heic_size read_heic_depth",
     "formats.light_fields.llff": "read_llff",
     "formats.light_fields.middlebury": "read_middlebury",
     "formats.light_fields.parameters": "read_parameters write_parameters stated_grid stated_focal_px stated_range_px",
@@ -311,6 +311,7 @@ READS_OR_TELLS = {
     "formats.images.oiio_names": "oiio_name",
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
     "complaint_of",
+    "formats.images.header": "PhotoHeader read_photo_header",
     "formats.light_fields.stanford": "read_stanford",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
     "generation.light_field": "transformer_for",
@@ -321,10 +322,11 @@ READS_OR_TELLS = {
     "inpainting.protocol": "Inpainter",
     "inpainting.registry": "load_inpainter",
     "runtime.allocator": "limit_arenas give_back_memory",
-    "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes "
-    "address_space_left",
+    "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes",
     "runtime.kernel_cache": "KernelCache sources_hash",
     "runtime.resources": "resource_folder",
+    "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
+    "largest_side require_reading require_decoding require_views require_field mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "rendering.view_synthesis": "ViewSynthesis",

@@ -13,7 +13,17 @@ import numpy as np
 
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import UNEDITED, Levels, levels_of
+from iibr_core.generation.memory_model import (
+    budget_of,
+    mebibytes,
+    pixels_within,
+    require_decoding,
+    require_process,
+    require_reading,
+    require_views,
+)
 from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, ScenePlan, plan_for_viewing
+from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import Disparity, FloatImage, Photo
 from viewer.model.state.app_state import Progress, Source
@@ -54,15 +64,17 @@ def load_photo(
     should_stop: ShouldStop = never,
     report_progress: Callable[[Progress], None] = lambda progress: None,
     depth_settings: DepthSettings | None = None,
+    keeps_views: bool = True,
 ) -> LoadedPhoto:
     """Read a photo and find its disparity, telling what is going on, not more often than people can see.
 
-    depth_settings: what to make of the disparity, None for what the source says. Raises InputError, and Cancelled once
-    should_stop is true.
+    depth_settings: what to make of the disparity, None for what the source says. keeps_views: its views will be shown:
+    the photo is then made as small as memory asks for, else refused. Raises InputError, and Cancelled once should_stop
+    is true.
     """
+    require_process(budget_of(source.depth.memory_bytes), keeps_views)
     from iibr_core.depth.search import open_with_depth
     from iibr_core.formats.images.heic import is_heic
-    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
     from viewer.model.saved_settings import settings_text_in
 
     said_at: dict[str, float] = {}
@@ -74,14 +86,17 @@ def load_photo(
             report_progress(Progress(doing=f"{doing}, {done / total:.0%}" if done and total else doing))
 
     path = Path(source.path)
+    max_pixels, notes = _pixels_to_read(source, keeps_views)
     found = open_with_depth(
         path,
         replace(source.depth, refine=NOT_YET),
-        source.max_pixels or DEFAULT_MAX_PIXELS,
+        max_pixels,
         source.grid,
         should_stop,
         report_at_times,
     )
+    found = replace(found, photo=replace(found.photo, notes=found.photo.notes + notes))
+    give_back_memory()
     # This program saves no HEIC.
     settings = "" if is_heic(path) else settings_text_in(path)
     return _prepare(found, settings, _models_here(), depth_settings or DepthSettings(source.depth.refine), should_stop)
@@ -102,6 +117,30 @@ def apply_depth_settings(
     return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
 
 
+def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, tuple[str, ...]]:
+    """How large a photo is read, and a note where that is less than was asked for. Raises InputError where memory does
+    not allow it, before any of it is taken.
+    """
+    from iibr_core.formats.images.header import read_photo_header
+    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, size_within
+
+    path, wanted = Path(source.path), source.max_pixels or DEFAULT_MAX_PIXELS
+    budget = budget_of(source.depth.memory_bytes)
+    header = read_photo_header(path)
+    require_decoding(budget, path.name, header.decoding_bytes, keeps_views)
+    size = size_within(header.size, wanted)
+    if not keeps_views:
+        require_reading(budget, size)
+        return wanted, ()
+    fitting = pixels_within(budget, source.grid)
+    is_less = fitting < size.height * size.width
+    size = size_within(size, fitting) if is_less else size
+    if source.grid is not None:
+        require_views(budget, path.name, size, source.grid)
+    note = f"{budget.said} {mebibytes(budget.bytes)}: no room for more than {fitting:,} pixels of the photo."
+    return (fitting, (note,)) if is_less else (wanted, ())
+
+
 def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> ScenePlan:
     """The plan for viewing. What was not edited keeps its parallax: clips and strokes must not move all the rest.
 
@@ -112,7 +151,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> Sce
         zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
         range_px, edited_px = (_robust_range(map_.values) for map_ in (loaded.refined, loaded.disparity))
         depth_strength *= edited_px / range_px if range_px else 1.0
-    overrides = PlanOverrides(source.grid, depth_strength, zero, source.depth.memory_bytes)
+    overrides = PlanOverrides(source.grid, depth_strength, zero, source.depth.memory_bytes, source.quality)
     return plan_for_viewing(loaded.photo, loaded.disparity, overrides)
 
 

@@ -15,8 +15,10 @@ import numpy as np
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.formats.files import is_folder
+from iibr_core.generation.memory_model import budget_of, require_field
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.runtime.machine import memory_bytes
 from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
@@ -179,6 +181,7 @@ def _results_of_folder(request: SceneRequest, should_stop: Callable[[], bool]) -
 
     field = open_light_field(Path(request.source.path))
     grid, (size, views) = grid_of(field), read_views(field)
+    require_field(budget_of(request.source.depth.memory_bytes or memory_bytes()), field.name, size, grid)
     centre = next(views)
     scene = Scene(
         source=request.source,

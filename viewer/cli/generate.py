@@ -28,6 +28,7 @@ from viewer.cli.options import (
     grid_from_text,
     inputs_with_sidecar,
     require_existing,
+    require_memory,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
@@ -53,6 +54,7 @@ def generate(
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
     """
+    require_memory(memory, keeps_views=False)
     from iibr_core.formats.light_fields.registry import writer_for
     from viewer.model.state.app_state import Source
 
@@ -67,8 +69,8 @@ def generate(
     from viewer.background.loaded_photo import load_photo
 
     with show_progress("reading") as show:
-        loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing))
-    plan = plan_literal(loaded.photo, loaded.disparity, grid, memory)
+        loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
+    plan = plan_literal(loaded.photo, loaded.disparity, grid, memory, quality)
     total = grid.rows * grid.columns
     views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality, inpaint=inpaint)
     with (

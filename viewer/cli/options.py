@@ -129,6 +129,13 @@ def require_heeded(context: typer.Context, path: Path) -> None:
     raise InputError(f"{' and '.join(options)}: {path} is a folder, and its views are taken as they are; leave it out")
 
 
+def require_memory(memory_bytes: int | None, keeps_views: bool) -> None:
+    """Raise InputError before anything heavy is loaded where that is more than what may be taken."""
+    from iibr_core.generation.memory_model import budget_of, require_process
+
+    require_process(budget_of(memory_bytes), keeps_views)
+
+
 def require_existing(source: Source) -> None:
     """Raise InputError before a window opens, rather than say so in it."""
     for path in (source.path, source.depth.file):

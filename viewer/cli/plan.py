@@ -15,6 +15,7 @@ from viewer.cli.options import (
     PhotoPath,
     Refine,
     depth_choice,
+    require_memory,
 )
 
 
@@ -35,6 +36,7 @@ def plan(
 
     Example: iibr plan photo.png --disparity photo.pfm
     """
+    require_memory(memory, keeps_views=True)
     from iibr_core.generation.plan import PlanOverrides, plan_for_viewing
     from viewer.background.loaded_photo import load_photo
     from viewer.model.state.app_state import Source

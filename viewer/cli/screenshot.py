@@ -36,6 +36,7 @@ from viewer.cli.options import (
     number_option,
     require_existing,
     require_heeded,
+    require_memory,
     require_utf8,
     size_from_text,
     view_from_text,
@@ -169,6 +170,7 @@ def screenshot(
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     shot = _Shot(Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint), depth_strength, size)
     require_heeded(context, path)
+    require_memory(memory, keeps_views=True)
     require_existing(shot.source)
     if ui:
         require_utf8(path, disparity, depth_model)
@@ -185,9 +187,11 @@ def screenshot(
 def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Shot:
     """With the settings of a picture saved before, except for the options given."""
     from viewer.model.actions import TakeSettings
-    from viewer.model.saved_settings import read_settings, source_like, unknown_note
+    from viewer.model.saved_settings import read_settings, require_saved_size, source_like, unknown_note
 
     saved = read_settings(like)
+    if shot.size is None and not ui:
+        require_saved_size(saved, like)
     return _Shot(
         source_like(shot.source, saved, given),
         shot.depth_strength if "depth_strength" in given else saved.depth_strength,

@@ -61,6 +61,7 @@ def show_progress(doing: str) -> Iterator[Callable[..., None]]:
     from rich.progress import Progress
 
     console = Console(stderr=True)
+    # Elsewhere a bar leaves empty lines, and an error is to be the only line.
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(doing, total=None)
 

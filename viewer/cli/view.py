@@ -27,6 +27,7 @@ from viewer.cli.options import (
     depth_choice,
     require_existing,
     require_heeded,
+    require_memory,
     require_utf8,
 )
 
@@ -62,6 +63,7 @@ def view(
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
     source = Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint)
     require_heeded(context, path)
+    require_memory(memory, keeps_views=True)
     require_existing(source)
     if ground_truth is not None and not is_folder(ground_truth):
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")

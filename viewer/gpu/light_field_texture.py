@@ -143,7 +143,8 @@ def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) 
         )
     if max(width, height) > max_size:
         raise InputError(
-            f"views of {width}x{height} px exceed this graphics driver's limit of {max_size} px: lower --max-pixels"
+            f"views of {width}x{height} px exceed this graphics driver's limit of {max_size} px: give --max-pixels "
+            f"{width * height * max_size**2 // max(width, height) ** 2}"
         )
 
 

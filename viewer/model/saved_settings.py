@@ -27,6 +27,9 @@ MOST_CHARACTERS = 1_000_000
 MASK_LIMITS = (1, 4096)
 UNKNOWN_TOLD = 3
 
+MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
+"""Of a picture that is asked for by a file."""
+
 SidePx = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
 Amount = Annotated[int, msgspec.Meta(ge=1, le=2**62)]
@@ -105,6 +108,15 @@ def read_settings(path: Path) -> SavedSettings:
     if not text:
         raise InputError(f"{path}: holds no settings of iibr; give a picture saved with Ctrl+S or `iibr screenshot`")
     return settings_from_text(text, str(path))
+
+
+def require_saved_size(saved: SavedSettings, path: Path) -> None:
+    """Raise InputError where the picture asks for one that is larger than this program draws."""
+    width, height = saved.size_px
+    if max(width, height) > MOST_SIDE_PX or width * height > MOST_PIXELS:
+        raise InputError(
+            f"{path}: its settings ask for a picture of {width}x{height} px; give a smaller one with --size"
+        )
 
 
 def settings_text_in(path: Path) -> str:

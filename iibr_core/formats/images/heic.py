@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, refuse_bomb, require_file
 from iibr_core.formats.images.oiio_reader import Raster
-from iibr_core.types import FloatImage, InputError
+from iibr_core.types import FloatImage, ImageSize, InputError
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
 EXIF_FOLDER = 0x8769
@@ -54,6 +54,12 @@ def read_heic(path: Path) -> Raster:
     if not getattr(file, "premultiplied_alpha", False):
         spec.attribute("oiio:UnassociatedAlpha", 1)
     return Raster(pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1], alpha, spec)
+
+
+def heic_size(path: Path) -> ImageSize:
+    """From a HEIC's header. Raises InputError as `read_heic` does."""
+    width, height = _open(path).size
+    return ImageSize(height, width)
 
 
 def read_heic_depth(path: Path) -> HeicDepth | None:

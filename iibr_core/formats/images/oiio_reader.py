@@ -71,7 +71,8 @@ class PictureRows:
     """A picture file, open to be read from top to bottom, some rows at a time: no more of it is in memory than that,
     as far as its format allows.
 
-    spec: OpenImageIO's header. size: of the picture. is_at_start: whether nothing was read yet.
+    spec: OpenImageIO's header. format_name: its name for the format. size: of the picture. is_at_start: whether nothing
+    was read yet.
     """
 
     def __init__(self, path: Path) -> None:
@@ -79,6 +80,7 @@ class PictureRows:
         self._path = path
         self._source = _open(path)
         self.spec = self._source.spec()
+        self.format_name = str(self._source.format_name())
         self.size = ImageSize(self.spec.height, self.spec.width)
         self._colors, self._alpha_at = _channels(path, self.spec)
         self._type = _reading_type(self.spec.format)

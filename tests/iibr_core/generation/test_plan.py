@@ -6,6 +6,7 @@ import pytest
 
 from iibr_core.generation.cost_model import estimate_workload, largest_offset, measure_parallax
 from iibr_core.generation.light_field import ray_set
+from iibr_core.generation.memory_model import whole_bytes
 from iibr_core.generation.plan import MOST_VIEWS_A_SIDE, STEP_PX, PlanOverrides, plan_for_viewing, plan_literal
 from iibr_core.training.batches import ambiguous_rays_of_view
 from iibr_core.training.degradation import blur
@@ -124,7 +125,8 @@ def test_literal_takes_disparity_as_it_is():
 def test_less_memory_gives_fewer_views():
     photo, disparity = square_before_wall(300, 800)
     roomy = plan_for_viewing(photo, disparity)
-    tight = plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=roomy.peak_bytes + roomy.field_bytes // 2))
+    needed = whole_bytes(300 * 800, roomy.field_bytes, roomy.peak_bytes, keeps_views=True)
+    tight = plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=needed - roomy.field_bytes // 2))
     assert tight.grid.columns < roomy.grid.columns
 
 

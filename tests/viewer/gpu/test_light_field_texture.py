@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb
-from iibr_core.types import GridShape, InputError
+from iibr_core.formats.images.photo import size_within
+from iibr_core.types import GridShape, ImageSize, InputError
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.light_field_texture import LightFieldTexture, check_fits
 
 GRID = GridShape(2, 3)
 
@@ -96,3 +97,13 @@ def test_foreign_views_are_refused(gl: GLContext, row: int, shape: tuple[int, ..
     with pytest.raises(ValueError, match=r"view \("):
         field.upload(row, 0, np.zeros(shape, np.uint8), None)
     field.release()
+
+
+@pytest.mark.parametrize("size", [(20_000, 2), (2, 20_000), (40_000, 30)])
+def test_views_longer_than_the_driver_allows_are_told_the_size_that_fits(gl: GLContext, size: tuple[int, int]) -> None:
+    width, height = (side * gl.max_texture_size // 16_384 for side in size)
+    with pytest.raises(InputError, match=r"give --max-pixels \d+$") as error:
+        check_fits(gl.ctx, GridShape(3, 3), width, height)
+    fitting = size_within(ImageSize(height, width), int(str(error.value).split()[-1]))
+    check_fits(gl.ctx, GridShape(3, 3), fitting.width, fitting.height)
+    assert max(fitting) > 0.9 * gl.max_texture_size

@@ -1,0 +1,71 @@
+"""What a photo's header tells before it is decoded: its size, and what its format makes decoders hold all at once."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import NamedTuple
+
+from iibr_core.formats.files import open_binary
+from iibr_core.formats.images.heic import heic_size, is_heic
+from iibr_core.formats.images.oiio_reader import PictureRows
+from iibr_core.types import ImageSize
+
+BY_ROWS = frozenset({"jpeg", "png", "tiff", "openexr", "hdr", "pnm", "bmp", "targa"})
+"""Formats, by OpenImageIO's names, that are decoded some rows at a time; of the others all is held at once."""
+HEIC_BYTES = 8
+"""Of a pixel: libheif's planes, and what it makes of them."""
+COEFFICIENT_BYTES = 2
+JPEG_START, START_OF_SCAN = b"\xff\xd8", 0xDA
+PROGRESSIVE_FRAMES = (0xC2, 0xC6, 0xCA, 0xCE)
+PNG_INTERLACE_AT, MOST_TILE_ROWS = 28, 1024
+
+
+class PhotoHeader(NamedTuple):
+    """size: as stored, before it is turned upright. decoding_bytes: what decoding it holds beside a few rows."""
+
+    size: ImageSize
+    decoding_bytes: int
+
+
+def read_photo_header(path: Path) -> PhotoHeader:
+    """Of a photo that `read_photo` reads. Raises InputError as that does for its header."""
+    if is_heic(path):
+        size = heic_size(path)
+        return PhotoHeader(size, size.height * size.width * HEIC_BYTES)
+    rows = PictureRows(path)
+    size, kind, pixels = rows.size, rows.format_name, rows.size.height * rows.size.width
+    if kind == "jpeg":
+        return PhotoHeader(size, round(pixels * _coefficient_bytes(path)))
+    is_whole = kind not in BY_ROWS or (kind == "png" and _is_interlaced(path)) or rows.spec.tile_height > MOST_TILE_ROWS
+    return PhotoHeader(size, int(rows.spec.image_bytes()) if is_whole else 0)
+
+
+def _is_interlaced(path: Path) -> bool:
+    with open_binary(path) as file:
+        header = file.read(PNG_INTERLACE_AT + 1)
+    return len(header) > PNG_INTERLACE_AT and header[PNG_INTERLACE_AT] == 1
+
+
+def _coefficient_bytes(path: Path) -> float:
+    """A progressive JPEG's coefficients, bytes a pixel: it has them all before it has any row. 0 for others."""
+    with open_binary(path) as file:
+        if file.read(2) != JPEG_START:
+            return 0.0
+        while len(mark := file.read(4)) == 4 and mark[0] == 0xFF and mark[1] != START_OF_SCAN:
+            length = struct.unpack(">H", mark[2:])[0]
+            if mark[1] in PROGRESSIVE_FRAMES:
+                return _samples_a_pixel(file.read(length - 2)) * COEFFICIENT_BYTES
+            file.seek(max(length - 2, 0), 1)
+    return 0.0
+
+
+def _samples_a_pixel(frame: bytes) -> float:
+    """Of all components of a frame header, each sampled so many times across and down."""
+    if len(frame) < 9:
+        return 4.0
+    factors = [(frame[at] >> 4, frame[at] & 15) for at in range(7, min(len(frame), 6 + 3 * frame[5]), 3)]
+    if not factors or min(map(min, factors)) < 1:
+        return 4.0
+    most_across, most_down = (max(values) for values in zip(*factors))
+    return float(sum(across * down for across, down in factors) / (most_across * most_down))

@@ -1,0 +1,155 @@
+"""What a process takes in all, so that `--memory` is a bound: refused or made smaller before anything is allocated.
+
+The constants were measured (`python -m benchmarks.memory bounds`) on fresh processes; they hold with nothing compiled
+in advance too.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from iibr_core.generation.cost_model import (
+    AMBIGUOUS_BYTES,
+    CANDIDATE_BYTES,
+    CORES,
+    RAY_BYTES,
+    STATISTICS_BYTES,
+    WORKING_BYTES,
+)
+from iibr_core.runtime.machine import (
+    MAPPED_BYTES,
+    MOST_USUAL_SHARE,
+    memory_bytes,
+    own_limit_bytes,
+    usual_budget_bytes,
+)
+from iibr_core.runtime.tiling import MOST_BAND_PIXELS
+from iibr_core.types import GridShape, ImageSize, InputError
+
+MIB = 2**20
+VIEWER_BYTES, WRITER_BYTES = 390 * MIB, 290 * MIB
+"""Of a process that does nothing yet: Python, compiled kernels and their compiler; OpenGL, where views are shown."""
+READING_BYTES, KEPT_BYTES = 90, 100
+"""Of one pixel of the photo: while it is read and its depth looked for; while views are made, beside them."""
+STORED_BYTES, STORED_HDR_BYTES = 7, 10
+"""Of one pixel of a view in a light field: colours and disparity."""
+USUAL_RAY_IMAGES, USUAL_HOLE_BYTES, USUAL_AMBIGUOUS_SHARE = 10, 20, 0.2
+"""What scenes take while their views are made, before anything is known of them."""
+USUAL_GRID = GridShape(5, 5)
+"""A photo is made no smaller than that so many of its views fit; more are not worth its details."""
+LEAST_PIXELS = 10_000
+
+
+class Budget(NamedTuple):
+    """What a process may take. said: where that comes from, for people."""
+
+    bytes: int
+    said: str
+
+    def require(self, needed: float, what: str, advice: str) -> None:
+        """Raise InputError where that is not enough. what: takes so much; advice: what to do, after a colon."""
+        if needed > self.bytes:
+            said = f"{what} takes {mebibytes(needed)}, {self.said} {mebibytes(self.bytes)}"
+            raise InputError(f"{said}: {advice}")
+
+
+def budget_of(wanted_bytes: int | None) -> Budget:
+    """The user's, where it is no larger than the machine. Raises InputError for nonsense."""
+    if wanted_bytes is not None and wanted_bytes <= 0:
+        raise InputError(f"--memory {wanted_bytes}: give a positive number of bytes")
+    machine = memory_bytes()
+    if wanted_bytes is None:
+        return Budget(usual_budget_bytes(), "the budget (--memory) is")
+    return Budget(wanted_bytes, "--memory is") if wanted_bytes <= machine else Budget(machine, "this machine has")
+
+
+def require_process(budget: Budget, keeps_views: bool) -> None:
+    """Raise InputError where not even the smallest photo fits."""
+    needed = process_bytes(keeps_views) + LEAST_PIXELS * (READING_BYTES + KEPT_BYTES)
+    allowed = own_limit_bytes()
+    what = "showing the smallest photo" if keeps_views else "writing the views of the smallest photo"
+    if MOST_USUAL_SHARE * allowed < needed:
+        least, limit = needed / MOST_USUAL_SHARE + MAPPED_BYTES, allowed + MAPPED_BYTES
+        said = f"{what} takes an address space of {mebibytes(least)}, it is limited to {mebibytes(limit)}"
+        raise InputError(f"{said} (ulimit -v, or -d): raise that limit")
+    budget.require(needed, what, "allow it that much")
+
+
+def process_bytes(keeps_views: bool) -> int:
+    """Of a process that does nothing yet. keeps_views: it shows them, rather than write them one by one."""
+    return VIEWER_BYTES if keeps_views else WRITER_BYTES
+
+
+def view_bytes(pixels: int, is_hdr: bool) -> int:
+    """Of one view of a light field."""
+    return pixels * (STORED_HDR_BYTES if is_hdr else STORED_BYTES)
+
+
+def whole_bytes(pixels: int, field_bytes: int, making_bytes: int, keeps_views: bool) -> int:
+    """The most that a process takes from reading a photo of so many pixels to its last view.
+
+    field_bytes: of all views, which count where they are kept. making_bytes: beside them while they are made.
+    """
+    making = pixels * KEPT_BYTES + (field_bytes if keeps_views else 0) + making_bytes
+    return process_bytes(keeps_views) + max(pixels * READING_BYTES, making)
+
+
+def pixels_within(budget: Budget, grid: GridShape | None, keeps_views: bool = True) -> int:
+    """How large a photo may be before anything is known of it: so that a few views, or those asked for where they are
+    fewer, fit.
+    """
+    views = min(math.prod(grid or USUAL_GRID), math.prod(USUAL_GRID))
+    each, fixed = _usual_making() if views > 1 else (0, 0)
+    each += KEPT_BYTES + (views * STORED_BYTES if keeps_views else 0)
+    return max((budget.bytes - process_bytes(keeps_views) - fixed) // each, LEAST_PIXELS)
+
+
+def _usual_making() -> tuple[int, int]:
+    """What views take while they are made: for each pixel of the photo, and of it whatever its size."""
+    rays = USUAL_RAY_IMAGES * (RAY_BYTES + STATISTICS_BYTES)
+    band = MOST_BAND_PIXELS * (CANDIDATE_BYTES + USUAL_AMBIGUOUS_SHARE * AMBIGUOUS_BYTES)
+    return rays + CORES * WORKING_BYTES + USUAL_HOLE_BYTES, round(CORES * band)
+
+
+def largest_side(budget: Budget, needed_beside: int, each_view: int) -> int:
+    """So many views a side of a square grid fit beside what else is needed; 0 where none does."""
+    return math.isqrt(max(budget.bytes - needed_beside, 0) // max(each_view, 1))
+
+
+def require_reading(budget: Budget, size: ImageSize) -> None:
+    """Raise InputError where a photo, made this (height, width) while it is read, cannot even be read."""
+    needed = WRITER_BYTES + math.prod(size) * READING_BYTES
+    fitting = pixels_within(budget, None, keeps_views=False)
+    budget.require(needed, f"a photo of {size}", f"give --max-pixels {fitting}, or raise --memory")
+
+
+def require_decoding(budget: Budget, name: str, decoding_bytes: int, keeps_views: bool) -> None:
+    """Raise InputError where a photo's format makes decoders hold more at once than there is."""
+    what = f"{name} cannot be decoded row by row: that"
+    advice = "raise --memory, or save it as a PNG or a JPEG that is not progressive"
+    budget.require(process_bytes(keeps_views) + decoding_bytes, what, advice)
+
+
+def require_views(budget: Budget, name: str, size: ImageSize, grid: GridShape) -> None:
+    """Raise InputError where so many views of this (height, width) cannot be shown, before the first is made."""
+    pixels, views = math.prod(size), math.prod(grid)
+    beside, each = VIEWER_BYTES + pixels * KEPT_BYTES, view_bytes(pixels, is_hdr=False)
+    made_of, fixed = _usual_making()
+    side = largest_side(budget, beside + pixels * made_of + fixed, each)
+    advice = f"at most --grid {side}, or " if side > 1 else ""
+    what = f"{grid.columns} x {grid.rows} views of {name} ({size})"
+    budget.require(beside + views * each, what, f"{advice}raise --memory or lower --max-pixels")
+
+
+def require_field(budget: Budget, name: str, size: ImageSize, grid: GridShape) -> None:
+    """Raise InputError where a light field from disk, its views of this (height, width), cannot be shown."""
+    needed = VIEWER_BYTES + view_bytes(math.prod(size) * math.prod(grid), is_hdr=False)
+    budget.require(
+        needed, f"{name}: {grid.columns} x {grid.rows} views of {size}", "raise --memory, or take fewer views"
+    )
+
+
+def mebibytes(count: float) -> str:
+    """For people."""
+    return f"{math.ceil(count / MIB):,} MiB"

@@ -1,0 +1,128 @@
+"""`--memory` is a bound for the whole process: what does not fit is refused or made smaller before it is allocated."""
+
+import math
+
+import numpy as np
+import pytest
+
+from iibr_core.generation import memory_model, plan
+from iibr_core.generation.memory_model import (
+    LEAST_PIXELS,
+    MIB,
+    VIEWER_BYTES,
+    WRITER_BYTES,
+    Budget,
+    budget_of,
+    largest_side,
+    pixels_within,
+    require_decoding,
+    require_process,
+    require_reading,
+    require_views,
+    view_bytes,
+    whole_bytes,
+)
+from iibr_core.generation.plan import PlanOverrides, plan_for_viewing, plan_literal
+from iibr_core.runtime.machine import memory_bytes
+from iibr_core.types import GridShape, ImageSize, InputError
+from tests.iibr_core.scenes import square_before_wall
+
+GIB = 1024 * MIB
+
+
+def test_a_budget_is_no_larger_than_the_machine():
+    assert budget_of(2**62).bytes == memory_bytes()
+    assert budget_of(1000).bytes == 1000
+    assert 0 < budget_of(None).bytes < memory_bytes()
+    with pytest.raises(InputError, match="--memory 0"):
+        budget_of(0)
+
+
+def test_a_process_takes_something_before_it_does_anything():
+    with pytest.raises(InputError, match=r"takes \d+ MiB, --memory is 100 MiB"):
+        require_process(budget_of(100 * MIB), keeps_views=True)
+    require_process(budget_of(WRITER_BYTES + 10 * MIB), keeps_views=False)
+    with pytest.raises(InputError):
+        require_process(budget_of(WRITER_BYTES + 10 * MIB), keeps_views=True)
+
+
+def test_more_memory_makes_room_for_larger_photos_and_fewer_views_for_larger_ones():
+    sizes = [pixels_within(Budget(gigabytes * GIB, ""), None) for gigabytes in (1, 2, 4, 8)]
+    assert sizes == sorted(set(sizes))
+    assert sizes[0] > 500_000
+    one = Budget(GIB, "")
+    assert pixels_within(one, GridShape(1, 1)) > pixels_within(one, GridShape(3, 3)) > pixels_within(one, None)
+    assert pixels_within(one, GridShape(99, 99)) == pixels_within(one, None)
+    assert pixels_within(Budget(1, ""), None) == LEAST_PIXELS
+
+
+def test_so_many_pixels_fit_indeed():
+    """With the views that a photo is made no smaller for, and what usual scenes take while they are made."""
+    budget = Budget(GIB, "")
+    pixels = pixels_within(budget, None)
+    making, fixed = memory_model._usual_making()
+    field = 25 * view_bytes(pixels, is_hdr=False)
+    assert whole_bytes(pixels, field, pixels * making + fixed, keeps_views=True) == pytest.approx(GIB, rel=1e-3)
+
+
+def test_views_that_are_kept_count_and_those_that_are_written_do_not():
+    kept, written = (whole_bytes(1000, 10**9, 10**6, keeps) for keeps in (True, False))
+    assert kept - written == 10**9 + VIEWER_BYTES - WRITER_BYTES
+
+
+def test_a_grid_that_was_asked_for_is_refused_with_the_largest_that_fits():
+    budget = Budget(2 * GIB, "--memory is")
+    with pytest.raises(InputError, match=r"99 x 99 views of a\.jpg .* at most --grid \d+, or raise --memory") as error:
+        require_views(budget, "a.jpg", ImageSize(1000, 1000), GridShape(99, 99))
+    side = int(str(error.value).split("--grid ")[1].split(",")[0])
+    assert side > 1
+    require_views(budget, "a.jpg", ImageSize(1000, 1000), GridShape(side, side))
+    assert largest_side(Budget(100, ""), 10, 10) == 3
+
+
+def test_a_photo_too_large_to_be_read_is_refused_with_the_size_that_fits():
+    with pytest.raises(InputError, match=r"100x1000000 takes .* give --max-pixels (\d+)"):
+        require_reading(Budget(GIB, "--memory is"), ImageSize(1_000_000, 100))
+    require_reading(Budget(GIB, "--memory is"), ImageSize(1000, 1000))
+    with pytest.raises(InputError, match="row by row"):
+        require_decoding(Budget(GIB, "--memory is"), "a.heic", GIB, keeps_views=False)
+
+
+def test_plans_stay_within_their_budget(monkeypatch):
+    monkeypatch.setattr(memory_model, "VIEWER_BYTES", MIB)
+    photo, disparity = square_before_wall(300, 400)
+    roomy = plan_for_viewing(photo, disparity)
+    for share in (0.5, 0.7, 0.9):
+        most = round(share * whole_bytes(300 * 400, roomy.field_bytes, roomy.peak_bytes, keeps_views=True))
+        try:
+            tight = plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=most))
+        except InputError:
+            assert whole_bytes(300 * 400, 9 * view_bytes(300 * 400, False), roomy.peak_bytes, True) > most
+        else:
+            assert whole_bytes(300 * 400, tight.field_bytes, tight.peak_bytes, keeps_views=True) <= most
+
+
+def test_holes_count():
+    """What fills them looks around in sixteen directions: 128 bytes a pixel of them."""
+    photo, disparity = square_before_wall(120, 160, front=6.0)
+    grid = GridShape(9, 9)
+    statistics = plan.measure_parallax(disparity.values, 4.0)
+    assert 0.05 < statistics.hole_share <= 1
+    assert plan.measure_parallax(np.zeros((120, 160), np.float32), 4.0).hole_share == 0
+    ramp = np.linspace(0, 0.05, 160, dtype=np.float32) * np.ones((120, 1), np.float32)
+    assert plan.measure_parallax(ramp, 4.0).hole_share < 0.01
+    holes = [int(view.inpainted.sum()) for view in _views(photo, disparity, grid)]
+    assert max(holes) <= statistics.hole_share * 120 * 160
+
+
+def _views(photo, disparity, grid):
+    from iibr_core.generation.light_field import generate
+
+    return generate(photo, disparity, plan_literal(photo, disparity, grid), quality="fast")
+
+
+def test_the_whole_is_what_the_plan_says():
+    photo, disparity = square_before_wall(60, 80)
+    made = plan_for_viewing(photo, disparity)
+    whole = whole_bytes(math.prod(photo.size), made.field_bytes, made.peak_bytes, keeps_views=True)
+    assert f"{math.ceil(whole / MIB)} MiB in all" in made.reasons[-1]
