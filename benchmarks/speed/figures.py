@@ -11,7 +11,8 @@ from benchmarks.speed.measure import Cost, in_turns, median_cost, median_ratio, 
 from benchmarks.speed.prediction import whole_field
 from benchmarks.speed.variants import REFERENCE, BenchScene, Draw, Variant, evaluated_views, field_cost, is_possible
 from iibr_core.evaluation.metrics import bounded_psnr, flip
-from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, plan_for_viewing
+from iibr_core.generation.plan import PlanOverrides, plan_for_viewing
+from iibr_core.generation.relief import measure_relief
 from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, ReportProgress
 
 
@@ -98,8 +99,8 @@ def _errors(variant: Variant, scene: BenchScene, draw: Draw | None) -> tuple[flo
 def _plan_choice(scene: BenchScene, variants: Sequence[Variant]) -> str:
     """The default quality with as few stored views as the plan finds enough for this parallax."""
     field, full = whole_field(scene), 2 * scene.reach
-    low, high = (float(p) for p in np.percentile(scene.disparity, ROBUST_PERCENTILES))
-    strength = max((high - low) * full / (TOTAL_PARALLAX * scene.photo.shape[1]), 1e-6)
+    moved_px = measure_relief(scene.disparity).range * full
+    strength = max(moved_px / (TOTAL_PARALLAX * scene.photo.shape[1]), 1e-6)
     side = plan_for_viewing(field.photo, field.disparity, PlanOverrides(depth_strength=strength)).grid.columns
     default = Variant("", DEFAULT_QUALITY)
     plain = [variant for variant in variants if replace(variant, name="", every=1) == default and variant.every > 0]

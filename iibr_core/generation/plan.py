@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -26,13 +26,16 @@ from iibr_core.generation.memory_model import (
     view_bytes,
     whole_bytes,
 )
+from iibr_core.generation.relief import measure_relief
 from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, Disparity, GridShape, InputError, Photo, Quality
 
 STEP_PX = 4.0
 """For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity."""
 MOST_VIEWS_A_SIDE = 9
-ROBUST_PERCENTILES = (1.0, 99.0)
-"""A few wild disparities must not set the baseline."""
+MOST_NOISE_PX = 1.0
+"""So much may a map's noise move from the first view to the last: relief that is hardly more than noise moves less."""
+MOST_STRENGTH = 100.0
+"""Parallax four times as wide as the picture."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,8 @@ class PlanOverrides:
 class ScenePlan:
     """The choices for one scene.
 
-    grid: stored views. disparity_scale, disparity_zero: the field's disparity is (given - zero) * scale.
+    grid: stored views. disparity_scale, disparity_zero: the field's disparity is (given - zero) * scale. given_range:
+    farther and nearer ones count as its ends; None where all count as they are.
     disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3
     px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
     of the light field, and at most while generating in the default quality, the field not counted. reasons: the same
@@ -71,10 +75,12 @@ class ScenePlan:
     peak_bytes: int
     reasons: tuple[str, ...]
     costs: CostEstimates = NO_COST
+    given_range: tuple[float, float] | None = None
 
     def field_disparity(self, given: Disparity) -> Disparity:
         """The disparity the light field is generated from (px per view step of this plan's grid)."""
-        values = (given.values - np.float32(self.disparity_zero)) * np.float32(self.disparity_scale)
+        counted = given.values if self.given_range is None else np.clip(given.values, *self.given_range)
+        values = (counted - np.float32(self.disparity_zero)) * np.float32(self.disparity_scale)
         return Disparity(values, given.source, given.notes)
 
 
@@ -84,33 +90,35 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
     Raises InputError if an override is out of range, or if a grid the user asked for does not fit into memory.
     """
     wanted = overrides or PlanOverrides()
-    if not np.isfinite(wanted.depth_strength):
-        raise InputError(f"--depth-strength {wanted.depth_strength}: give a finite number")
+    if not abs(wanted.depth_strength) <= MOST_STRENGTH:
+        raise InputError(f"--depth-strength {wanted.depth_strength:g}: give a number up to {MOST_STRENGTH:g}")
     budget = budget_of(wanted.memory_bytes)
-    low, high = (float(p) for p in np.percentile(disparity.values, ROBUST_PERCENTILES))
+    relief = measure_relief(disparity.values)
+    disparity = replace(disparity, values=np.clip(disparity.values, relief.low, relief.high))
     zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
     width = photo.size.width
-    parallax_px = (
-        TOTAL_PARALLAX * width * abs(wanted.depth_strength) if high - low > 1e-6 * max(abs(low), abs(high), 1) else 0.0
-    )
+    parallax_px = 0.0
+    if relief.range > 0:
+        carried_px = MOST_NOISE_PX * relief.range / relief.noise if relief.noise > 0 else np.inf
+        parallax_px = min(TOTAL_PARALLAX * width, carried_px) * abs(wanted.depth_strength)
     reasons = []
     if wanted.grid is not None:
         grid = wanted.grid
         reasons.append(f"{grid.columns} x {grid.rows} views, as asked.")
     else:
-        most_moved = 0.5 * parallax_px / (high - low) if parallax_px else 0.0
+        most_moved = 0.5 * parallax_px / relief.range if parallax_px else 0.0
         statistics = measure_parallax(disparity.values - np.float32(zero), most_moved)
         grid = _grid_for(parallax_px, statistics, photo, budget, wanted.quality)
         reasons.append(_grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
-    scale = parallax_px / steps / (high - low) * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
+    scale = parallax_px / steps / relief.range * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
     if parallax_px:
         reasons.append(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
     plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons)
     _require_room(plan, photo, budget, wanted.quality, keeps_views=True)
-    return plan
+    return replace(plan, given_range=(relief.low, relief.high))
 
 
 def plan_literal(

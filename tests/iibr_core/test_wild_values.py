@@ -24,7 +24,7 @@ from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverse
 from iibr_core.formats.images import photo
 from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
-from iibr_core.generation import cost_model, plan
+from iibr_core.generation import cost_model, plan, relief
 from iibr_core.generation import light_field as generating
 from iibr_core.inpainting import disparity_holes
 from iibr_core.rendering import (
@@ -222,6 +222,7 @@ FINITE = {
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(depth_strength=v)),
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(focus_disparity=v)).field_disparity(scene()[1]),
     ],
+    "generation.relief.measure_relief": lambda v, _: relief.measure_relief(depths(v)),
     "generation.plan.plan_literal": lambda v, _: plan.plan_literal(scene()[0], Disparity(depths(v), "wild"), GRID),
     "rendering.coherent_cells.find_coherent_cells": lambda v, _: [
         coherent_cells.find_coherent_cells(rays(v), ViewOffset(0.5, -1.0), (0, SIZE[0])),

@@ -22,7 +22,8 @@ from iibr_core.generation.memory_model import (
     require_reading,
     require_views,
 )
-from iibr_core.generation.plan import ROBUST_PERCENTILES, PlanOverrides, ScenePlan, plan_for_viewing
+from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing
+from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import Disparity, FloatImage, Photo
@@ -149,8 +150,9 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> Sce
     zero = source.focus_disparity
     if loaded.depth_settings.edits != UNEDITED:
         zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
-        range_px, edited_px = (_robust_range(map_.values) for map_ in (loaded.refined, loaded.disparity))
-        depth_strength *= edited_px / range_px if range_px else 1.0
+        range_px, edited_px = (measure_relief(map_.values).range for map_ in (loaded.refined, loaded.disparity))
+        wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
+        depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
     overrides = PlanOverrides(source.grid, depth_strength, zero, source.depth.memory_bytes, source.quality)
     return plan_for_viewing(loaded.photo, loaded.disparity, overrides)
 
@@ -195,11 +197,6 @@ def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> Lo
         values = refine(loaded.photo.pixels, values, strength, should_stop)
     canvas = DepthCanvas(loaded.photo.pixels, values)
     return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)
-
-
-def _robust_range(values: FloatImage) -> float:
-    low, high = np.percentile(values, ROBUST_PERCENTILES)
-    return float(high - low)
 
 
 def _models_here() -> tuple[str, ...]:
