@@ -1,0 +1,238 @@
+"""How soft the depth edges of a map are, place by place; measured on edges that can be nothing but steps, blurred.
+
+A slope, a hill or a fold may rise like a blurred step. It has no flat shoulders, or the photo does not change along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.depth.edge_profiles import gradient, height_at, strongest_change, walk
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.types import FloatImage, ImageSize
+
+SHARP_PX = 0.65
+"""Edges blurred by less (sigma) count as exact: a step between two pixels measures 0.4, one pixel between them 0.8."""
+WIDEST_SIGMA_PX = 16.0
+EDGE_SIGMAS = sqrt(2 * np.pi)
+"""The height of a blurred step over its steepest slope, in sigmas of the blur."""
+MEASURED_EDGE = 0.1
+"""The blur is measured on steps of at least this share of the map's range."""
+MEASURED_PIXELS = 300_000
+MEASURING_REACH_PX = 20
+MEASURED_SIGMA_PX = MEASURING_REACH_PX / 5
+"""Wider edges are measured on a smaller map."""
+STEEPEST_PLATEAU = 0.35
+"""Slopes beside a sharp step, relative to its own, above which it is none."""
+SHOULDERS = (2.5, 4.0)
+"""Where the surfaces beside a blurred step must be flat: from its middle, in sigmas."""
+STEEPEST_SHOULDER = 0.15
+"""Slope there, relative to the step's."""
+CHANGE_NOISE = 0.003
+"""Squared change of colour (sRGB-encoded) that is no edge of the photo."""
+CELL_PX = 32
+CELLS = 24
+"""At most so many cells along each side of the map."""
+NEAREST_EDGES = 64
+"""Whose median is the blur of a cell."""
+WITNESSES = 512
+"""Edges at which the photo is asked whether they are any."""
+WITNESS_PX = 16
+"""Edges nearer to each other show the same of the photo: they count as one."""
+CHANCE = 0.5
+"""Share of shoulders at which any photo changes less than in the middle of a slope."""
+CHANCE_VARIANCE = 1 / 6
+"""Of that share of two shoulders: three changes in any order."""
+CERTAINTY = 3.0
+"""Standard deviations above chance from which the photo is believed."""
+LIKELY = 0.55
+"""Share from which it is believed of a place, where it is sure of edges as soft as these all over the map."""
+MOST_EDGES = 4096
+LEAST_SOFT = 0.1
+"""A map of which a smaller share of edges is soft, is exact."""
+CLEARLY_SOFT_PX = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeBlur:
+    """Standard deviation (px) of the blur of a map, for each of its cells; 0 where its edges are exact or unknown."""
+
+    sigma_px: NDArray[np.float32]
+    """(rows, columns)"""
+    cell_px: int
+
+
+def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never) -> EdgeBlur:
+    """The blur of the depth edges of a (H, W) map, place by place. photo: (H, W, 3), sRGB-encoded.
+
+    Raises Cancelled once should_stop is true.
+    """
+    height, width = disparity.shape
+    cell = max(CELL_PX, ceil(max(height, width, 1) / CELLS))
+    sigmas = np.zeros((ceil(height / cell), ceil(width / cell)), np.float32)
+    edges = _edges(photo, disparity, should_stop)
+    if _soft_share(edges) >= LEAST_SOFT:
+        for row, column in np.ndindex(*sigmas.shape):
+            raise_if_stopped(should_stop)
+            sigmas[row, column] = _sigma_at(edges, (column + 0.5) * cell, (row + 0.5) * cell)
+    return EdgeBlur(sigmas, cell)
+
+
+def extent(disparity: FloatImage) -> float:
+    """Robust range of a map."""
+    step = max(1, disparity.size // 200_000)
+    low, high = np.percentile(disparity.reshape(-1)[::step].astype(np.float64), [2, 98]) if disparity.size else (0, 0)
+    return float(high - low)
+
+
+def _sigma_at(edges: NDArray[np.float32], x: float, y: float) -> float:
+    """The blur about a place; 0 where the nearest edges are exact, or where the photo knows nothing of them."""
+    away = np.maximum(np.abs(edges[0] - x), np.abs(edges[1] - y))
+    nearest = edges[:, np.argsort(away, kind="stable")[:WITNESSES]]
+    sigma = _weighted_median(nearest[2, :NEAREST_EDGES], nearest[3, :NEAREST_EDGES])
+    if sigma < SHARP_PX:
+        return 0.0
+    # Only edges about as soft as these tell whether they are edges.
+    here, anywhere = (among[:, np.abs(np.log(among[2] / sigma)) < np.log(1.5)] for among in (nearest, edges))
+    agreed = _photo_is_sure(here) or (here[4].mean() >= LIKELY and _photo_is_sure(anywhere))
+    return min(sigma, WIDEST_SIGMA_PX) if agreed else 0.0
+
+
+def _soft_share(edges: NDArray[np.float32]) -> float:
+    """Of the edges, by height."""
+    return float(edges[3, (edges[2] >= CLEARLY_SOFT_PX) & (edges[4] > 0)].sum() / max(edges[3].sum(), 1e-30))
+
+
+def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
+    """Whether the photo changes at so many of them as chance would hardly have it."""
+    if not edges.shape[1]:
+        return False
+    places = len(np.unique(edges[:2] // WITNESS_PX, axis=1).T)
+    return bool(edges[4].mean() >= CHANCE + CERTAINTY * sqrt(CHANCE_VARIANCE / places))
+
+
+def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> NDArray[np.float32]:
+    """(5, N): x, y, blur (sigma), height, and whether the photo agrees; px of the map. At most MOST_EDGES.
+
+    Soft edges are measured on smaller maps, where they are as short as the others.
+    """
+    least_edge = MEASURED_EDGE * extent(disparity)
+    found: list[NDArray[np.float32]] = [np.empty((5, 0), np.float32)]
+    scale, least_sigma = 1, 0.0
+    while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * MEASURING_REACH_PX):
+        edges = _edges_of_level(photo, disparity, least_edge, least_sigma, should_stop)
+        edges[:2] = (edges[:2] + 0.5) * scale - 0.5
+        edges[2] *= scale
+        found.append(edges)
+        if 2 * scale * MEASURED_SIGMA_PX > WIDEST_SIGMA_PX:
+            break
+        photo, disparity = _half(photo), _half(disparity)
+        scale, least_sigma = 2 * scale, MEASURED_SIGMA_PX / 2
+    edges = np.concatenate(found, axis=1)
+    return edges[:, :: max(1, ceil(edges.shape[1] / MOST_EDGES))]
+
+
+def _edges_of_level(
+    photo: FloatImage, disparity: FloatImage, least_edge: float, least_sigma: float, should_stop: ShouldStop
+) -> NDArray[np.float32]:
+    """(5, N), see `_edges`; looks at as many rows as hold MEASURED_PIXELS."""
+    step = max(1, ceil(sqrt(disparity.size / MEASURED_PIXELS)))
+    height, width = -(-disparity.shape[0] // step), disparity.shape[1]
+
+    def band(first: int, last: int) -> NDArray[np.float32]:
+        found = np.empty((5, (last - first) * width), np.float32)
+        count = _measure_edges(
+            disparity, photo, least_edge, least_sigma, MEASURING_REACH_PX, step, first, last, found
+        )
+        return found[:, :count].copy()
+
+    return np.concatenate(in_bands(band, ImageSize(height, width), should_stop), axis=1)
+
+
+def _weighted_median(values: FloatImage, weights: FloatImage) -> float:
+    if not len(values):
+        return 0.0
+    order = np.argsort(values)
+    share = np.cumsum(weights[order], dtype=np.float64)
+    return float(values[order][np.searchsorted(share, share[-1] / 2)])
+
+
+def _half(values: FloatImage) -> FloatImage:
+    """Averaged over 2 x 2 pixels, (H, W) or (H, W, C)."""
+    height, width = values.shape[0] // 2 * 2, values.shape[1] // 2 * 2
+    even = values[:height, :width]
+    return np.ascontiguousarray((even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]) / 4)
+
+
+@kernel
+def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, last, found):
+    """At the steepest places of edges: x, y, blur (sigma, px), height, whether the photo agrees; returns how many.
+
+    Looks at every step-th row, from the first-th to before the last-th of those.
+    """
+    width = values.shape[1]
+    count = 0
+    for row in range(first, last):
+        y = row * step
+        for x in range(width):
+            across, down = gradient(values, x, y)
+            slope = sqrt(across * across + down * down)
+            # Even this slope, kept up over the whole search, makes no edge.
+            if not slope * 2 * reach > least_edge:
+                continue
+            across, down = across / slope, down / slope
+            # Both ends of the ramp, as far as they go.
+            up, top, end_up, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, 1.0, np.inf)
+            back, bottom, end_down, steepest_down, at_down = walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
+            steepest = max(steepest_up, steepest_down)
+            nearest = at_up if steepest_up >= steepest_down else at_down
+            # Only from the steepest pixel of an edge.
+            height = top - bottom
+            if not (height > least_edge and nearest < 1):
+                continue
+            # A step blurred by a Gaussian is height / (sqrt(2 pi) sigma) steep at its middle.
+            edge = at_up if steepest_up >= steepest_down else -at_down
+            sigma = height / (EDGE_SIGMAS * steepest)
+            agrees = 1.0
+            if sigma < SHARP_PX:
+                # Steep within two pixels: a step, whatever the photo shows.
+                if max(end_up, end_down) > STEEPEST_PLATEAU * steepest:
+                    continue
+            elif _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
+                agrees = _photo_agrees(photo, x, y, across, down, edge, sigma)
+            else:
+                continue
+            if least_sigma <= sigma < MEASURED_SIGMA_PX:
+                found[0, count], found[1, count] = x + across * edge, y + down * edge
+                found[2, count], found[3, count], found[4, count] = sigma, height, agrees
+                count += 1
+    return count
+
+
+@kernel
+def _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
+    near, far = SHOULDERS[0] * sigma, SHOULDERS[1] * sigma
+    limit = STEEPEST_SHOULDER * steepest * (far - near)
+    for sign in (-1.0, 1.0):
+        begin = height_at(values, x + across * (edge + sign * near), y + down * (edge + sign * near))
+        end = height_at(values, x + across * (edge + sign * far), y + down * (edge + sign * far))
+        if not abs(end - begin) <= limit:
+            return False
+    return True
+
+
+@kernel
+def _photo_agrees(photo, x, y, across, down, edge, sigma):
+    """Share of shoulders at which the photo changes less than in the middle of the edge, over the same length."""
+    near = max(sigma, 1.0)
+    middle = strongest_change(photo, x, y, across, down, edge - near, edge + near)
+    lower = strongest_change(photo, x, y, across, down, edge - 4 * near, edge - 2 * near)
+    upper = strongest_change(photo, x, y, across, down, edge + 2 * near, edge + 4 * near)
+    if max(middle, lower, upper) <= CHANGE_NOISE:
+        return 0.5
+    return 0.5 * (middle > lower) + 0.5 * (middle > upper)
