@@ -48,11 +48,13 @@ CHANCE = 0.5
 """Share of shoulders at which any photo changes less than in the middle of a slope."""
 CHANCE_VARIANCE = 1 / 6
 """Of that share of two shoulders: three changes in any order."""
-CERTAINTY = 3.0
+CERTAINTY = 2.5
 """Standard deviations above chance from which the photo is believed."""
 LIKELY = 0.55
 """Share from which it is believed of a place, where it is sure of edges as soft as these all over the map."""
 MOST_EDGES = 4096
+LEAST_STEPS = 0.2
+"""Share of soft edges with flat shoulders, among all that are as soft, from which they are steps; hills have few."""
 LEAST_SOFT = 0.1
 """A map of which a smaller share of edges is soft, is exact."""
 CLEARLY_SOFT_PX = 0.8
@@ -91,21 +93,29 @@ def extent(disparity: FloatImage) -> float:
 
 
 def _sigma_at(edges: NDArray[np.float32], x: float, y: float) -> float:
-    """The blur about a place; 0 where the nearest edges are exact, or where the photo knows nothing of them."""
+    """The blur about a place; 0 where the nearest edges are exact, or may as well be slopes."""
     away = np.maximum(np.abs(edges[0] - x), np.abs(edges[1] - y))
-    nearest = edges[:, np.argsort(away, kind="stable")[:WITNESSES]]
-    sigma = _weighted_median(nearest[2, :NEAREST_EDGES], nearest[3, :NEAREST_EDGES])
+    edges = edges[:, np.argsort(away, kind="stable")]
+    steps = edges[:, edges[5] > 0]
+    sigma = _weighted_median(steps[2, :NEAREST_EDGES], steps[3, :NEAREST_EDGES])
     if sigma < SHARP_PX:
         return 0.0
     # Only edges about as soft as these tell whether they are edges.
-    here, anywhere = (among[:, np.abs(np.log(among[2] / sigma)) < np.log(1.5)] for among in (nearest, edges))
-    agreed = _photo_is_sure(here) or (here[4].mean() >= LIKELY and _photo_is_sure(anywhere))
+    here = _as_soft_as(sigma, edges[:, :WITNESSES])
+    agreed = here[5].mean() >= LEAST_STEPS if here.shape[1] else False
+    here = _as_soft_as(sigma, steps[:, :WITNESSES])
+    agreed = agreed and (_photo_is_sure(here) or here[4].mean() >= LIKELY and _photo_is_sure(_as_soft_as(sigma, steps)))
     return min(sigma, WIDEST_SIGMA_PX) if agreed else 0.0
 
 
+def _as_soft_as(sigma: float, edges: NDArray[np.float32]) -> NDArray[np.float32]:
+    return edges[:, np.abs(np.log(edges[2] / sigma)) < np.log(1.5)]
+
+
 def _soft_share(edges: NDArray[np.float32]) -> float:
-    """Of the edges, by height."""
-    return float(edges[3, (edges[2] >= CLEARLY_SOFT_PX) & (edges[4] > 0)].sum() / max(edges[3].sum(), 1e-30))
+    """Of the steps, by height."""
+    steps = edges[:, edges[5] > 0]
+    return float(steps[3, (steps[2] >= CLEARLY_SOFT_PX) & (steps[4] > 0)].sum() / max(steps[3].sum(), 1e-30))
 
 
 def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
@@ -117,12 +127,12 @@ def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
 
 
 def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> NDArray[np.float32]:
-    """(5, N): x, y, blur (sigma), height, and whether the photo agrees; px of the map. At most MOST_EDGES.
+    """(6, N): x, y, blur (sigma), height, and whether the photo agrees; px of the map. At most MOST_EDGES.
 
     Soft edges are measured on smaller maps, where they are as short as the others.
     """
     least_edge = MEASURED_EDGE * extent(disparity)
-    found: list[NDArray[np.float32]] = [np.empty((5, 0), np.float32)]
+    found: list[NDArray[np.float32]] = [np.empty((6, 0), np.float32)]
     scale, least_sigma = 1, 0.0
     while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * MEASURING_REACH_PX):
         edges = _edges_of_level(photo, disparity, least_edge, least_sigma, should_stop)
@@ -140,12 +150,12 @@ def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
 def _edges_of_level(
     photo: FloatImage, disparity: FloatImage, least_edge: float, least_sigma: float, should_stop: ShouldStop
 ) -> NDArray[np.float32]:
-    """(5, N), see `_edges`; looks at as many rows as hold MEASURED_PIXELS."""
+    """(6, N), see `_edges`; looks at as many rows as hold MEASURED_PIXELS."""
     step = max(1, ceil(sqrt(disparity.size / MEASURED_PIXELS)))
     height, width = -(-disparity.shape[0] // step), disparity.shape[1]
 
     def band(first: int, last: int) -> NDArray[np.float32]:
-        found = np.empty((5, (last - first) * width), np.float32)
+        found = np.empty((6, (last - first) * width), np.float32)
         count = _measure_edges(
             disparity, photo, least_edge, least_sigma, MEASURING_REACH_PX, step, first, last, found
         )
@@ -198,7 +208,7 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             # A step blurred by a Gaussian is height / (sqrt(2 pi) sigma) steep at its middle.
             edge = at_up if steepest_up >= steepest_down else -at_down
             sigma = height / (EDGE_SIGMAS * steepest)
-            agrees = 1.0
+            agrees, is_step = 1.0, 1.0
             if sigma < SHARP_PX:
                 # Steep within two pixels: a step, whatever the photo shows.
                 if max(end_up, end_down) > STEEPEST_PLATEAU * steepest:
@@ -206,10 +216,11 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             elif _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
                 agrees = _photo_agrees(photo, x, y, across, down, edge, sigma)
             else:
-                continue
+                is_step = 0.0
             if least_sigma <= sigma < MEASURED_SIGMA_PX:
                 found[0, count], found[1, count] = x + across * edge, y + down * edge
                 found[2, count], found[3, count], found[4, count] = sigma, height, agrees
+                found[5, count] = is_step
                 count += 1
     return count
 
