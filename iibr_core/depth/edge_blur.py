@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.edge_profiles import gradient, height_at, strongest_change, walk
+from iibr_core.depth.ridges import SHARES, structure_blur
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize
@@ -186,6 +187,7 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
     Looks at every step-th row, from the first-th to before the last-th of those.
     """
     width = values.shape[1]
+    shares = np.empty(SHARES)
     count = 0
     for row in range(first, last):
         y = row * step
@@ -198,7 +200,7 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             across, down = across / slope, down / slope
             # Both ends of the ramp, as far as they go.
             up, top, end_up, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, 1.0, np.inf)
-            back, bottom, end_down, steepest_down, at_down = walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
+            _, bottom, end_down, steepest_down, at_down = walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
             steepest = max(steepest_up, steepest_down)
             nearest = at_up if steepest_up >= steepest_down else at_down
             # Only from the steepest pixel of an edge.
@@ -216,7 +218,13 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             elif _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
                 agrees = _photo_agrees(photo, x, y, across, down, edge, sigma)
             else:
+                # A wire is no step, but two.
+                blur, fitted, sides = structure_blur(
+                    values, photo, x + across * up, y + down * up, across, down, reach, least_edge, shares
+                )
                 is_step = 0.0
+                if blur > 0:
+                    sigma, height, agrees, is_step = blur, fitted, sides, 1.0
             if least_sigma <= sigma < MEASURED_SIGMA_PX:
                 found[0, count], found[1, count] = x + across * edge, y + down * edge
                 found[2, count], found[3, count], found[4, count] = sigma, height, agrees

@@ -12,6 +12,7 @@ import numpy as np
 
 from iibr_core.depth.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
 from iibr_core.depth.edge_profiles import gradient, height_at, walk
+from iibr_core.depth.ridges import SHARES, structure_at
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -35,6 +36,10 @@ MOST_EXTENSION = 0.05
 """Limit on those slopes, relative to the ramp's steepest."""
 STEPS_A_SIGMA = 2.5
 """Ramps are walked in steps so fine, or of a pixel."""
+REACH_SIGMAS = 5.0
+"""From a pixel to the ends of its ramp, at most."""
+CREST_SHARE = 0.5
+"""Of the least edge that the map falls beside a crest, from which it may be one."""
 FINE_STRENGTH = 1e-3
 
 
@@ -108,55 +113,120 @@ def _foreground_colour(photo, x, y, across, down, front, behind):
 
 
 @kernel
+def _curvature(values, x, y, apart):
+    """The map's strongest second derivative at a pixel and its direction (x, y), from pixels so far apart."""
+    height, width = values.shape
+    left, right, above, below = max(x - apart, 0), min(x + apart, width - 1), max(y - apart, 0), min(y + apart, height - 1)
+    here, area = values[y, x], 1.0 * apart * apart
+    xx = (values[y, left] - 2.0 * here + values[y, right]) / area
+    yy = (values[above, x] - 2.0 * here + values[below, x]) / area
+    xy = (values[above, left] + values[below, right] - values[above, right] - values[below, left]) / (4.0 * area)
+    mean, half = 0.5 * (xx + yy), sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+    strongest = mean + half if mean >= 0 else mean - half
+    # Of the two ways to write an eigenvector the longer one.
+    across, down = (strongest - yy, xy) if abs(strongest - yy) >= abs(strongest - xx) else (xy, strongest - xx)
+    length = sqrt(across * across + down * down)
+    if not length > 0:
+        return 0.0, 1.0, 0.0
+    return strongest, across / length, down / length
+
+
+@kernel
+def _as_structure(values, photo, x, y, across, down, far, sign, sigma, least_edge, softness, shares):
+    """The pixel's value as part of a ridge (sign 1) or slit (-1), or of what is beside it; NaN where there is none."""
+    height, ground, share = structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares)
+    if height == 0:
+        return np.nan
+    sharp = ground + height if share >= 0.5 else ground
+    return values[y, x] + (1.0 - softness) * (sharp - values[y, x])
+
+
+@kernel
+def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares):
+    """The pixel's value on or near the crest of a ridge or slit; NaN where there is none. (across, down): its slope."""
+    apart = max(int(sigma + 0.5), 1)
+    bend, line_x, line_y = _curvature(values, x, y, apart)
+    # Too straight to be lower by an edge beside it, or too far from where it is level.
+    along = across * line_x + down * line_y
+    if not (abs(bend) * apart * apart >= CREST_SHARE * least_edge and abs(along) < abs(bend) * apart):
+        return np.nan
+    sign = 1.0 if bend < 0 else -1.0
+    far = -along / bend
+    return _as_structure(values, photo, x, y, line_x, line_y, far, sign, sigma, least_edge, softness, shares)
+
+
+@kernel
+def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, shares):
+    """The pixel's value as part of one of the two surfaces of a step along the (unit) direction; as given elsewhere."""
+    here = values[y, x]
+    # Wide ramps are walked in longer steps: all of them take about as many.
+    pace = max(1.0, sigma / STEPS_A_SIGMA)
+    reach = ceil(REACH_SIGMAS * sigma / pace) + 1
+    # Where the ramp ends both ways; its height there.
+    up, top, _, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
+    back, bottom, _, steepest_down, at_down = walk(
+        values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
+    )
+    steepest = max(steepest_up, steepest_down)
+    if top - bottom < least_edge:
+        return here
+    # The step was where the ramp is steepest (px up it from here); its plateaus lie some sigmas to both sides.
+    edge = at_up if steepest_up >= steepest_down else -at_down
+    up, back = min(up, edge + PLATEAU_SIGMAS * sigma), min(back, PLATEAU_SIGMAS * sigma - edge)
+    top = height_at(values, x + across * up, y + down * up)
+    bottom = height_at(values, x - across * back, y - down * back)
+    # Higher than a step of this slope can be after a blur of sigma: a slanted surface. Lower: an exact edge.
+    unit = EDGE_SIGMAS * steepest
+    if not (max(least_edge, SHARP_PX * unit) <= top - bottom <= TOLERANCE * sigma * unit):
+        return here
+    # Where the map returns to the other side's height as soon as it can, there is no plateau, but something thin.
+    middle = 0.5 * (top + bottom)
+    beyond, before = 2 * up - edge + PLATEAU_SIGMAS * sigma, 2 * back + edge + PLATEAU_SIGMAS * sigma
+    if height_at(values, x + across * beyond, y + down * beyond) < middle:
+        value = _as_structure(values, photo, x, y, across, down, up, 1.0, sigma, least_edge, softness, shares)
+        if value == value:
+            return value
+    if height_at(values, x - across * before, y - down * before) > middle:
+        value = _as_structure(values, photo, x, y, across, down, -back, -1.0, sigma, least_edge, softness, shares)
+        if value == value:
+            return value
+    # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
+    limit = MOST_EXTENSION * steepest
+    top = max(_continue_plateau(values, x, y, across, down, up, top, limit), here)
+    bottom = min(_continue_plateau(values, x, y, -across, -down, back, bottom, limit), here)
+    if not top > bottom:
+        return here
+
+    # Where does this pixel belong? By its height on the ramp and by its colour in the photo, ...
+    front = min(up, edge + COLOR_SIGMAS * sigma + 1)
+    behind = min(back, COLOR_SIGMAS * sigma + 1 - edge)
+    colour = _foreground_colour(photo, x, y, across, down, front, behind)
+    # ... steepened about the middle of the ramp; softness near 0 makes a step.
+    place = (here - bottom) / (top - bottom) - 0.5
+    place = (place + COLOR_SHARE * (1.0 - softness) * colour) / softness + 0.5
+    return bottom + (top - bottom) * min(max(place, 0.0), 1.0)
+
+
+@kernel
 def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_row, refined):
     """Rows [first_row, last_row) of the refined map. softness: 0 = steps, 1 = as given."""
     width = values.shape[1]
+    shares = np.empty(SHARES)
     for y in range(first_row, last_row):
         for x in range(width):
-            here = values[y, x]
-            refined[y, x] = here
+            refined[y, x] = values[y, x]
             sigma = sigmas[y // cell, x // cell]
             # Exact edges here, or none.
             if sigma == 0:
                 continue
-            # Wide ramps are walked in longer steps: all of them take about as many.
-            pace = max(1.0, sigma / STEPS_A_SIGMA)
-            reach = ceil(5.0 * sigma / pace) + 1
             across, down = gradient(values, x, y)
+            crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares)
+            if crest == crest:
+                refined[y, x] = crest
+                continue
             slope = sqrt(across * across + down * down)
             # Too flat to belong to an edge: most pixels end here.
-            if not slope * 4 * reach * pace > least_edge:
-                continue
-            across, down = across / slope, down / slope
-            # Where the ramp ends both ways; its height there.
-            up, top, _, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
-            back, bottom, _, steepest_down, at_down = walk(
-                values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
-            )
-            steepest = max(steepest_up, steepest_down)
-            if top - bottom < least_edge:
-                continue
-            # The step was where the ramp is steepest (px up it from here); its plateaus lie some sigmas to both sides.
-            edge = at_up if steepest_up >= steepest_down else -at_down
-            up, back = min(up, edge + PLATEAU_SIGMAS * sigma), min(back, PLATEAU_SIGMAS * sigma - edge)
-            top = height_at(values, x + across * up, y + down * up)
-            bottom = height_at(values, x - across * back, y - down * back)
-            # Higher than a step of this slope can be after a blur of sigma: a slanted surface. Lower: an exact edge.
-            unit = EDGE_SIGMAS * steepest
-            if not (max(least_edge, SHARP_PX * unit) <= top - bottom <= TOLERANCE * sigma * unit):
-                continue
-            # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
-            limit = MOST_EXTENSION * steepest
-            top = max(_continue_plateau(values, x, y, across, down, up, top, limit), here)
-            bottom = min(_continue_plateau(values, x, y, -across, -down, back, bottom, limit), here)
-            if not top > bottom:
-                continue
-
-            # Where does this pixel belong? By its height on the ramp and by its colour in the photo, ...
-            front = min(up, edge + COLOR_SIGMAS * sigma + 1)
-            behind = min(back, COLOR_SIGMAS * sigma + 1 - edge)
-            colour = _foreground_colour(photo, x, y, across, down, front, behind)
-            # ... steepened about the middle of the ramp; softness near 0 makes a step.
-            place = (here - bottom) / (top - bottom) - 0.5
-            place = (place + COLOR_SHARE * (1.0 - softness) * colour) / softness + 0.5
-            refined[y, x] = bottom + (top - bottom) * min(max(place, 0.0), 1.0)
+            if slope * 4 * (REACH_SIGMAS * sigma + 1) > least_edge:
+                refined[y, x] = _as_step(
+                    values, photo, x, y, across / slope, down / slope, sigma, least_edge, softness, shares
+                )

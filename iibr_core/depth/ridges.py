@@ -1,0 +1,223 @@
+"""Thin structures in a blurred map: how high a wire or a slit was before the blur, by its width in the photo.
+
+A blur of the map lowers what is narrower than itself and leaves its volume: the photo knows the width, so the height
+follows. It counts only where the structure so found, blurred again, gives the map that was given.
+"""
+
+from __future__ import annotations
+
+from math import ceil, exp, floor, sqrt
+
+import numpy as np
+
+from iibr_core.depth.edge_profiles import height_at, strongest_change, walk
+from iibr_core.runtime.jit import kernel
+
+SAMPLES_A_PX = 2
+"""Of the photo along the line across a structure."""
+WIDEST_SIGMAS = 4.0
+"""A structure wider than that has a crest as high as it was."""
+BESIDE_SIGMAS = 2.0
+"""So far to both sides of a structure the map is compared with it, blurred again."""
+LEAST_LEFT = 0.25
+"""Of a structure's height, after the blur: lower ones are guesses."""
+MOST_MISFIT = 0.06
+"""Deviation (rms) of the structure, blurred again, from the given map, relative to its height there."""
+SEARCHED_PX = 24
+"""How far from the crest the photo is looked at, at most."""
+SHARES = 2 * SEARCHED_PX * SAMPLES_A_PX + 1
+"""Places looked at."""
+LEAST_SIDE = 0.4
+"""A crest's height over its higher side, relative to that over its lower one, from which it is no step."""
+FLAT_SIDE = 0.15
+"""Change of height beside a structure, relative to its own, up to which nothing else is there."""
+BLURS = 0.65 * 1.15 ** np.arange(14)
+"""Tried (sigma, px) where the blur of a map is measured on a structure."""
+LEAST_CONTRAST = 0.01
+"""Squared distance of colours (sRGB-encoded) from what is beside, below which a structure has no outline."""
+
+
+@kernel
+def _color_at(photo, x, y, c):
+    """A channel of the photo at a real position, bilinear."""
+    height, width = photo.shape[:2]
+    x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
+    left, top = max(min(int(x), width - 2), 0), max(min(int(y), height - 2), 0)
+    right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
+    u, v = x - left, y - top
+    above = photo[top, left, c] * (1.0 - u) + photo[top, right, c] * u
+    below = photo[bottom, left, c] * (1.0 - u) + photo[bottom, right, c] * u
+    return above * (1.0 - v) + below * v
+
+
+@kernel
+def _structure_shares(photo, x, y, across, down, feet, shares):
+    """How much of a structure each place of the line across its crest (x, y) shows, by its colour, into shares (N,).
+
+    Place k lies (k - N // 2) / SAMPLES_A_PX px from the crest; feet: where what is beside the structure begins, before and after, px.
+    Returns first and last place that show any of it; last < first where the photo has no outline of it.
+    """
+    middle = len(shares) // 2
+    # What is beside it, on both sides; the structure's own colour, where it differs most from them.
+    own_at, most = 0.0, 0.0
+    for k in range(-2, 3):
+        at = k / 2.0
+        contrast = 0.0
+        for c in range(3):
+            beside = 0.5 * (
+                _color_at(photo, x - across * feet[0], y - down * feet[0], c)
+                + _color_at(photo, x + across * feet[1], y + down * feet[1], c)
+            )
+            contrast += (_color_at(photo, x + across * at, y + down * at, c) - beside) ** 2
+        if contrast > most:
+            own_at, most = at, contrast
+    for side in (-1, 1):
+        foot, contrast = feet[0] if side < 0 else feet[1], 0.0
+        for c in range(3):
+            beside = _color_at(photo, x + side * across * foot, y + side * down * foot, c)
+            contrast += (_color_at(photo, x + across * own_at, y + down * own_at, c) - beside) ** 2
+        if contrast < LEAST_CONTRAST:
+            return 1, 0
+    shares[:] = 0.0
+    first = last = middle + int(own_at * SAMPLES_A_PX)
+    for side in (-1, 1):
+        foot, k = feet[0] if side < 0 else feet[1], middle + int(own_at * SAMPLES_A_PX)
+        # Outwards, as long as there is any of it.
+        while 0 <= k < len(shares):
+            at = (k - middle) / SAMPLES_A_PX
+            along = total = 0.0
+            for c in range(3):
+                beside = _color_at(photo, x + side * across * foot, y + side * down * foot, c)
+                difference = _color_at(photo, x + across * own_at, y + down * own_at, c) - beside
+                along += (_color_at(photo, x + across * at, y + down * at, c) - beside) * difference
+                total += difference**2
+            # Texture beside it and in it is neither a little of it nor a gap.
+            share = min(max(2.0 * along / total - 0.5, 0.0), 1.0)
+            if share == 0:
+                break
+            shares[k] = share
+            first, last = min(first, k), max(last, k)
+            k += side
+    if first == 0 or last == len(shares) - 1:
+        return 1, 0
+    return first, last
+
+
+@kernel
+def _fit_structure(values, x, y, across, down, shares, first, last, sigma):
+    """Height of a structure over a slanted ground, so that its blur by sigma fits the map: (height, ground, slope,
+    misfit). ground and its slope at (x, y), along the line; misfit inf where it cannot be told.
+    """
+    middle, crest = len(shares) // 2, height_at(values, x, y)
+    spacing = 1.0 / SAMPLES_A_PX
+    begin = floor((first - middle) * spacing - BESIDE_SIGMAS * sigma)
+    end = ceil((last - middle) * spacing + BESIDE_SIGMAS * sigma)
+    # Least squares for ground + slope * t + height * blurred(t).
+    n = t1 = t2 = b0 = b1 = b2 = p0 = p1 = pb = pp = strongest = 0.0
+    for t in range(begin, end + 1):
+        blurred = 0.0
+        for k in range(first, last + 1):
+            away = ((k - middle) * spacing - t) / sigma
+            blurred += shares[k] * exp(-0.5 * away * away)
+        blurred *= spacing / (sqrt(2.0 * np.pi) * sigma)
+        value = height_at(values, x + across * t, y + down * t) - crest
+        n, t1, t2 = n + 1.0, t1 + t, t2 + t * t
+        b0, b1, b2 = b0 + blurred, b1 + blurred * t, b2 + blurred * blurred
+        p0, p1, pb, pp = p0 + value, p1 + value * t, pb + value * blurred, pp + value * value
+        strongest = max(strongest, blurred)
+    # Both without their own line over t; what remains of the map is explained by what remains of the structure.
+    spread = t2 - t1 * t1 / n
+    line_b, line_p = (b1 - t1 * b0 / n) / spread, (p1 - t1 * p0 / n) / spread
+    rest_b = b2 - b0 * b0 / n - line_b * line_b * spread
+    rest_pb = pb - p0 * b0 / n - line_b * line_p * spread
+    rest_p = pp - p0 * p0 / n - line_p * line_p * spread
+    if not (rest_b > 1e-6 and strongest >= LEAST_LEFT):
+        return 0.0, 0.0, 0.0, np.inf
+    height = rest_pb / rest_b
+    slope = line_p - height * line_b
+    ground = (p0 - height * b0 - slope * t1) / n
+    misfit = sqrt(max(rest_p - height * rest_pb, 0.0) / n) / max(abs(height) * strongest, 1e-30)
+    return height, ground + crest, slope, misfit
+
+
+@kernel
+def _crest(values, x, y, across, down, sign):
+    """How far along the line the highest (sign 1) or lowest (-1) place within 2 px lies."""
+    best, highest = 0.0, sign * height_at(values, x, y)
+    for k in range(-4, 5):
+        height = sign * height_at(values, x + across * k / 2.0, y + down * k / 2.0)
+        if height > highest:
+            best, highest = k / 2.0, height
+    return best
+
+
+@kernel
+def _feet(values, x, y, across, down, sign, reach, least_edge):
+    """Where a ridge (sign 1) or slit (-1) with its crest at (x, y) ends before and after, px; 0, 0 if it is none.
+
+    Both sides must be lower than the crest by least_edge, and not much higher than each other.
+    """
+    crest = height_at(values, x, y)
+    before, low, _, _, _ = walk(values, x, y, sign * across, sign * down, -sign, reach, 1.0, np.inf)
+    after, high, _, _, _ = walk(values, x, y, -sign * across, -sign * down, -sign, reach, 1.0, np.inf)
+    drops = sign * (crest - low), sign * (crest - high)
+    if not (min(drops) >= max(least_edge, LEAST_SIDE * max(drops)) and min(before, after) > 0):
+        return 0.0, 0.0
+    return before, after
+
+
+@kernel
+def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares):
+    """What the pixel (x, y) is to a ridge (sign 1) or slit (-1) whose crest lies about `far` px along the line.
+
+    Returns (its height, height of the ground, share of the pixel it covers); a height of 0 where there is none.
+    """
+    far += _crest(values, x + across * far, y + down * far, across, down, sign)
+    crest_x, crest_y = x + across * far, y + down * far
+    reach = ceil((BESIDE_SIGMAS + 0.5 + WIDEST_SIGMAS / 2) * sigma)
+    feet = _feet(values, crest_x, crest_y, across, down, sign, min(reach, SEARCHED_PX - 4), least_edge)
+    if feet[0] == 0:
+        return 0.0, 0.0, 0.0
+    first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, shares)
+    if not 0 <= last - first <= (WIDEST_SIGMAS * sigma + 1) * SAMPLES_A_PX:
+        return 0.0, 0.0, 0.0
+    height, ground, slope, misfit = _fit_structure(values, crest_x, crest_y, across, down, shares, first, last, sigma)
+    if not (misfit <= MOST_MISFIT and sign * height > 0):
+        return 0.0, 0.0, 0.0
+    place = len(shares) // 2 - far * SAMPLES_A_PX
+    k = min(max(floor(place + 0.5), 0), len(shares) - 1)
+    return height, ground - slope * far, shares[k]
+
+
+@kernel
+def structure_blur(values, photo, x, y, across, down, reach, least_edge, shares):
+    """The blur of a ridge whose crest lies about (x, y): (sigma, height, share of sides where the photo agrees).
+
+    Sigma is 0 where it may as well be a hill: its sides are not flat, or no blur makes it of what the photo shows.
+    """
+    far = _crest(values, x, y, across, down, 1.0)
+    x, y = x + across * far, y + down * far
+    feet = _feet(values, x, y, across, down, 1.0, min(reach, SEARCHED_PX - 4), least_edge)
+    if feet[0] == 0:
+        return 0.0, 0.0, 0.0
+    crest = height_at(values, x, y)
+    for side in (-1, 1):
+        foot = feet[0] if side < 0 else feet[1]
+        level = height_at(values, x + side * foot * across, y + side * foot * down)
+        beyond = height_at(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down)
+        if not abs(beyond - level) <= FLAT_SIDE * (crest - level):
+            return 0.0, 0.0, 0.0
+    first, last = _structure_shares(photo, x, y, across, down, feet, shares)
+    best, sigma, height = MOST_MISFIT, 0.0, 0.0
+    if first <= last:
+        for blur in BLURS:
+            fitted, _, _, misfit = _fit_structure(values, x, y, across, down, shares, first, last, blur)
+            if misfit < best and fitted > 0:
+                best, sigma, height = misfit, blur, fitted
+    # Both outlines of it stand out from what the photo shows beside it.
+    agrees = 0.0
+    for side in (-1, 1):
+        foot = feet[0] if side < 0 else feet[1]
+        outline = strongest_change(photo, x, y, side * across, side * down, 0.0, foot)
+        agrees += 0.5 * (outline > strongest_change(photo, x, y, side * across, side * down, foot + 1, 2 * foot + 1))
+    return sigma, height, agrees
