@@ -11,7 +11,7 @@ from math import ceil, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.edge_profiles import gradient, height_at, strongest_change, walk
+from iibr_core.depth.edge_profiles import gradient, height_at, is_inside, strongest_change, walk
 from iibr_core.depth.ridges import SHARES, structure_blur
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
@@ -49,14 +49,14 @@ CHANCE = 0.5
 """Share of shoulders at which any photo changes less than in the middle of a slope."""
 CHANCE_VARIANCE = 1 / 6
 """Of that share of two shoulders: three changes in any order."""
-CERTAINTY = 2.5
+CERTAINTY = 2.0
 """Standard deviations above chance from which the photo is believed."""
 LIKELY = 0.55
 """Share from which it is believed of a place, where it is sure of edges as soft as these all over the map."""
 MOST_EDGES = 4096
 LEAST_STEPS = 0.2
 """Share of soft edges with flat shoulders, among all that are as soft, from which they are steps; hills have few."""
-LEAST_SOFT = 0.1
+LEAST_SOFT = 0.2
 """A map of which a smaller share of edges is soft, is exact."""
 CLEARLY_SOFT_PX = 0.8
 
@@ -99,7 +99,7 @@ def _sigma_at(edges: NDArray[np.float32], x: float, y: float) -> float:
     edges = edges[:, np.argsort(away, kind="stable")]
     steps = edges[:, edges[5] > 0]
     sigma = _weighted_median(steps[2, :NEAREST_EDGES], steps[3, :NEAREST_EDGES])
-    if sigma < SHARP_PX:
+    if sigma < CLEARLY_SOFT_PX:
         return 0.0
     # Only edges about as soft as these tell whether they are edges.
     here = _as_soft_as(sigma, edges[:, :WITNESSES])
@@ -238,6 +238,9 @@ def _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
     near, far = SHOULDERS[0] * sigma, SHOULDERS[1] * sigma
     limit = STEEPEST_SHOULDER * steepest * (far - near)
     for sign in (-1.0, 1.0):
+        # Outside, pixels of the border go on: as flat as nothing else is.
+        if not is_inside(values, x + across * (edge + sign * far), y + down * (edge + sign * far)):
+            return False
         begin = height_at(values, x + across * (edge + sign * near), y + down * (edge + sign * near))
         end = height_at(values, x + across * (edge + sign * far), y + down * (edge + sign * far))
         if not abs(end - begin) <= limit:

@@ -26,6 +26,12 @@ def height_at(values, x, y):
 
 
 @kernel
+def is_inside(values, x, y):
+    """Whether a real position lies between the centres of the map's outermost pixels."""
+    return 0 <= x <= values.shape[1] - 1 and 0 <= y <= values.shape[0] - 1
+
+
+@kernel
 def gradient(values, x, y):
     """Gradient (x, y) of the map about a pixel, over 5 x 5."""
     height, width = values.shape
@@ -72,7 +78,7 @@ def strongest_change(photo, x, y, across, down, first, last):
     """Greatest squared change of the photo's colour over 2 px of the line through (x, y), between those distances."""
     height, width = photo.shape[:2]
     strongest = 0.0
-    for k in range(int(floor(last - first)) + 1):
+    for k in range(floor(last - first) + 1):
         at = first + k
         # The pixels nearest to one pixel before and one after.
         x0 = min(max(floor(x + across * (at - 1) + 0.5), 0), width - 1)

@@ -22,6 +22,8 @@ LEAST_EDGE = 0.03
 """Lower steps are left alone: share of the map's range."""
 TOLERANCE = 1.5
 """A ramp may be longer than the blur makes it by this factor; longer ones are surfaces."""
+STEEPEST_END = 0.4
+"""Of a ramp's steepest slope, at its ends."""
 PLATEAU_SIGMAS = 2.0
 """From a ramp's steepest place to its plateaus, at most."""
 COLOR_SIGMAS = 1.0
@@ -163,12 +165,13 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
     pace = max(1.0, sigma / STEPS_A_SIGMA)
     reach = ceil(REACH_SIGMAS * sigma / pace) + 1
     # Where the ramp ends both ways; its height there.
-    up, top, _, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
-    back, bottom, _, steepest_down, at_down = walk(
+    up, top, end_up, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
+    back, bottom, end_down, steepest_down, at_down = walk(
         values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
     )
     steepest = max(steepest_up, steepest_down)
-    if top - bottom < least_edge:
+    # Where it still rises like this so far from its middle, it is a surface.
+    if top - bottom < least_edge or max(end_up, end_down) > STEEPEST_END * steepest:
         return here
     # The step was where the ramp is steepest (px up it from here); its plateaus lie some sigmas to both sides.
     edge = at_up if steepest_up >= steepest_down else -at_down

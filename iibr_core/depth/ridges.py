@@ -10,7 +10,7 @@ from math import ceil, exp, floor, sqrt
 
 import numpy as np
 
-from iibr_core.depth.edge_profiles import height_at, strongest_change, walk
+from iibr_core.depth.edge_profiles import height_at, is_inside, strongest_change, walk
 from iibr_core.runtime.jit import kernel
 
 SAMPLES_A_PX = 2
@@ -143,12 +143,16 @@ def _fit_structure(values, x, y, across, down, shares, first, last, sigma):
 @kernel
 def _crest(values, x, y, across, down, sign):
     """How far along the line the highest (sign 1) or lowest (-1) place within 2 px lies."""
-    best, highest = 0.0, sign * height_at(values, x, y)
+    first = last = 0.0
+    highest = -np.inf
     for k in range(-4, 5):
         height = sign * height_at(values, x + across * k / 2.0, y + down * k / 2.0)
         if height > highest:
-            best, highest = k / 2.0, height
-    return best
+            first, highest = k / 2.0, height
+        # Between two pixels as high as each other lies the crest.
+        if height >= highest:
+            last = k / 2.0
+    return 0.5 * (first + last)
 
 
 @kernel
@@ -203,6 +207,9 @@ def structure_blur(values, photo, x, y, across, down, reach, least_edge, shares)
     crest = height_at(values, x, y)
     for side in (-1, 1):
         foot = feet[0] if side < 0 else feet[1]
+        # Outside, pixels of the border go on: as flat as nothing else is.
+        if not is_inside(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down):
+            return 0.0, 0.0, 0.0
         level = height_at(values, x + side * foot * across, y + side * foot * down)
         beyond = height_at(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down)
         if not abs(beyond - level) <= FLAT_SIDE * (crest - level):
