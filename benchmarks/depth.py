@@ -20,8 +20,9 @@ import numpy as np
 from benchmarks.provenance import made_by
 from benchmarks.speed.variants import bench_scenes
 from iibr_core.color import encoded_from_stored
+from iibr_core.depth.edge_blur import measure_edge_blur
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.depth.refine import edge_blur_px, refine
+from iibr_core.depth.refine import refine
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
@@ -176,8 +177,14 @@ def guess_table(data: Path) -> Iterator[str]:
         flat = float(np.mean([bounded_psnr(photo.pixels, view) for view in truth.values()]))
         holds = f"error {yes(errors[0] < min(errors[1:]))}, PSNR {yes(ratios[0] > flat)}"
         cells = [f"{error:.2f}" for error in errors] + [f"{ratio:.2f}" for ratio in (*ratios, flat)]
-        yield f"| {scene.name} | {' | '.join(cells)} | {edge_blur_px(guess):.1f} | {holds} |"
+        yield f"| {scene.name} | {' | '.join(cells)} | {measured_blur(photo.pixels, guess):.1f} | {holds} |"
     yield from ("", *NOTE)
+
+
+def measured_blur(photo: FloatImage, disparity: FloatImage) -> float:
+    """Median (px) over the parts of a map that refinement works on; 0 if there are none."""
+    sigmas = measure_edge_blur(photo, disparity).sigma_px
+    return float(np.median(sigmas[sigmas > 0])) if sigmas.any() else 0.0
 
 
 def fit_to(values: FloatImage, true: FloatImage) -> FloatImage:

@@ -37,12 +37,14 @@ STEEPEST_SHOULDER = 0.15
 CHANGE_NOISE = 0.003
 """Squared change of colour (sRGB-encoded) that is no edge of the photo."""
 CELL_PX = 32
-CELLS = 24
+CELLS = 16
 """At most so many cells along each side of the map."""
 NEAREST_EDGES = 64
 """Whose median is the blur of a cell."""
 WITNESSES = 512
 """Edges at which the photo is asked whether they are any."""
+ALIKE = 1.5
+"""Up to this factor edges are as soft as each other."""
 WITNESS_PX = 16
 """Edges nearer to each other show the same of the photo: they count as one."""
 CHANCE = 0.5
@@ -96,21 +98,25 @@ def extent(disparity: FloatImage) -> float:
 def _sigma_at(edges: NDArray[np.float32], x: float, y: float) -> float:
     """The blur about a place; 0 where the nearest edges are exact, or may as well be slopes."""
     away = np.maximum(np.abs(edges[0] - x), np.abs(edges[1] - y))
-    edges = edges[:, np.argsort(away, kind="stable")]
-    steps = edges[:, edges[5] > 0]
+    near = np.argpartition(away, 2 * WITNESSES)[: 2 * WITNESSES] if len(away) > 2 * WITNESSES else np.arange(len(away))
+    nearest = edges[:, near[np.argsort(away[near], kind="stable")]]
+    steps = nearest[:, nearest[5] > 0][:, :WITNESSES]
     sigma = _weighted_median(steps[2, :NEAREST_EDGES], steps[3, :NEAREST_EDGES])
     if sigma < CLEARLY_SOFT_PX:
         return 0.0
     # Only edges about as soft as these tell whether they are edges.
-    here = _as_soft_as(sigma, edges[:, :WITNESSES])
-    agreed = here[5].mean() >= LEAST_STEPS if here.shape[1] else False
-    here = _as_soft_as(sigma, steps[:, :WITNESSES])
-    agreed = agreed and (_photo_is_sure(here) or here[4].mean() >= LIKELY and _photo_is_sure(_as_soft_as(sigma, steps)))
-    return min(sigma, WIDEST_SIGMA_PX) if agreed else 0.0
+    around, here = _as_soft_as(sigma, nearest[:, :WITNESSES]), _as_soft_as(sigma, steps)
+    if not around.shape[1] or around[5].mean() < LEAST_STEPS:
+        return 0.0
+    if not _photo_is_sure(here):
+        anywhere = _as_soft_as(sigma, edges[:, edges[5] > 0])
+        if here[4].mean() < LIKELY or not _photo_is_sure(anywhere):
+            return 0.0
+    return min(sigma, WIDEST_SIGMA_PX)
 
 
 def _as_soft_as(sigma: float, edges: NDArray[np.float32]) -> NDArray[np.float32]:
-    return edges[:, np.abs(np.log(edges[2] / sigma)) < np.log(1.5)]
+    return edges[:, (edges[2] < ALIKE * sigma) & (edges[2] > sigma / ALIKE)]
 
 
 def _soft_share(edges: NDArray[np.float32]) -> float:
@@ -123,7 +129,7 @@ def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
     """Whether the photo changes at so many of them as chance would hardly have it."""
     if not edges.shape[1]:
         return False
-    places = len(np.unique(edges[:2] // WITNESS_PX, axis=1).T)
+    places = len(np.unique(edges[0] // WITNESS_PX + (edges[1] // WITNESS_PX) * 65536))
     return bool(edges[4].mean() >= CHANCE + CERTAINTY * sqrt(CHANCE_VARIANCE / places))
 
 
@@ -136,7 +142,7 @@ def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
     found: list[NDArray[np.float32]] = [np.empty((6, 0), np.float32)]
     scale, least_sigma = 1, 0.0
     while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * MEASURING_REACH_PX):
-        edges = _edges_of_level(photo, disparity, least_edge, least_sigma, should_stop)
+        edges = _edges_of_level(photo, disparity, least_edge, least_sigma, MEASURED_PIXELS // scale, should_stop)
         edges[:2] = (edges[:2] + 0.5) * scale - 0.5
         edges[2] *= scale
         found.append(edges)
@@ -149,17 +155,20 @@ def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
 
 
 def _edges_of_level(
-    photo: FloatImage, disparity: FloatImage, least_edge: float, least_sigma: float, should_stop: ShouldStop
+    photo: FloatImage,
+    disparity: FloatImage,
+    least_edge: float,
+    least_sigma: float,
+    pixels: int,
+    should_stop: ShouldStop,
 ) -> NDArray[np.float32]:
-    """(6, N), see `_edges`; looks at as many rows as hold MEASURED_PIXELS."""
-    step = max(1, ceil(sqrt(disparity.size / MEASURED_PIXELS)))
+    """(6, N), see `_edges`; looks at as many rows as hold so many pixels."""
+    step = max(1, ceil(disparity.size / pixels))
     height, width = -(-disparity.shape[0] // step), disparity.shape[1]
 
     def band(first: int, last: int) -> NDArray[np.float32]:
         found = np.empty((6, (last - first) * width), np.float32)
-        count = _measure_edges(
-            disparity, photo, least_edge, least_sigma, MEASURING_REACH_PX, step, first, last, found
-        )
+        count = _measure_edges(disparity, photo, least_edge, least_sigma, MEASURING_REACH_PX, step, first, last, found)
         return found[:, :count].copy()
 
     return np.concatenate(in_bands(band, ImageSize(height, width), should_stop), axis=1)
@@ -187,7 +196,7 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
     Looks at every step-th row, from the first-th to before the last-th of those.
     """
     width = values.shape[1]
-    shares = np.empty(SHARES)
+    shares, taps = np.empty(SHARES), np.empty(SHARES)
     count = 0
     for row in range(first, last):
         y = row * step
@@ -200,7 +209,7 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             across, down = across / slope, down / slope
             # Both ends of the ramp, as far as they go.
             up, top, end_up, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, 1.0, np.inf)
-            _, bottom, end_down, steepest_down, at_down = walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
+            back, bottom, end_down, steepest_down, at_down = walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
             steepest = max(steepest_up, steepest_down)
             nearest = at_up if steepest_up >= steepest_down else at_down
             # Only from the steepest pixel of an edge.
@@ -218,11 +227,23 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             elif _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
                 agrees = _photo_agrees(photo, x, y, across, down, edge, sigma)
             else:
-                # A wire is no step, but two.
-                blur, fitted, sides = structure_blur(
-                    values, photo, x + across * up, y + down * up, across, down, reach, least_edge, shares
-                )
-                is_step = 0.0
+                # A wire or a slit is no step, but two.
+                blur = is_step = 0.0
+                for sign in (1.0, -1.0):
+                    far = up if sign > 0 else -back
+                    if blur == 0:
+                        blur, fitted, sides = structure_blur(
+                            values,
+                            photo,
+                            x + across * far,
+                            y + down * far,
+                            across,
+                            down,
+                            sign,
+                            least_edge,
+                            shares,
+                            taps,
+                        )
                 if blur > 0:
                     sigma, height, agrees, is_step = blur, fitted, sides, 1.0
             if least_sigma <= sigma < MEASURED_SIGMA_PX:

@@ -118,7 +118,12 @@ def _foreground_colour(photo, x, y, across, down, front, behind):
 def _curvature(values, x, y, apart):
     """The map's strongest second derivative at a pixel and its direction (x, y), from pixels so far apart."""
     height, width = values.shape
-    left, right, above, below = max(x - apart, 0), min(x + apart, width - 1), max(y - apart, 0), min(y + apart, height - 1)
+    left, right, above, below = (
+        max(x - apart, 0),
+        min(x + apart, width - 1),
+        max(y - apart, 0),
+        min(y + apart, height - 1),
+    )
     here, area = values[y, x], 1.0 * apart * apart
     xx = (values[y, left] - 2.0 * here + values[y, right]) / area
     yy = (values[above, x] - 2.0 * here + values[below, x]) / area
@@ -134,9 +139,9 @@ def _curvature(values, x, y, apart):
 
 
 @kernel
-def _as_structure(values, photo, x, y, across, down, far, sign, sigma, least_edge, softness, shares):
+def _as_structure(values, photo, x, y, across, down, far, sign, sigma, least_edge, softness, shares, taps):
     """The pixel's value as part of a ridge (sign 1) or slit (-1), or of what is beside it; NaN where there is none."""
-    height, ground, share = structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares)
+    height, ground, share = structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares, taps)
     if height == 0:
         return np.nan
     sharp = ground + height if share >= 0.5 else ground
@@ -144,7 +149,7 @@ def _as_structure(values, photo, x, y, across, down, far, sign, sigma, least_edg
 
 
 @kernel
-def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares):
+def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps):
     """The pixel's value on or near the crest of a ridge or slit; NaN where there is none. (across, down): its slope."""
     apart = max(int(sigma + 0.5), 1)
     bend, line_x, line_y = _curvature(values, x, y, apart)
@@ -154,11 +159,11 @@ def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, sh
         return np.nan
     sign = 1.0 if bend < 0 else -1.0
     far = -along / bend
-    return _as_structure(values, photo, x, y, line_x, line_y, far, sign, sigma, least_edge, softness, shares)
+    return _as_structure(values, photo, x, y, line_x, line_y, far, sign, sigma, least_edge, softness, shares, taps)
 
 
 @kernel
-def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, shares):
+def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps):
     """The pixel's value as part of one of the two surfaces of a step along the (unit) direction; as given elsewhere."""
     here = values[y, x]
     # Wide ramps are walked in longer steps: all of them take about as many.
@@ -186,11 +191,11 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
     middle = 0.5 * (top + bottom)
     beyond, before = 2 * up - edge + PLATEAU_SIGMAS * sigma, 2 * back + edge + PLATEAU_SIGMAS * sigma
     if height_at(values, x + across * beyond, y + down * beyond) < middle:
-        value = _as_structure(values, photo, x, y, across, down, up, 1.0, sigma, least_edge, softness, shares)
+        value = _as_structure(values, photo, x, y, across, down, up, 1.0, sigma, least_edge, softness, shares, taps)
         if value == value:
             return value
     if height_at(values, x - across * before, y - down * before) > middle:
-        value = _as_structure(values, photo, x, y, across, down, -back, -1.0, sigma, least_edge, softness, shares)
+        value = _as_structure(values, photo, x, y, across, down, -back, -1.0, sigma, least_edge, softness, shares, taps)
         if value == value:
             return value
     # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
@@ -214,7 +219,7 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
 def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_row, refined):
     """Rows [first_row, last_row) of the refined map. softness: 0 = steps, 1 = as given."""
     width = values.shape[1]
-    shares = np.empty(SHARES)
+    shares, taps = np.empty(SHARES), np.empty(SHARES)
     for y in range(first_row, last_row):
         for x in range(width):
             refined[y, x] = values[y, x]
@@ -223,7 +228,7 @@ def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_r
             if sigma == 0:
                 continue
             across, down = gradient(values, x, y)
-            crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares)
+            crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps)
             if crest == crest:
                 refined[y, x] = crest
                 continue
@@ -231,5 +236,5 @@ def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_r
             # Too flat to belong to an edge: most pixels end here.
             if slope * 4 * (REACH_SIGMAS * sigma + 1) > least_edge:
                 refined[y, x] = _as_step(
-                    values, photo, x, y, across / slope, down / slope, sigma, least_edge, softness, shares
+                    values, photo, x, y, across / slope, down / slope, sigma, least_edge, softness, shares, taps
                 )

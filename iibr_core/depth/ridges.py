@@ -23,6 +23,8 @@ LEAST_LEFT = 0.25
 """Of a structure's height, after the blur: lower ones are guesses."""
 MOST_MISFIT = 0.06
 """Deviation (rms) of the structure, blurred again, from the given map, relative to its height there."""
+MOST_OFFSET = 2
+"""Of a structure in the map against the photo, in places."""
 SEARCHED_PX = 24
 """How far from the crest the photo is looked at, at most."""
 SHARES = 2 * SEARCHED_PX * SAMPLES_A_PX + 1
@@ -33,66 +35,69 @@ FLAT_SIDE = 0.15
 """Change of height beside a structure, relative to its own, up to which nothing else is there."""
 BLURS = 0.65 * 1.15 ** np.arange(14)
 """Tried (sigma, px) where the blur of a map is measured on a structure."""
+REACH_SIGMAS = 4.0
+"""Where a Gaussian ends."""
 LEAST_CONTRAST = 0.01
 """Squared distance of colours (sRGB-encoded) from what is beside, below which a structure has no outline."""
 
 
 @kernel
-def _color_at(photo, x, y, c):
-    """A channel of the photo at a real position, bilinear."""
+def _color_at(photo, x, y):
+    """The photo's colour at a real position, bilinear."""
     height, width = photo.shape[:2]
     x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
-    left, top = max(min(int(x), width - 2), 0), max(min(int(y), height - 2), 0)
+    left, top = int(x), int(y)
     right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
     u, v = x - left, y - top
-    above = photo[top, left, c] * (1.0 - u) + photo[top, right, c] * u
-    below = photo[bottom, left, c] * (1.0 - u) + photo[bottom, right, c] * u
-    return above * (1.0 - v) + below * v
+    a, b, c, d = (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v
+    red = a * photo[top, left, 0] + b * photo[top, right, 0] + c * photo[bottom, left, 0] + d * photo[bottom, right, 0]
+    green = (
+        a * photo[top, left, 1] + b * photo[top, right, 1] + c * photo[bottom, left, 1] + d * photo[bottom, right, 1]
+    )
+    blue = a * photo[top, left, 2] + b * photo[top, right, 2] + c * photo[bottom, left, 2] + d * photo[bottom, right, 2]
+    return red, green, blue
+
+
+@kernel
+def _product(a, b, origin):
+    """Scalar product of two colours, seen from a third."""
+    total = 0.0
+    for c in range(3):
+        total += (a[c] - origin[c]) * (b[c] - origin[c])
+    return total
 
 
 @kernel
 def _structure_shares(photo, x, y, across, down, feet, shares):
     """How much of a structure each place of the line across its crest (x, y) shows, by its colour, into shares (N,).
 
-    Place k lies (k - N // 2) / SAMPLES_A_PX px from the crest; feet: where what is beside the structure begins, before and after, px.
-    Returns first and last place that show any of it; last < first where the photo has no outline of it.
+    Place k lies (k - N // 2) / SAMPLES_A_PX px from the crest; feet: where what is beside the structure begins on
+    both sides, px. Returns first and last place that show any of it; last < first where the photo has no outline of it.
     """
-    middle = len(shares) // 2
-    # What is beside it, on both sides; the structure's own colour, where it differs most from them.
-    own_at, most = 0.0, 0.0
+    before = _color_at(photo, x - across * feet[0], y - down * feet[0])
+    after = _color_at(photo, x + across * feet[1], y + down * feet[1])
+    # The structure's own colour: near its crest, where it differs most from both.
+    own, own_at, most = before, 0, 0.0
     for k in range(-2, 3):
-        at = k / 2.0
-        contrast = 0.0
-        for c in range(3):
-            beside = 0.5 * (
-                _color_at(photo, x - across * feet[0], y - down * feet[0], c)
-                + _color_at(photo, x + across * feet[1], y + down * feet[1], c)
-            )
-            contrast += (_color_at(photo, x + across * at, y + down * at, c) - beside) ** 2
+        color = _color_at(photo, x + across * k / SAMPLES_A_PX, y + down * k / SAMPLES_A_PX)
+        contrast = min(_product(color, color, before), _product(color, color, after))
         if contrast > most:
-            own_at, most = at, contrast
-    for side in (-1, 1):
-        foot, contrast = feet[0] if side < 0 else feet[1], 0.0
-        for c in range(3):
-            beside = _color_at(photo, x + side * across * foot, y + side * down * foot, c)
-            contrast += (_color_at(photo, x + across * own_at, y + down * own_at, c) - beside) ** 2
-        if contrast < LEAST_CONTRAST:
-            return 1, 0
+            own, own_at, most = color, k, contrast
+    if most < LEAST_CONTRAST:
+        return 1, 0
     shares[:] = 0.0
-    first = last = middle + int(own_at * SAMPLES_A_PX)
+    middle = len(shares) // 2
+    first = last = middle + own_at
     for side in (-1, 1):
-        foot, k = feet[0] if side < 0 else feet[1], middle + int(own_at * SAMPLES_A_PX)
+        beside = before if side < 0 else after
+        whole = _product(own, own, beside)
+        k = middle + own_at
         # Outwards, as long as there is any of it.
         while 0 <= k < len(shares):
             at = (k - middle) / SAMPLES_A_PX
-            along = total = 0.0
-            for c in range(3):
-                beside = _color_at(photo, x + side * across * foot, y + side * down * foot, c)
-                difference = _color_at(photo, x + across * own_at, y + down * own_at, c) - beside
-                along += (_color_at(photo, x + across * at, y + down * at, c) - beside) * difference
-                total += difference**2
+            along = _product(_color_at(photo, x + across * at, y + down * at), own, beside)
             # Texture beside it and in it is neither a little of it nor a gap.
-            share = min(max(2.0 * along / total - 0.5, 0.0), 1.0)
+            share = min(max(2.0 * along / whole - 0.5, 0.0), 1.0)
             if share == 0:
                 break
             shares[k] = share
@@ -104,7 +109,24 @@ def _structure_shares(photo, x, y, across, down, feet, shares):
 
 
 @kernel
-def _fit_structure(values, x, y, across, down, shares, first, last, sigma):
+def _offset(values, x, y, across, down, feet, shares, first, last):
+    """How many places the map shows a structure after where the photo does, at most MOST_OFFSET."""
+    total = moment = 0.0
+    low = height_at(values, x - across * feet[0], y - down * feet[0])
+    high = height_at(values, x + across * feet[1], y + down * feet[1])
+    for t in range(-int(feet[0]), int(feet[1]) + 1):
+        ground = low + (high - low) * (t + feet[0]) / (feet[0] + feet[1])
+        height = height_at(values, x + across * t, y + down * t) - ground
+        total, moment = total + height, moment + height * t
+    shown = shown_moment = 0.0
+    for k in range(first, last + 1):
+        shown, shown_moment = shown + shares[k], shown_moment + shares[k] * (k - len(shares) // 2)
+    offset = SAMPLES_A_PX * moment / total - shown_moment / shown
+    return floor(min(max(offset, -MOST_OFFSET), MOST_OFFSET) + 0.5) if offset == offset else 0
+
+
+@kernel
+def _fit_structure(values, x, y, across, down, shares, first, last, offset, sigma, taps):
     """Height of a structure over a slanted ground, so that its blur by sigma fits the map: (height, ground, slope,
     misfit). ground and its slope at (x, y), along the line; misfit inf where it cannot be told.
     """
@@ -112,14 +134,18 @@ def _fit_structure(values, x, y, across, down, shares, first, last, sigma):
     spacing = 1.0 / SAMPLES_A_PX
     begin = floor((first - middle) * spacing - BESIDE_SIGMAS * sigma)
     end = ceil((last - middle) * spacing + BESIDE_SIGMAS * sigma)
+    # The blur, by distance in places.
+    scale = spacing / (sqrt(2.0 * np.pi) * sigma)
+    reach = min(int(REACH_SIGMAS * sigma * SAMPLES_A_PX) + 1, len(taps))
+    for k in range(reach):
+        taps[k] = scale * exp(-0.5 * (k * spacing / sigma) ** 2)
     # Least squares for ground + slope * t + height * blurred(t).
     n = t1 = t2 = b0 = b1 = b2 = p0 = p1 = pb = pp = strongest = 0.0
-    for t in range(begin, end + 1):
+    for t in range(begin, end + 1, max(int(sigma / 2.0), 1)):
         blurred = 0.0
-        for k in range(first, last + 1):
-            away = ((k - middle) * spacing - t) / sigma
-            blurred += shares[k] * exp(-0.5 * away * away)
-        blurred *= spacing / (sqrt(2.0 * np.pi) * sigma)
+        place = middle + t * SAMPLES_A_PX - offset
+        for k in range(max(first, place - reach + 1), min(last, place + reach - 1) + 1):
+            blurred += shares[k] * taps[abs(k - place)]
         value = height_at(values, x + across * t, y + down * t) - crest
         n, t1, t2 = n + 1.0, t1 + t, t2 + t * t
         b0, b1, b2 = b0 + blurred, b1 + blurred * t, b2 + blurred * blurred
@@ -171,13 +197,20 @@ def _feet(values, x, y, across, down, sign, reach, least_edge):
 
 
 @kernel
-def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares):
+def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares, taps):
     """What the pixel (x, y) is to a ridge (sign 1) or slit (-1) whose crest lies about `far` px along the line.
 
     Returns (its height, height of the ground, share of the pixel it covers); a height of 0 where there is none.
     """
-    far += _crest(values, x + across * far, y + down * far, across, down, sign)
     crest_x, crest_y = x + across * far, y + down * far
+    # Nearly always there is none, and this tells: lower on both sides.
+    beside, crest = 0.5 * (BESIDE_SIGMAS + WIDEST_SIGMAS - 1) * sigma, height_at(values, crest_x, crest_y)
+    before = height_at(values, crest_x - across * beside, crest_y - down * beside)
+    after = height_at(values, crest_x + across * beside, crest_y + down * beside)
+    if not min(sign * (crest - before), sign * (crest - after)) > 0.5 * least_edge:
+        return 0.0, 0.0, 0.0
+    found = _crest(values, crest_x, crest_y, across, down, sign)
+    far, crest_x, crest_y = far + found, crest_x + across * found, crest_y + down * found
     reach = ceil((BESIDE_SIGMAS + 0.5 + WIDEST_SIGMAS / 2) * sigma)
     feet = _feet(values, crest_x, crest_y, across, down, sign, min(reach, SEARCHED_PX - 4), least_edge)
     if feet[0] == 0:
@@ -185,7 +218,10 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, shares)
     if not 0 <= last - first <= (WIDEST_SIGMAS * sigma + 1) * SAMPLES_A_PX:
         return 0.0, 0.0, 0.0
-    height, ground, slope, misfit = _fit_structure(values, crest_x, crest_y, across, down, shares, first, last, sigma)
+    offset = _offset(values, crest_x, crest_y, across, down, feet, shares, first, last)
+    height, ground, slope, misfit = _fit_structure(
+        values, crest_x, crest_y, across, down, shares, first, last, offset, sigma, taps
+    )
     if not (misfit <= MOST_MISFIT and sign * height > 0):
         return 0.0, 0.0, 0.0
     place = len(shares) // 2 - far * SAMPLES_A_PX
@@ -194,14 +230,14 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
 
 
 @kernel
-def structure_blur(values, photo, x, y, across, down, reach, least_edge, shares):
-    """The blur of a ridge whose crest lies about (x, y): (sigma, height, share of sides where the photo agrees).
+def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, taps):
+    """The blur of a ridge (sign 1) or slit (-1) with its crest about (x, y): (sigma, height, photo's agreement, 0..1).
 
     Sigma is 0 where it may as well be a hill: its sides are not flat, or no blur makes it of what the photo shows.
     """
-    far = _crest(values, x, y, across, down, 1.0)
+    far = _crest(values, x, y, across, down, sign)
     x, y = x + across * far, y + down * far
-    feet = _feet(values, x, y, across, down, 1.0, min(reach, SEARCHED_PX - 4), least_edge)
+    feet = _feet(values, x, y, across, down, sign, SEARCHED_PX - 4, least_edge)
     if feet[0] == 0:
         return 0.0, 0.0, 0.0
     crest = height_at(values, x, y)
@@ -212,15 +248,16 @@ def structure_blur(values, photo, x, y, across, down, reach, least_edge, shares)
             return 0.0, 0.0, 0.0
         level = height_at(values, x + side * foot * across, y + side * foot * down)
         beyond = height_at(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down)
-        if not abs(beyond - level) <= FLAT_SIDE * (crest - level):
+        if not abs(beyond - level) <= FLAT_SIDE * abs(crest - level):
             return 0.0, 0.0, 0.0
     first, last = _structure_shares(photo, x, y, across, down, feet, shares)
     best, sigma, height = MOST_MISFIT, 0.0, 0.0
     if first <= last:
+        offset = _offset(values, x, y, across, down, feet, shares, first, last)
         for blur in BLURS:
-            fitted, _, _, misfit = _fit_structure(values, x, y, across, down, shares, first, last, blur)
-            if misfit < best and fitted > 0:
-                best, sigma, height = misfit, blur, fitted
+            fitted, _, _, misfit = _fit_structure(values, x, y, across, down, shares, first, last, offset, blur, taps)
+            if misfit < best and sign * fitted > 0:
+                best, sigma, height = misfit, blur, abs(fitted)
     # Both outlines of it stand out from what the photo shows beside it.
     agrees = 0.0
     for side in (-1, 1):

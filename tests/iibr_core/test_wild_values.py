@@ -16,7 +16,7 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import pictorial_cues, refine, scaling, search
+from iibr_core.depth import edge_blur, pictorial_cues, refine, scaling, search
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp, parse_packet
@@ -180,7 +180,10 @@ FINITE = {
     "depth.pictorial_cues.estimate_from_cues": lambda v, _: pictorial_cues.estimate_from_cues(
         Photo(image(v), 20.0, "wild")
     ),
-    "depth.refine.edge_blur_px": lambda v, _: refine.edge_blur_px(np.nan_to_num(depths(v))),
+    "depth.edge_blur.extent": lambda v, _: edge_blur.extent(np.nan_to_num(depths(v))),
+    "depth.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(
+        image(0.5), np.nan_to_num(depths(v))
+    ),
     "depth.refine.refine": lambda v, _: [
         refine.refine(image(0.5), depths(v)),
         refine.refine(image(0.5), depths(1.0), strength=v),

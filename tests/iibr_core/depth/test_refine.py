@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from iibr_core.depth.refine import edge_blur_px, refine
+from iibr_core.depth.refine import refine
 from iibr_core.training.degradation import blur, coarsen
 from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import ImageSize, InputError, ViewOffset
@@ -28,18 +28,6 @@ def disc_before_slope(size: int = 120) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def rms(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sqrt(np.mean((a - b) ** 2)))
-
-
-@pytest.mark.parametrize("sigma", [0.8, 1.0, 2.0, 4.0])
-def test_the_blur_of_a_map_is_measured(sigma: float) -> None:
-    _, disparity, _ = disc_before_slope()
-    assert edge_blur_px(blur(disparity, sigma)) == pytest.approx(sigma, rel=0.2)
-
-
-def test_a_wide_blur_is_measured_on_a_smaller_map() -> None:
-    disparity = np.zeros((400, 400), np.float32)
-    disparity[:, 200:] = 1
-    assert edge_blur_px(blur(disparity, 8.0)) == pytest.approx(8.0, rel=0.2)
 
 
 @pytest.mark.parametrize("sigma", [1.0, 2.0, 4.0])
@@ -88,7 +76,10 @@ def test_a_steep_slope_is_no_edge_beside_sharper_ones() -> None:
     disparity[:, 80:] = 2.0
     disparity[:40] = np.clip((np.arange(160) - 50) / 30, 0, 2)
     soft = blur(disparity, 1.0)
-    refined = refine(smooth_texture(80, 160), soft)
+    photo = smooth_texture(80, 160) * 0.3
+    photo[:, 80:] += 0.5
+    photo[:40] *= 0.5
+    refined = refine(photo, soft)
     np.testing.assert_allclose(refined[:34], soft[:34], atol=1e-5)
     assert np.minimum(np.abs(refined[46:]), np.abs(refined[46:] - 2)).max() < 0.1
 

@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from iibr_core.depth.edge_blur import measure_edge_blur
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.depth.refine import edge_blur_px, refine
+from iibr_core.depth.refine import refine
 from iibr_core.generation.light_field import generate
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background
@@ -65,7 +66,7 @@ STAGES = {
     "survey": surveyed,
     "softness": lambda stop: [edge_softness(SOFT, 0.5, stop)],
     "refine": lambda stop: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, stop)],
-    "blur": lambda stop: [edge_blur_px(SOFT, stop)],
+    "blur": lambda stop: [measure_edge_blur(COLORS, SOFT, stop).sigma_px],
     "offline": lambda stop: [estimate_from_cues(Photo(COLORS, 100.0, "test"), stop).values],
     "unknown depth": lambda stop: [fill_disparity_holes(np.where(HOLES, np.nan, LAYERS), stop)],
 }
