@@ -40,6 +40,8 @@ STEPS_A_SIGMA = 2.5
 """Ramps are walked in steps so fine, or of a pixel."""
 REACH_SIGMAS = 5.0
 """From a pixel to the ends of its ramp, at most."""
+FLAT_SHARE = 0.2
+"""Of the least edge, up to which a map is flat."""
 CREST_SHARE = 0.5
 """Of the least edge that the map falls beside a crest, from which it may be one."""
 FINE_STRENGTH = 1e-3
@@ -112,6 +114,16 @@ def _foreground_colour(photo, x, y, across, down, front, behind):
     # Sure where both surfaces differ by more than noise and the colour lies on the line.
     residual = max(away - share * along, 0.0)
     return (min(max(share, 0.0), 1.0) - 0.5) * contrast / (contrast + residual + COLOR_NOISE)
+
+
+@kernel
+def _is_flat(values, x, y, apart, least):
+    """Whether the map is as high as at a pixel on all four sides of it, so many pixels away."""
+    height, width = values.shape
+    here = values[y, x]
+    across = max(abs(values[y, max(x - apart, 0)] - here), abs(values[y, min(x + apart, width - 1)] - here))
+    down = max(abs(values[max(y - apart, 0), x] - here), abs(values[min(y + apart, height - 1), x] - here))
+    return max(across, down) < least
 
 
 @kernel
@@ -224,8 +236,8 @@ def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_r
         for x in range(width):
             refined[y, x] = values[y, x]
             sigma = sigmas[y // cell, x // cell]
-            # Exact edges here, or none.
-            if sigma == 0:
+            # Exact edges here, or none: most pixels end here.
+            if sigma == 0 or _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_SHARE * least_edge):
                 continue
             across, down = gradient(values, x, y)
             crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps)
@@ -233,7 +245,7 @@ def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_r
                 refined[y, x] = crest
                 continue
             slope = sqrt(across * across + down * down)
-            # Too flat to belong to an edge: most pixels end here.
+            # Too flat to belong to an edge.
             if slope * 4 * (REACH_SIGMAS * sigma + 1) > least_edge:
                 refined[y, x] = _as_step(
                     values, photo, x, y, across / slope, down / slope, sigma, least_edge, softness, shares, taps

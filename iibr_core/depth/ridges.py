@@ -23,8 +23,6 @@ LEAST_LEFT = 0.25
 """Of a structure's height, after the blur: lower ones are guesses."""
 MOST_MISFIT = 0.06
 """Deviation (rms) of the structure, blurred again, from the given map, relative to its height there."""
-MOST_OFFSET = 2
-"""Of a structure in the map against the photo, in places."""
 SEARCHED_PX = 24
 """How far from the crest the photo is looked at, at most."""
 SHARES = 2 * SEARCHED_PX * SAMPLES_A_PX + 1
@@ -33,7 +31,7 @@ LEAST_SIDE = 0.4
 """A crest's height over its higher side, relative to that over its lower one, from which it is no step."""
 FLAT_SIDE = 0.15
 """Change of height beside a structure, relative to its own, up to which nothing else is there."""
-BLURS = 0.65 * 1.15 ** np.arange(14)
+BLURS = 0.65 * 1.15 ** np.arange(16)
 """Tried (sigma, px) where the blur of a map is measured on a structure."""
 REACH_SIGMAS = 4.0
 """Where a Gaussian ends."""
@@ -109,24 +107,7 @@ def _structure_shares(photo, x, y, across, down, feet, shares):
 
 
 @kernel
-def _offset(values, x, y, across, down, feet, shares, first, last):
-    """How many places the map shows a structure after where the photo does, at most MOST_OFFSET."""
-    total = moment = 0.0
-    low = height_at(values, x - across * feet[0], y - down * feet[0])
-    high = height_at(values, x + across * feet[1], y + down * feet[1])
-    for t in range(-int(feet[0]), int(feet[1]) + 1):
-        ground = low + (high - low) * (t + feet[0]) / (feet[0] + feet[1])
-        height = height_at(values, x + across * t, y + down * t) - ground
-        total, moment = total + height, moment + height * t
-    shown = shown_moment = 0.0
-    for k in range(first, last + 1):
-        shown, shown_moment = shown + shares[k], shown_moment + shares[k] * (k - len(shares) // 2)
-    offset = SAMPLES_A_PX * moment / total - shown_moment / shown
-    return floor(min(max(offset, -MOST_OFFSET), MOST_OFFSET) + 0.5) if offset == offset else 0
-
-
-@kernel
-def _fit_structure(values, x, y, across, down, shares, first, last, offset, sigma, taps):
+def _fit_structure(values, x, y, across, down, shares, first, last, sigma, taps):
     """Height of a structure over a slanted ground, so that its blur by sigma fits the map: (height, ground, slope,
     misfit). ground and its slope at (x, y), along the line; misfit inf where it cannot be told.
     """
@@ -143,7 +124,7 @@ def _fit_structure(values, x, y, across, down, shares, first, last, offset, sigm
     n = t1 = t2 = b0 = b1 = b2 = p0 = p1 = pb = pp = strongest = 0.0
     for t in range(begin, end + 1, max(int(sigma / 2.0), 1)):
         blurred = 0.0
-        place = middle + t * SAMPLES_A_PX - offset
+        place = middle + t * SAMPLES_A_PX
         for k in range(max(first, place - reach + 1), min(last, place + reach - 1) + 1):
             blurred += shares[k] * taps[abs(k - place)]
         value = height_at(values, x + across * t, y + down * t) - crest
@@ -218,9 +199,8 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, shares)
     if not 0 <= last - first <= (WIDEST_SIGMAS * sigma + 1) * SAMPLES_A_PX:
         return 0.0, 0.0, 0.0
-    offset = _offset(values, crest_x, crest_y, across, down, feet, shares, first, last)
     height, ground, slope, misfit = _fit_structure(
-        values, crest_x, crest_y, across, down, shares, first, last, offset, sigma, taps
+        values, crest_x, crest_y, across, down, shares, first, last, sigma, taps
     )
     if not (misfit <= MOST_MISFIT and sign * height > 0):
         return 0.0, 0.0, 0.0
@@ -253,11 +233,13 @@ def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, 
     first, last = _structure_shares(photo, x, y, across, down, feet, shares)
     best, sigma, height = MOST_MISFIT, 0.0, 0.0
     if first <= last:
-        offset = _offset(values, x, y, across, down, feet, shares, first, last)
         for blur in BLURS:
-            fitted, _, _, misfit = _fit_structure(values, x, y, across, down, shares, first, last, offset, blur, taps)
+            fitted, _, _, misfit = _fit_structure(values, x, y, across, down, shares, first, last, blur, taps)
             if misfit < best and sign * fitted > 0:
                 best, sigma, height = misfit, blur, abs(fitted)
+    # What no blur is wide enough for is a hill.
+    if sigma == BLURS[-1]:
+        sigma = 0.0
     # Both outlines of it stand out from what the photo shows beside it.
     agrees = 0.0
     for side in (-1, 1):
