@@ -1,6 +1,7 @@
 """How soft the depth edges of a map are, place by place; measured on edges that can be nothing but steps, blurred.
 
-A slope, a hill or a fold may rise like a blurred step. It has no flat shoulders, or the photo does not change along it.
+A slope, a hill or a fold may rise like a blurred step, but few have flat shoulders, and the photo changes along those
+no more often than chance has it. Where nothing is sure, the blur is 0: the map stays.
 """
 
 from __future__ import annotations
@@ -56,11 +57,13 @@ CERTAINTY = 2.0
 LIKELY = 0.55
 """Share from which it is believed of a place, where it is sure of edges as soft as these all over the map."""
 MOST_EDGES = 4096
+"""Kept of a map."""
 LEAST_STEPS = 0.2
 """Share of soft edges with flat shoulders, among all that are as soft, from which they are steps; hills have few."""
 LEAST_SOFT = 0.2
 """A map of which a smaller share of edges is soft, is exact."""
 CLEARLY_SOFT_PX = 0.8
+"""A part of a map with edges blurred by less is exact: single edges measure up to this by chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +132,14 @@ def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
     """Whether the photo changes at so many of them as chance would hardly have it."""
     if not edges.shape[1]:
         return False
-    places = len(np.unique(edges[0] // WITNESS_PX + (edges[1] // WITNESS_PX) * 65536))
+    places = len(np.unique(edges[0] // WITNESS_PX + (edges[1] // WITNESS_PX) * 4096))
     return bool(edges[4].mean() >= CHANCE + CERTAINTY * sqrt(CHANCE_VARIANCE / places))
 
 
 def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> NDArray[np.float32]:
-    """(6, N): x, y, blur (sigma), height, and whether the photo agrees; px of the map. At most MOST_EDGES.
+    """(6, N): x, y, blur (sigma), height, how far the photo agrees (0..1), whether it is a step (0, 1); px of the map.
 
-    Soft edges are measured on smaller maps, where they are as short as the others.
+    At most MOST_EDGES. Soft ones are measured on smaller maps, where they are as short as the others.
     """
     least_edge = MEASURED_EDGE * extent(disparity)
     found: list[NDArray[np.float32]] = [np.empty((6, 0), np.float32)]
@@ -191,7 +194,7 @@ def _half(values: FloatImage) -> FloatImage:
 
 @kernel
 def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, last, found):
-    """At the steepest places of edges: x, y, blur (sigma, px), height, whether the photo agrees; returns how many.
+    """At the steepest places of edges: what `_edges` says, px of these values, into found (6, N); returns how many.
 
     Looks at every step-th row, from the first-th to before the last-th of those.
     """

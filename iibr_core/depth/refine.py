@@ -1,7 +1,7 @@
 """Sharp depth edges from soft ones: what lies between foreground and background is given to one of them.
 
-A soft map is a sharp one, blurred; how much is measured on the map itself. Only slopes that such a blur makes of a step
-are changed, so exact maps and slanted surfaces stay as they are.
+A soft map is a sharp one, blurred; how much is measured on the map itself, place by place. Only slopes that such a blur
+makes of a step or of something thin are changed, so exact maps, slanted and curved surfaces stay as they are.
 """
 
 from __future__ import annotations

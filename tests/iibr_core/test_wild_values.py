@@ -181,9 +181,7 @@ FINITE = {
         Photo(image(v), 20.0, "wild")
     ),
     "depth.edge_blur.extent": lambda v, _: edge_blur.extent(np.nan_to_num(depths(v))),
-    "depth.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(
-        image(0.5), np.nan_to_num(depths(v))
-    ),
+    "depth.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(image(0.5), np.nan_to_num(depths(v))),
     "depth.refine.refine": lambda v, _: [
         refine.refine(image(0.5), depths(v)),
         refine.refine(image(0.5), depths(1.0), strength=v),

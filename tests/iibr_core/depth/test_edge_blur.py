@@ -1,4 +1,4 @@
-"""The blur of a map, place by place: of edges that are steps for sure, not of slopes or what the photo does not share."""
+"""The blur of a map, place by place: of steps, not of slopes or of what the photo does not share."""
 
 from __future__ import annotations
 
