@@ -54,7 +54,8 @@ def refine(
 
     photo: (H, W, 3), sRGB-encoded. disparity: (H, W), any unit in which larger is closer; what is not finite is filled
     from its background side. strength: 0 changes nothing, 1 makes steps, between them the slopes are shortened.
-    Returns (H, W) float32, within the range of what was given but for a slope's continuation.
+    Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
+    gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given.
     Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known, Cancelled
     once should_stop is true.
     """
