@@ -68,7 +68,7 @@ def _peaks(photo: Path, budget: str) -> Iterator[str]:
 
 
 def peak_of(arguments: list[str]) -> tuple[int, float]:
-    """Exit code of the command line in a process of its own, and its peak, MiB."""
+    """Exit code of the command line in a process of its own, and its peak, MiB; this one's counts too, but is less."""
     silent = subprocess.DEVNULL
     child = subprocess.Popen([sys.executable, "-m", "viewer", *arguments], stdout=silent, stderr=silent)
     _, status, used = os.wait4(child.pid, 0)

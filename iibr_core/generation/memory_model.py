@@ -32,6 +32,8 @@ VIEWER_BYTES, WRITER_BYTES = 390 * MIB, 290 * MIB
 """Of a process that does nothing yet: Python, compiled kernels and their compiler; OpenGL, where views are shown."""
 READING_BYTES, KEPT_BYTES = 90, 100
 """Of one pixel of the photo: while it is read and its depth looked for; while views are made, beside them."""
+MAP_BYTES, DEPTH_MAP_BYTES = 6, 26
+"""Of one pixel of a disparity map at its own size; more where it is depth."""
 STORED_BYTES, STORED_HDR_BYTES = 7, 10
 """Of one pixel of a view in a light field: colours and disparity."""
 USUAL_RAY_IMAGES, USUAL_HOLE_BYTES, USUAL_AMBIGUOUS_SHARE = 10, 20, 0.2
@@ -129,6 +131,16 @@ def require_decoding(budget: Budget, name: str, decoding_bytes: int, keeps_views
     what = f"{name} cannot be decoded row by row: that"
     advice = "raise --memory, or save it as a PNG or a JPEG that is not progressive"
     budget.require(process_bytes(keeps_views) + decoding_bytes, what, advice)
+
+
+def require_map(budget: Budget, name: str, size: ImageSize, bytes_beside: int, keeps_views: bool) -> None:
+    """Raise InputError where a disparity map of this (height, width) is too large to be read.
+
+    bytes_beside: what reading its format holds of each pixel. A name ending in `_depth` is one of depth.
+    """
+    each = MAP_BYTES + bytes_beside + (DEPTH_MAP_BYTES if name.rpartition(".")[0].endswith("_depth") else 0)
+    needed = process_bytes(keeps_views) + math.prod(size) * each
+    budget.require(needed, f"the map {name} ({size})", "raise --memory, or make the map smaller")
 
 
 def require_views(budget: Budget, name: str, size: ImageSize, grid: GridShape) -> None:

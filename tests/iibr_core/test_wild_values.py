@@ -306,9 +306,9 @@ READS_OR_TELLS = {
     "formats.light_fields.scene": "pictures_in common_size on_grid maps_in first_map numbers_in",
     "formats.light_fields.view_grid": "view_folder candidate_views set_view require_fitting missing_view grid_scene",
     "formats.light_fields.views": "grid_of read_stored_view disparity_range step_length",
-    "formats.maps.npy": "read_array",
-    "formats.maps.pfm": "read_pfm",
-    "formats.maps.reader": "read_map",
+    "formats.maps.npy": "read_array read_array_header",
+    "formats.maps.pfm": "read_pfm read_pfm_size",
+    "formats.maps.reader": "read_map read_map_header MapHeader",
     "formats.images.oiio_writer": "write_image_file",
     "formats.images.oiio_names": "oiio_name",
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
@@ -328,7 +328,7 @@ READS_OR_TELLS = {
     "runtime.kernel_cache": "KernelCache sources_hash",
     "runtime.resources": "resource_folder",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
-    "largest_side require_reading require_decoding require_views require_field mebibytes",
+    "largest_side require_reading require_decoding require_map require_views require_field mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "rendering.view_synthesis": "ViewSynthesis",

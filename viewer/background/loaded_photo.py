@@ -14,10 +14,12 @@ import numpy as np
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import UNEDITED, Levels, levels_of
 from iibr_core.generation.memory_model import (
+    Budget,
     budget_of,
     mebibytes,
     pixels_within,
     require_decoding,
+    require_map,
     require_process,
     require_reading,
     require_views,
@@ -26,7 +28,7 @@ from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, p
 from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
-from iibr_core.types import Disparity, FloatImage, Photo
+from iibr_core.types import Disparity, FloatImage, InputError, Photo
 from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.depth_editing import DepthSettings
 
@@ -129,6 +131,7 @@ def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, tuple[str, 
     budget = budget_of(source.depth.memory_bytes)
     header = read_photo_header(path)
     require_decoding(budget, path.name, header.decoding_bytes, keeps_views)
+    _require_map(source, budget, keeps_views)
     size = size_within(header.size, wanted)
     if not keeps_views:
         require_reading(budget, size)
@@ -140,6 +143,27 @@ def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, tuple[str, 
         require_views(budget, path.name, size, source.grid)
     note = f"{budget.said} {mebibytes(budget.bytes)}: no room for more than {fitting:,} pixels of the photo."
     return (fitting, (note,)) if is_less else (wanted, ())
+
+
+def _require_map(source: Source, budget: Budget, keeps_views: bool) -> None:
+    """Raise InputError where the map to be read is too large; one that nobody named may be a bad one."""
+    from iibr_core.depth.sidecar import find_sidecar
+    from iibr_core.formats.maps.reader import read_map_header
+
+    named, path = source.depth.file, None
+    if named is not None:
+        path = Path(named)
+    elif source.depth.start == "auto":
+        path = find_sidecar(Path(source.path))
+    if path is None:
+        return
+    try:
+        header = read_map_header(path)
+    except InputError:
+        if named is not None:
+            raise
+        return
+    require_map(budget, path.name, header.size, header.bytes_beside, keeps_views)
 
 
 def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> ScenePlan:

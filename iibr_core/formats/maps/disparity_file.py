@@ -24,6 +24,7 @@ MAX_DISPARITY_WIDTHS = 4.0
 DEPTH_SPAN_WIDTHS = 0.01
 """Depth has no baseline; its disparity is given this span from the far to the near end, in photo widths per step."""
 FLAT_DEPTH_SHARE = 1e-4
+SCALED_ROWS = 64
 
 
 def read_disparity(path: Path, size: ImageSize, scale: float = 1.0) -> Disparity:
@@ -38,11 +39,14 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0) -> Disparity
         raise InputError(f"--disparity-scale {scale}: must be a number other than 0")
     stored = read_map(path)
     _require_aspect(path, image_size(stored), size)
-    if path.stem.endswith("_depth"):
+    is_depth = path.stem.endswith("_depth")
+    scaled: FloatImage | DoubleImage
+    if is_depth:
         scaled, notes = _disparity_from_depth(stored, size.width, scale), _depth_notes(path)
     else:
-        scaled, notes = stored.astype(np.float64) * (scale * size.width / stored.shape[1]), ()
-    values, limit_notes = _without_absurd(path, scaled, MAX_DISPARITY_WIDTHS * size.width)
+        scaled, notes = stored, ()
+    factor = 1.0 if is_depth else scale * size.width / stored.shape[1]
+    values, limit_notes = _without_absurd(path, scaled, factor, MAX_DISPARITY_WIDTHS * size.width)
     if values.shape != size:
         notes += (f"{path.name} was resampled from {stored.shape[1]}x{stored.shape[0]} to {size}.",)
         values = resample_surfaces(values, size)
@@ -83,17 +87,28 @@ def _depth_notes(path: Path) -> tuple[str, ...]:
     return (f"{path.name} holds depth of unknown baseline: near and far were set {span} apart per view step.",)
 
 
-def _without_absurd(path: Path, values: DoubleImage, limit_px: float) -> tuple[FloatImage, tuple[str, ...]]:
-    """Values as float32, those that are infinite or beyond the limit as NaN. Raises InputError if nothing is left."""
-    absurd = np.abs(values) > limit_px
-    count = int((absurd & np.isfinite(values)).sum())
-    known = np.where(absurd, np.nan, values).astype(np.float32)
+def _without_absurd(
+    path: Path, values: FloatImage | DoubleImage, factor: float, limit_px: float
+) -> tuple[FloatImage, tuple[str, ...]]:
+    """Values times a factor as float32, those that are then infinite or beyond the limit as NaN.
+
+    Raises InputError if nothing is left.
+    """
+    known = values if values.dtype == np.float32 else np.empty(values.shape, np.float32)
+    count = 0
+    # Some rows at a time, in place: as doubles a large map would take twice its own memory more.
+    for first in range(0, len(values), SCALED_ROWS):
+        rows = slice(first, first + SCALED_ROWS)
+        scaled = values[rows].astype(np.float64) * factor
+        absurd = np.abs(scaled) > limit_px
+        count += int((absurd & np.isfinite(scaled)).sum())
+        known[rows] = np.where(absurd, np.nan, scaled).astype(np.float32)
     if np.isnan(known).all() and count:
         raise InputError(f"{path}: every value exceeds {limit_px:g} px per view step; give a smaller --disparity-scale")
     if np.isnan(known).all():
         raise InputError(f"{path}: no value is known (all are NaN, infinite, 0 or masked); give another map")
     notes = (f"{count} values of {path.name} beyond {limit_px:g} px per view step count as unknown.",) if count else ()
-    return known, notes
+    return np.asarray(known, np.float32), notes
 
 
 def _fill_unknown(path: Path, values: FloatImage) -> FloatImage:

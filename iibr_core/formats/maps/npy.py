@@ -42,6 +42,12 @@ def read_array(path: Path, most_values: int) -> NDArray[Any]:
             ) from error
 
 
+def read_array_header(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the array of an NPY file. Raises InputError where there is none."""
+    with open_binary(path) as file:
+        return _header(path, file)
+
+
 def _header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
     try:
         version = npy_format.read_magic(file)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary
 from iibr_core.formats.outputs import atomic_write
-from iibr_core.types import FloatImage, InputError
+from iibr_core.types import FloatImage, ImageSize, InputError
 
 # The header ends with exactly one white-space character (or CR LF); the next byte is data.
 HEADER = re.compile(rb"P([fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.0-9eE]{1,32})(?:\r\n|\s)")
 HEADER_BYTES = 256
+READ_ROWS = 64
 
 
 def read_pfm(path: Path) -> FloatImage:
@@ -24,23 +26,40 @@ def read_pfm(path: Path) -> FloatImage:
     """
     path = Path(path)
     with open_binary(path) as file:
-        match = HEADER.match(file.read(HEADER_BYTES))
-        if match is None:
-            raise InputError(f"{path}: is not a PFM file (no header 'Pf width height scale')")
-        if match[1] == b"F":
-            raise InputError(f"{path}: is a colour PFM; a disparity map has one value per pixel ('Pf')")
-        width, height = int(match[2]), int(match[3])
-        if not 0 < width * height <= MAX_FILE_PIXELS:
-            raise InputError(f"{path}: {width}x{height} pixels; a map has 1 to {MAX_FILE_PIXELS:,}")
-        dtype = np.dtype("<f4") if _scale(path, match[4]) < 0 else np.dtype(">f4")
-        missing = match.end() + 4 * width * height - path.stat().st_size
+        size, dtype, start = _header(path, file)
+        missing = start + 4 * size.width * size.height - path.stat().st_size
         if missing > 0:
-            raise InputError(f"{path}: cut off, {missing} bytes are missing for {width}x{height} values")
-        file.seek(match.end())
-        values = np.fromfile(file, dtype, width * height)
-    if values.size < width * height:
-        raise InputError(f"{path}: became shorter while it was read; try again")
-    return np.ascontiguousarray(values.reshape(height, width)[::-1], np.float32)
+            raise InputError(f"{path}: cut off, {missing} bytes are missing for {size} values")
+        file.seek(start)
+        result = np.empty(size, np.float32)
+        # From the last row up, some at a time: turned over as a whole, a large map would be there twice.
+        for bottom in range(size.height, 0, -READ_ROWS):
+            rows = result[max(bottom - READ_ROWS, 0) : bottom]
+            values = np.fromfile(file, dtype, rows.size)
+            if values.size < rows.size:
+                raise InputError(f"{path}: became shorter while it was read; try again")
+            rows[:] = values.reshape(rows.shape)[::-1]
+    return result
+
+
+def read_pfm_size(path: Path) -> ImageSize:
+    """From the header. Raises InputError as `read_pfm` does."""
+    with open_binary(path) as file:
+        return _header(path, file)[0]
+
+
+def _header(path: Path, file: BinaryIO) -> tuple[ImageSize, np.dtype[Any], int]:
+    """Size, type of the values, and where they begin."""
+    match = HEADER.match(file.read(HEADER_BYTES))
+    if match is None:
+        raise InputError(f"{path}: is not a PFM file (no header 'Pf width height scale')")
+    if match[1] == b"F":
+        raise InputError(f"{path}: is a colour PFM; a disparity map has one value per pixel ('Pf')")
+    width, height = int(match[2]), int(match[3])
+    if not 0 < width * height <= MAX_FILE_PIXELS:
+        raise InputError(f"{path}: {width}x{height} pixels; a map has 1 to {MAX_FILE_PIXELS:,}")
+    dtype = np.dtype("<f4") if _scale(path, match[4]) < 0 else np.dtype(">f4")
+    return ImageSize(height, width), dtype, match.end()
 
 
 def write_pfm(path: Path, values: FloatImage) -> None:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
-from iibr_core.formats.images.oiio_reader import read_raster
-from iibr_core.formats.maps.npy import read_array
-from iibr_core.formats.maps.pfm import read_pfm
-from iibr_core.types import FloatImage, InputError
+from iibr_core.formats.images.oiio_reader import PictureRows, Raster
+from iibr_core.formats.maps.npy import read_array, read_array_header
+from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size
+from iibr_core.types import FloatImage, ImageSize, InputError
+
+READ_ROWS = 64
+
+
+class MapHeader(NamedTuple):
+    """size: of the map. bytes_beside: what reading it holds of each pixel, beside the map itself."""
+
+    size: ImageSize
+    bytes_beside: int
 
 
 def read_map(path: Path) -> FloatImage:
@@ -27,9 +36,30 @@ def read_map(path: Path) -> FloatImage:
         return read_pfm(path)
     if path.suffix.lower() == ".npy":
         return _read_npy(path)
-    raster = read_raster(path)
+    picture = PictureRows(path)
+    result = np.empty(picture.size, np.float32)
+    for first in range(0, len(result), READ_ROWS):
+        rows = result[first : first + READ_ROWS]
+        rows[:] = _values(path, picture.read(first, first + len(rows)))
+    return result
+
+
+def read_map_header(path: Path) -> MapHeader:
+    """Of a map that `read_map` reads. Raises InputError as that does for its header."""
+    if path.suffix.lower() == ".pfm":
+        return MapHeader(read_pfm_size(path), 0)
+    if path.suffix.lower() == ".npy":
+        shape, dtype = read_array_header(path)
+        size = ImageSize(*shape) if len(shape) == 2 else ImageSize(math.prod(shape), 1)
+        return MapHeader(size, dtype.itemsize)
+    return MapHeader(PictureRows(path).size, 0)
+
+
+def _values(path: Path, raster: Raster) -> FloatImage:
+    """Of some rows of a picture."""
     first = raster.pixels[..., 0]
-    if not all(np.array_equal(first, other, equal_nan=first.dtype.kind == "f") for other in _others(raster.pixels)):
+    others = (raster.pixels[..., channel] for channel in range(1, raster.pixels.shape[2]))
+    if not all(np.array_equal(first, other, equal_nan=first.dtype.kind == "f") for other in others):
         raise InputError(f"{path}: is a colour picture; a disparity map has one value per pixel")
     values = first.astype(np.float32)
     if first.dtype.kind == "u":
@@ -37,10 +67,6 @@ def read_map(path: Path) -> FloatImage:
     if raster.alpha is not None:
         values[raster.alpha == 0] = np.nan
     return values
-
-
-def _others(pixels: NDArray[Any]) -> list[NDArray[Any]]:
-    return [pixels[..., channel] for channel in range(1, pixels.shape[2])]
 
 
 def _read_npy(path: Path) -> FloatImage:

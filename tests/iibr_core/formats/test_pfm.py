@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from iibr_core.formats.maps.pfm import read_pfm, write_pfm
+from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size, write_pfm
 from iibr_core.types import InputError
 
 SHAPES = hnp.array_shapes(min_dims=2, max_dims=2, max_side=9)
@@ -73,3 +73,11 @@ def test_missing_file_and_folder(tmp_path):
     with pytest.raises(InputError, match="does not exist"):
         write_pfm(tmp_path / "none" / "a.pfm", np.zeros((2, 2), np.float32))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("height", [1, 63, 64, 65, 200])
+def test_rows_keep_their_order_however_many_there_are(tmp_path, height):
+    values = np.arange(height * 3, dtype=np.float32).reshape(height, 3)
+    write_pfm(tmp_path / "a.pfm", values)
+    assert np.array_equal(read_pfm(tmp_path / "a.pfm"), values)
+    assert read_pfm_size(tmp_path / "a.pfm") == (height, 3)

@@ -16,6 +16,7 @@ from iibr_core.generation.memory_model import (
     largest_side,
     pixels_within,
     require_decoding,
+    require_map,
     require_process,
     require_reading,
     require_views,
@@ -86,6 +87,14 @@ def test_a_photo_too_large_to_be_read_is_refused_with_the_size_that_fits():
     require_reading(Budget(GIB, "--memory is"), ImageSize(1000, 1000))
     with pytest.raises(InputError, match="row by row"):
         require_decoding(Budget(GIB, "--memory is"), "a.heic", GIB, keeps_views=False)
+
+
+def test_maps_count_and_those_of_depth_count_more():
+    size, budget = ImageSize(4000, 5000), Budget(GIB, "--memory is")
+    require_map(budget, "a.pfm", size, 0, keeps_views=True)
+    for name, beside in (("a_depth.pfm", 4), ("a.npy", 64)):
+        with pytest.raises(InputError, match=r"the map a.* \(5000x4000\) takes"):
+            require_map(budget, name, size, beside, keeps_views=True)
 
 
 def test_plans_stay_within_their_budget(monkeypatch):
