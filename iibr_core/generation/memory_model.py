@@ -75,7 +75,7 @@ def require_process(budget: Budget, keeps_views: bool) -> None:
         least, limit = needed / MOST_USUAL_SHARE + MAPPED_BYTES, allowed + MAPPED_BYTES
         said = f"{what} takes an address space of {mebibytes(least)}, it is limited to {mebibytes(limit)}"
         raise InputError(f"{said} (ulimit -v, or -d): raise that limit")
-    budget.require(needed, what, "allow it that much")
+    budget.require(needed, what, "raise --memory, or take a machine that has as much")
 
 
 def process_bytes(keeps_views: bool) -> int:

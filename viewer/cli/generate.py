@@ -29,6 +29,7 @@ from viewer.cli.options import (
     inputs_with_sidecar,
     require_existing,
     require_memory,
+    require_model,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
@@ -63,6 +64,7 @@ def generate(
     require_existing(source)
     new_writer = writer_for(format)
     new_writer.require_place(out, inputs_with_sidecar(source), force)
+    require_model(choice)
 
     from iibr_core.generation.light_field import generate as generated
     from iibr_core.generation.plan import plan_literal

@@ -141,7 +141,6 @@ def require_existing(source: Source) -> None:
     for path in (source.path, source.depth.file):
         if path is not None and status_of(Path(path)) is None:
             raise InputError(f"{path}: no such file")
-    require_model(source.depth)
 
 
 def require_model(choice: DepthChoice) -> None:

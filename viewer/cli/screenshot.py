@@ -37,6 +37,7 @@ from viewer.cli.options import (
     require_existing,
     require_heeded,
     require_memory,
+    require_model,
     require_utf8,
     size_from_text,
     view_from_text,
@@ -177,6 +178,7 @@ def screenshot(
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
     require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)
+    require_model(choice)
     shot = replace(shot, lens=_LensOptions(view, focus, aperture))
     notes, origin = _write(shot, output, ui, backend)
     print(output)

@@ -28,6 +28,7 @@ from viewer.cli.options import (
     require_existing,
     require_heeded,
     require_memory,
+    require_model,
     require_utf8,
 )
 
@@ -65,6 +66,7 @@ def view(
     require_heeded(context, path)
     require_memory(memory, keeps_views=True)
     require_existing(source)
+    require_model(choice)
     if ground_truth is not None and not is_folder(ground_truth):
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
     from viewer.app.main_loop import initial_state, run

@@ -181,7 +181,9 @@ def require_whole_png(path: Path) -> None:
         header = file.read(16)
         width, height = (int.from_bytes(header[at : at + 4], "big") for at in (8, 12))
         if not (1 <= width <= MOST_PNG_SIDE and 1 <= height <= MOST_PNG_SIDE):
-            raise InputError(f"{path}: {width}x{height} pixels, a PNG has 1 to {MOST_PNG_SIDE:,} a side; save it anew")
+            raise InputError(
+                f"{path}: damaged or cut off (it claims {width}x{height} pixels); get the whole file again"
+            )
         file.seek(len(PNG_START))
         kind = b""
         while kind != b"IEND":
