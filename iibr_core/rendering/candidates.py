@@ -1,9 +1,9 @@
 """Which source rays land near each target ray.
 
 A source ray at (x, y) with disparity d lands at (x - d*s, y - d*t). Its footprint, one pixel wide where the disparity
-is constant, stretches to meet its neighbours on the same surface. Rays of one source and one surface that land on the
-same pixel look up the same colour, so they are kept as one candidate: K candidates are K surfaces, and K = 5 is
-plenty.
+is constant, stretches to meet its neighbours on the same surface; on a steep one its disparity changes across it. Rays
+of one source and one surface that land on the same pixel look up the same colour, so they are kept as one candidate: K
+candidates are K surfaces, and K = 5 is plenty.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.coherent_cells import backward_warp, find_coherent_cells, land_incoherent
+from iibr_core.rendering.joined_rays import BELOW, RIGHT
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset
@@ -22,7 +23,13 @@ from iibr_core.types import FloatImage, ViewOffset
 SAME_SURFACE_PX = 0.5
 """Rays of one source whose colour look-ups lie closer than this are one candidate."""
 SEALED_GAP_PX = 0.75
-"""A gap between landing neighbours up to this wide is no disocclusion: their footprints stretch to meet."""
+"""A gap between landing neighbours up to this wide is no disocclusion: their footprints stretch to meet. So they do
+where a steep surface joins them.
+"""
+MOST_STRETCHED_PX = 8.0
+"""Even a surface is torn by a gap this wide: little can be told from so few of its rays."""
+LEAST_SHRUNK = 0.05
+"""A surface compressed to less than this share of its width turns its back to the view."""
 LEAST_OVERLAP = 1e-4
 
 
@@ -68,7 +75,7 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
         t, s = offset.t - offsets[k, 0], offset.s - offsets[k, 1]
         needed = land_incoherent(cells, k, t, s, rows, smooth)
         _land_rays(
-            disparity[k], coverage[k], needed, needed.any(axis=1), k, s, t, first_row,
+            disparity[k], coverage[k], rays.joined, rays.steep_cells(k), needed, needed.any(axis=1), k, s, t, first_row,
             found.count, found.coverage, found.disparity, found.source,
         )  # fmt: skip
     _mean_disparity(found.count, found.coverage, found.disparity)
@@ -80,10 +87,23 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
 
 
 @kernel
-def _half_extent(gap):
+def _half_extent(gap, is_joined):
     """How far a footprint reaches towards a neighbour that lands 1 + gap pixels away."""
     # Wider gaps are disocclusions and stay open; neighbours that land on each other are two surfaces.
-    return 0.5 + 0.5 * gap if abs(gap) <= SEALED_GAP_PX else 0.5
+    if abs(gap) <= SEALED_GAP_PX or (is_joined and LEAST_SHRUNK - 1.0 <= gap <= MOST_STRETCHED_PX):
+        return 0.5 + 0.5 * gap
+    return 0.5
+
+
+@kernel
+def _slope(disparity, joined, bit, y, x, down, right):
+    """Change of disparity a pixel, that way, at a ray that a steep surface joins to a neighbour there; else 0."""
+    here, rise, sides = disparity[y, x], 0.0, 0
+    if y >= down and x >= right and joined[y - down, x - right] & bit:
+        rise, sides = here - disparity[y - down, x - right], 1
+    if joined[y, x] & bit:
+        rise, sides = rise + disparity[y + down, x + right] - here, sides + 1
+    return rise / max(sides, 1)
 
 
 @kernel
@@ -100,7 +120,8 @@ def _rearmost(coverage, disparity, row, column):
 
 @kernel
 def _land_rays(
-    ray_disparity, ray_coverage, needed, needed_rows, index, s, t, first_row, count, coverage, disparity, source
+    ray_disparity, ray_coverage, joined, steep, needed, needed_rows, index, s, t, first_row,
+    count, coverage, disparity, source,
 ):  # fmt: skip
     """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, `disparity`
     holds sums weighted by coverage.
@@ -111,7 +132,7 @@ def _land_rays(
     slots, rows, width = coverage.shape
     height = len(ray_disparity)
     # The same as a difference of disparities.
-    tolerance = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
+    same_surface = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     for y in range(height):
         if not needed_rows[y // CELL_PX]:
             continue
@@ -125,21 +146,41 @@ def _land_rays(
                     continue
                 d = ray_disparity[y, x]
                 landed_x, landed_y = x - d * s, y - d * t
-                left = landed_x - _half_extent((ray_disparity[y, max(x - 1, 0)] - d) * s)
-                right = landed_x + _half_extent((d - ray_disparity[y, min(x + 1, width - 1)]) * s)
-                top = landed_y - _half_extent((ray_disparity[max(y - 1, 0), x] - d) * t)
-                bottom = landed_y + _half_extent((d - ray_disparity[min(y + 1, height - 1), x]) * t)
+                to_left, to_right = max(x - 1, 0), min(x + 1, width - 1)
+                above, below = max(y - 1, 0), min(y + 1, height - 1)
+                is_joined, tolerance, slope_x, slope_y = False, same_surface, 0.0, 0.0
+                if steep[y // CELL_PX, cell]:
+                    rise_x = _slope(ray_disparity, joined, RIGHT, y, x, 0, 1)
+                    rise_y = _slope(ray_disparity, joined, BELOW, y, x, 1, 0)
+                    # How much the view stretches the surface, as an area: the same slope is spread over more pixels.
+                    stretched = 1.0 - s * rise_x - t * rise_y
+                    is_joined = (rise_x != 0.0 or rise_y != 0.0) and stretched >= LEAST_SHRUNK
+                if is_joined:
+                    slope_x, slope_y = rise_x / stretched, rise_y / stretched
+                    tolerance = max(same_surface, abs(slope_x) + abs(slope_y))
+                left = landed_x - _half_extent(
+                    (ray_disparity[y, to_left] - d) * s, is_joined and joined[y, to_left] & RIGHT
+                )
+                right = landed_x + _half_extent(
+                    (d - ray_disparity[y, to_right]) * s, is_joined and joined[y, x] & RIGHT
+                )
+                top = landed_y - _half_extent((ray_disparity[above, x] - d) * t, is_joined and joined[above, x] & BELOW)
+                bottom = landed_y + _half_extent((d - ray_disparity[below, x]) * t, is_joined and joined[y, x] & BELOW)
                 # Beside the target rows, or not finite.
                 if not (right > -0.5 and left < width and bottom > first_row - 0.5 and top < first_row + rows):
                     continue
                 first_y, last_y = max(nearest_pixel(top), first_row), min(ceil(bottom - 0.5), first_row + rows - 1)
                 # Splat: each target pixel under the footprint gets its overlap, in pixels of area.
                 for target_y in range(first_y, last_y + 1):
-                    overlap_y = filled * (min(bottom, target_y + 0.5) - max(top, target_y - 0.5))
+                    from_y, to_y = max(top, target_y - 0.5), min(bottom, target_y + 0.5)
+                    overlap_y, across = filled * (to_y - from_y), 0.5 * (from_y + to_y) - landed_y
                     for target_x in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
-                        overlap = np.float32(overlap_y * (min(right, target_x + 0.5) - max(left, target_x - 0.5)))
+                        from_x, to_x = max(left, target_x - 0.5), min(right, target_x + 0.5)
+                        overlap = np.float32(overlap_y * (to_x - from_x))
                         if not overlap > LEAST_OVERLAP:
                             continue
+                        # A steep surface's disparity in the middle of the overlap.
+                        d_here = np.float32(d + slope_y * across + slope_x * (0.5 * (from_x + to_x) - landed_x))
                         # Its surface's candidate, if any; `disparity` holds sums, so compare times coverage.
                         row, column = np.uint64(target_y - first_row), np.uint64(target_x)  # never counted from the end
                         used = np.int64(count[row, column])
@@ -148,13 +189,13 @@ def _land_rays(
                             c = coverage[slot, row, column]
                             if (
                                 source[slot, row, column] == index
-                                and abs(disparity[slot, row, column] - d * c) <= tolerance * c
+                                and abs(disparity[slot, row, column] - d_here * c) <= tolerance * c
                             ):
                                 break
                             slot += 1
                         if slot < used:
                             coverage[slot, row, column] += overlap
-                            disparity[slot, row, column] += overlap * d
+                            disparity[slot, row, column] += overlap * d_here
                             continue
                         # A new candidate: in a free slot, or instead of the rearmost one if that lies farther back (a
                         # z-test).
@@ -162,10 +203,10 @@ def _land_rays(
                             count[row, column] = used + 1
                         else:
                             slot = _rearmost(coverage, disparity, row, column)
-                            if disparity[slot, row, column] >= d * coverage[slot, row, column]:
+                            if disparity[slot, row, column] >= d_here * coverage[slot, row, column]:
                                 continue
                         coverage[slot, row, column] = overlap
-                        disparity[slot, row, column] = overlap * d
+                        disparity[slot, row, column] = overlap * d_here
                         source[slot, row, column] = index
 
 

@@ -20,6 +20,14 @@ STEP_AROUND_PX = 2
 """Reach of the search for a depth edge."""
 EDGE_WINDOW_PX = 8
 """A depth edge softer than this is a slope."""
+SOFT_EDGES_PX = (8, 12)
+"""Widths of the soft edges that are looked for; the wider one is for a blur of 4 px and more."""
+MOST_SHOULDER = 0.33
+"""By at most this share of a soft edge may the map rise or fall within its width on either side: a surface goes on."""
+SHARP_SHARE = 0.5
+"""An edge whose largest step makes up this share of its steps is sharp."""
+SOFT_AROUND_PX = 8
+"""Rays this close to the middle of a soft edge are marked."""
 EDGE_PARALLAX_PX = 2.0
 """Least parallax, in the outermost view, of the edges whose softness is measured."""
 
@@ -28,13 +36,15 @@ EDGE_PARALLAX_PX = 2.0
 class DisparityStatistics:
     """Of S source images. low, high (S, H, W): least and greatest disparity within AROUND_PX of each ray. step
     (S, H, W): the largest step between neighbours within STEP_AROUND_PX; all px per view step, 0 where nothing is.
-    softness: 0..1, of the photo's depth edges: 0 where each is one step, near 1 where they are slopes.
+    softness: 0..1, of the photo's depth edges: 0 where each is one step, near 1 where they are slopes. soft (H, W):
+    the photo's rays near a soft edge.
     """
 
     low: FloatImage
     high: FloatImage
     step: FloatImage
     softness: float
+    soft: NDArray[np.bool_]
 
 
 def measure_disparity(
@@ -47,8 +57,8 @@ def measure_disparity(
     low, high, step = (np.empty(disparity.shape, np.float32) for _ in range(3))
     for source, *found in zip(disparity, low, high, step):
         _measure_rows(source, found, should_stop)
-    softness = edge_softness(disparity[0], EDGE_PARALLAX_PX / max(farthest_views, 1e-9), should_stop)
-    return DisparityStatistics(low, high, step, softness)
+    soft, softness = find_soft_edges(disparity[0], EDGE_PARALLAX_PX / max(farthest_views, 1e-9), should_stop)
+    return DisparityStatistics(low, high, step, softness, soft)
 
 
 def _measure_rows(disparity: FloatImage, found: list[FloatImage], should_stop: ShouldStop) -> None:
@@ -56,48 +66,100 @@ def _measure_rows(disparity: FloatImage, found: list[FloatImage], should_stop: S
 
 
 def edge_softness(disparity: FloatImage, least_edge: float, should_stop: ShouldStop = never) -> float:
-    """0..1: the mean share of the depth edges (H, W) that their largest step leaves to the others; 0 without edges.
+    """The softness that `find_soft_edges` gives."""
+    return find_soft_edges(disparity, least_edge, should_stop)[1]
+
+
+def find_soft_edges(
+    disparity: FloatImage, least_edge: float, should_stop: ShouldStop = never
+) -> tuple[NDArray[np.bool_], float]:
+    """Which rays (H, W) lie near a soft depth edge; and 0..1, the mean share of all depth edges that their largest
+    step leaves to the others: 0 without edges.
 
     An edge: a change of at least least_edge within EDGE_WINDOW_PX along a row or a column; it counts by its change.
+    Its largest step is SHARP_SHARE of it, or both its shoulders are flat: a slope that goes on is a surface.
     Raises Cancelled once should_stop is true.
     """
     left = total = 0.0
-    for values in (disparity, disparity.T):
-        changes, lefts = _edges(values, least_edge, should_stop)
+    soft = np.zeros(disparity.shape, np.bool_)
+    for values, marked in ((disparity, soft), (disparity.T, soft.T)):
+        changes, lefts, found = _edges(values, least_edge, should_stop)
         left += float(lefts.sum(dtype=np.float64))
         total += float(changes.sum(dtype=np.float64))
-    return left / total if 0 < total < np.inf else 0.0
+        marked |= found
+    return soft, left / total if 0 < total < np.inf else 0.0
 
 
-def _edges(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> NDArray[np.float32]:
-    """(2, N): the change of each edge along the rows, and what its largest step leaves of it."""
+def _edges(
+    values: FloatImage, least_edge: float, should_stop: ShouldStop
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """Of the edges along the rows (N): the change of each, what its largest step leaves of it; and `soft` (H, W)."""
+    soft = np.zeros(values.shape, np.bool_)
 
     def edges(first: int, last: int) -> NDArray[np.float32]:
         rows = np.ascontiguousarray(values[first:last], np.float32)
         found = np.empty((2, rows.size), np.float32)
-        return found[:, : _row_edges(rows, np.float32(least_edge), *found)].copy()
+        return found[:, : _row_edges(rows, np.float32(least_edge), *found, soft[first:last])].copy()
 
-    return np.concatenate([np.empty((2, 0), np.float32), *in_bands(edges, image_size(values), should_stop)], axis=1)
+    found = in_bands(edges, image_size(values), should_stop)
+    changes, lefts = np.concatenate([np.empty((2, 0), np.float32), *found], axis=1)
+    return changes, lefts, soft
 
 
 @kernel
-def _row_edges(rows, least_edge, changes, lefts):
+def _rise(values, first, last):
+    """From the least to the greatest of values [first, last]; NaN counts for nothing."""
+    least, most = np.float32(np.inf), np.float32(-np.inf)
+    for x in range(max(first, 0), min(last, len(values) - 1) + 1):
+        d = values[x]
+        least, most = d if d < least else least, d if d > most else most
+    return most - least
+
+
+@kernel
+def _mark_soft(values, width, least_edge, soft):
+    """Mark what lies near the middle of the soft edges of this width in one row."""
+    # Half of either shoulder at least must lie in the frame.
+    for x in range(width // 2, len(values) - width - width // 2):
+        change = abs(values[x + width] - values[x])
+        # NaN fails the comparisons.
+        if not change >= least_edge:
+            continue
+        largest = np.float32(0.0)
+        for i in range(x, x + width):
+            largest = max(largest, abs(values[i + 1] - values[i]))
+        if not largest < SHARP_SHARE * change:
+            continue
+        # Flat shoulders on both sides tell an edge from a surface.
+        flat, end = MOST_SHOULDER * change, x + width
+        if _rise(values, x - width, x) <= flat and _rise(values, end, end + width) <= flat:
+            middle = x + width // 2
+            soft[max(middle - SOFT_AROUND_PX, 0) : middle + SOFT_AROUND_PX + 1] = True
+
+
+@kernel
+def _row_edges(rows, least_edge, changes, lefts, soft):
     """Writes what `_edges` returns; returns how many edges there are."""
     count = 0
     for y in range(rows.shape[0]):
+        for width in SOFT_EDGES_PX:
+            _mark_soft(rows[y], width, least_edge, soft[y])
         for x in range(rows.shape[1] - EDGE_WINDOW_PX):
             # Is there an edge across the window? NaN fails the comparison.
             change = abs(rows[y, x + EDGE_WINDOW_PX] - rows[y, x])
             if not change >= least_edge:
                 continue
             # A sharp edge is one step, which leaves nothing; a slope leaves most of it.
-            largest = np.float32(0.0)
+            largest = every = np.float32(0.0)
             is_known = True
             for i in range(EDGE_WINDOW_PX):
                 step = abs(rows[y, x + i + 1] - rows[y, x + i])
-                largest = max(largest, step)
+                largest, every = max(largest, step), every + step
                 is_known &= step == step
             left = change - largest
+            # A slope that is no soft edge is a surface.
+            if is_known and largest < SHARP_SHARE * every and not soft[y, x + EDGE_WINDOW_PX // 2]:
+                continue
             changes[count] = change
             lefts[count] = left if is_known and left > 0 else np.float32(0.0)
             count += 1

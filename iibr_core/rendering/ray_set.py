@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.disparity_statistics import DisparityStatistics, measure_disparity
+from iibr_core.rendering.ambiguity import SOFT
+from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, DisparityStatistics, measure_disparity
+from iibr_core.rendering.joined_rays import BELOW, RIGHT, join_rays, joined_either_way
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
@@ -52,6 +54,7 @@ class RaySet:
         self._surface_step = surface_step
         self._farthest_views = farthest_views
         self._statistics: DisparityStatistics | None = None
+        self._soft_cells = np.zeros((0, 0, 0), np.bool_)
         self._surveying = threading.Lock()
         self._offsets = np.empty((capacity, 2))
         self._colors = np.empty((capacity, *size, 3), np.float32)
@@ -62,6 +65,8 @@ class RaySet:
         self._low, self._high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
         self._row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
         self._incoherent = np.ones(in_cells, np.bool_)
+        self._joined = np.zeros(size, np.uint8)
+        self._steep, self._nowhere = np.zeros(in_cells, np.bool_), np.zeros(in_cells, np.bool_)
 
     def add(
         self,
@@ -72,13 +77,17 @@ class RaySet:
         should_stop: ShouldStop = never,
     ) -> None:
         """Add the rays of one image (H, W). Raises Cancelled once should_stop is true; then nothing is added."""
-        k = self._count
+        k, joined = self._count, np.zeros(self.size, np.uint8)
+        if k == 0:
+            least_edge = EDGE_PARALLAX_PX / max(self._farthest_views, 1e-9)
+            self._joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
+            self._steep = _any_in_cells(joined_either_way(joined))
 
         def band(first: int, last: int) -> None:
             rows = slice(first, last)
             self._colors[k, rows], self._disparity[k, rows] = colors[rows], disparity[rows]
             self._coverage[k, rows] = coverage[rows]
-            _near_edge(disparity, self._surface_step, first, last, self._near_edge[k])
+            _near_edge(disparity, joined, self._surface_step, first, last, self._near_edge[k])
             _sum_up(disparity, coverage, first, last, self._low[k], self._high[k])
             if k == 0:
                 _find_incoherent(disparity, SMOOTH_SHARE * self._surface_step, first, last, self._incoherent)
@@ -94,7 +103,11 @@ class RaySet:
         with self._surveying:
             if self._statistics is None:
                 disparity = self._disparity[: self._count]
-                self._statistics = measure_disparity(disparity, self._farthest_views, should_stop)
+                found = measure_disparity(disparity, self._farthest_views, should_stop)
+                self._soft_cells = np.empty(self._low[: self._count].shape, np.bool_)
+                self._soft_cells[: self.photo_images] = _any_in_cells(found.soft)
+                self._soft_cells[self.photo_images :] = found.softness > SOFT
+                self._statistics = found
             return self._statistics
 
     def __len__(self) -> int:
@@ -112,6 +125,15 @@ class RaySet:
         return tuple(array[: self._count] for array in everything)
 
     @property
+    def joined(self) -> NDArray[np.uint8]:
+        """(H, W): which steps between the photo's rays are a steep surface's (`joined_rays`)."""
+        return self._joined
+
+    def steep_cells(self, k: int) -> NDArray[np.bool_]:
+        """(M, N): cells of image k with joined rays. Only the photo has any."""
+        return self._steep if k == 0 else self._nowhere
+
+    @property
     def cells(self) -> Cells:
         """The rays added so far, summarised."""
         low, high, row_ranges = (part[: self._count] for part in (self._low, self._high, self._row_ranges))
@@ -123,6 +145,14 @@ class RaySet:
         return self._statistics or self.survey()
 
     @property
+    def soft_cells(self) -> NDArray[np.bool_]:
+        """(S, M, N): cells of rays that count as near a soft depth edge: those of the photo that do, and where edges
+        are SOFT all that was inpainted.
+        """
+        self.survey()
+        return self._soft_cells
+
+    @property
     def photo_images(self) -> int:
         """How many images, from the first on, hold what the photo shows; the others are inpainted."""
         return int((self._offsets[: self._count] == 0).all(axis=1).sum())
@@ -131,6 +161,12 @@ class RaySet:
     def photo_disparity(self) -> FloatImage:
         """(H, W) disparity of the first image."""
         return np.asarray(self._disparity[0])
+
+
+def _any_in_cells(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(M, N): cells of which any pixel (H, W) is marked."""
+    rows, columns = (np.arange(0, length, CELL_PX) for length in marked.shape)
+    return np.asarray(np.logical_or.reduceat(np.logical_or.reduceat(marked, rows, 0), columns, 1))
 
 
 @kernel
@@ -172,9 +208,9 @@ def _find_incoherent(disparity, smooth_step, first, last, incoherent):
 
 
 @kernel
-def _near_edge(disparity, surface_step, first, last, near_edge):
-    """Of rows [first, last): True where the 4x4 pixels from (x - 1, y - 1) to (x + 2, y + 2) hold a larger step, or no
-    surface.
+def _near_edge(disparity, joined, surface_step, first, last, near_edge):
+    """Of rows [first, last): True where the 4x4 pixels from (x - 1, y - 1) to (x + 2, y + 2) hold a larger step between
+    rays that no surface joins, or no surface.
     """
     height, width = disparity.shape
     near_edge[first:last] = False
@@ -185,5 +221,6 @@ def _near_edge(disparity, surface_step, first, last, near_edge):
             right = disparity[y, min(x + 1, width - 1)]
             below = disparity[min(y + 1, height - 1), x]
             # Mark whoever has this step, or NaN, among its 4x4 taps: it lies two pixels away at most.
-            if not (abs(right - here) <= surface_step and abs(below - here) <= surface_step):
+            is_smooth = abs(right - here) <= surface_step or joined[y, x] & RIGHT
+            if not (is_smooth and (abs(below - here) <= surface_step or joined[y, x] & BELOW)):
                 near_edge[max(y - 2, first) : min(y + 3, last), max(x - 2, 0) : x + 3] = True

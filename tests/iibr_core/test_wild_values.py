@@ -32,6 +32,7 @@ from iibr_core.rendering import (
     candidates,
     coherent_cells,
     disparity_statistics,
+    joined_rays,
     mixed_pixels,
     occlusion,
     resampling,
@@ -232,6 +233,13 @@ FINITE = {
     "rendering.coherent_cells.land_incoherent": lambda v, _: [
         coherent_cells.land_incoherent(rays(v).cells, 0, t, 0.5, (0, 4), np.eye(1, 4, dtype=np.bool_)) for t in (0.5, v)
     ],
+    "rendering.joined_rays.join_rays": lambda v, _: joined_rays.joined_either_way(
+        joined_rays.join_rays(depths(v), 0.5, 0.5)
+    ),
+    "rendering.joined_rays.joined_either_way": lambda v, _: joined_rays.joined_either_way(
+        joined_rays.join_rays(depths(v), 0.5, 0.5)
+    ),
+    "rendering.disparity_statistics.find_soft_edges": lambda v, _: disparity_statistics.find_soft_edges(depths(v), 0.5),
     "rendering.disparity_statistics.edge_softness": lambda v, _: disparity_statistics.edge_softness(depths(v), 0.5),
     "rendering.disparity_statistics.measure_disparity": lambda v, _: (
         disparity_statistics.measure_disparity(depths(v)[None], 1.0).softness

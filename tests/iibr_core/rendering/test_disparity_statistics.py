@@ -4,8 +4,13 @@ import pytest
 from iibr_core.rendering.disparity_statistics import (
     AROUND_PX,
     EDGE_WINDOW_PX,
+    MOST_SHOULDER,
+    SHARP_SHARE,
+    SOFT_AROUND_PX,
+    SOFT_EDGES_PX,
     STEP_AROUND_PX,
     edge_softness,
+    find_soft_edges,
     measure_disparity,
 )
 from iibr_core.training.degradation import blur
@@ -51,13 +56,32 @@ def square(size: int = 64) -> np.ndarray:
     return disparity
 
 
+def slow_soft(line: np.ndarray, least_edge: float) -> np.ndarray:
+    """Pixel by pixel: near the middle of a slope that is flat on both sides, as far as the frame shows them."""
+    soft = np.zeros(len(line), bool)
+    for width in SOFT_EDGES_PX:
+        for x in range(width // 2, len(line) - width - width // 2):
+            change = abs(line[x + width] - line[x])
+            shoulders = line[max(x - width, 0) : x + 1], line[x + width : x + 2 * width + 1]
+            is_slope = np.nanmax(np.append(np.abs(np.diff(line[x : x + width + 1])), 0)) < SHARP_SHARE * change
+            if (
+                change >= least_edge
+                and is_slope
+                and all(np.nanmax(s) - np.nanmin(s) <= MOST_SHOULDER * change for s in shoulders)
+            ):
+                soft[max(x + width // 2 - SOFT_AROUND_PX, 0) : x + width // 2 + SOFT_AROUND_PX + 1] = True
+    return soft
+
+
 def slow_softness(disparity: np.ndarray, least_edge: float) -> float:
     left, total = [], []
     for values in (*disparity, *disparity.T):
+        soft = slow_soft(values, least_edge)
         for x in range(len(values) - EDGE_WINDOW_PX):
             steps = np.abs(np.diff(values[x : x + EDGE_WINDOW_PX + 1]))
             change = abs(values[x + EDGE_WINDOW_PX] - values[x])
-            if change >= least_edge:
+            is_surface = np.isfinite(steps).all() and steps.max() < SHARP_SHARE * steps.sum()
+            if change >= least_edge and not (is_surface and not soft[x + EDGE_WINDOW_PX // 2]):
                 total.append(change)
                 left.append(np.fmax(change - steps.max(), 0))
     return sum(left) / sum(total) if total else 0.0
@@ -69,6 +93,39 @@ def test_softness_against_a_slow_twin(shape: tuple[int, int], unknown: float):
     disparity = np.cumsum(random_disparity(np.random.default_rng(4), shape, 0.0), axis=1)
     disparity[np.random.default_rng(5).random(shape) < unknown] = np.nan
     assert edge_softness(disparity, 1.5) == pytest.approx(slow_softness(disparity, 1.5), rel=1e-5)
+
+
+@pytest.mark.parametrize("unknown", [0.0, 0.02])
+def test_soft_edges_against_a_slow_twin(unknown: float):
+    random = np.random.default_rng(6)
+    layers = np.repeat(np.repeat(random.normal(size=(4, 5)), 17, axis=0), 13, axis=1)
+    disparity = (3 * blur(layers.astype(np.float32), 1.5)).astype(np.float32)
+    disparity[random.random(disparity.shape) < unknown] = np.nan
+    soft = find_soft_edges(disparity, 1.5)[0]
+    along_rows = np.array([slow_soft(row, 1.5) for row in disparity])
+    along_columns = np.array([slow_soft(column, 1.5) for column in disparity.T]).T
+    assert (soft == along_rows | along_columns).all()
+    assert 0.1 < soft.mean() < 0.95
+
+
+@pytest.mark.parametrize("slope", [0.05, 0.3, 0.9])
+def test_slopes_that_go_on_are_surfaces_and_no_soft_edges(slope: float):
+    y, x = np.mgrid[:80, :120].astype(np.float32)
+    plane, relief = slope * (x - y), slope * 64 / (2 * np.pi) * np.cos(x * 2 * np.pi / 64)
+    for surface in (plane, relief.astype(np.float32)):
+        soft, softness = find_soft_edges(surface, 0.25)
+        assert not soft.any()
+        assert softness == 0
+
+
+def test_soft_edges_are_marked_where_they_are():
+    """A map that is soft on one side and sharp on the other, before a slanted wall."""
+    disparity = square(64) + np.float32(0.02) * np.arange(64, dtype=np.float32)
+    disparity[:, :32] = blur(disparity, 2)[:, :32]
+    soft, softness = find_soft_edges(disparity, 0.5)
+    assert soft[24:40, 12:20].all()
+    assert not soft[24:40, 32:].any()
+    assert 0.1 < softness < edge_softness(blur(disparity, 2), 0.5)
 
 
 def test_softness_tells_steps_from_slopes():
