@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.generation.outer_views import outer_views_of_grid
-from iibr_core.rendering.ambiguity import AMBIGUOUS_AROUND_PX, AMBIGUOUS_PX, EVERY_COST, SOFT
+from iibr_core.rendering.ambiguity import AMBIGUOUS_PX, EVERY_COST, SOFT
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
 from iibr_core.types import FloatImage, GridShape, Quality
 
@@ -23,6 +24,10 @@ STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
 GAP_PX = 1.0
 """A depth edge disoccludes something if it opens a gap wider than this in the outermost view."""
+OPEN_SHARE = 0.42
+"""Of the rays where surfaces meet, so many are left open by the closed form."""
+SOFT_GROWTH = 0.75
+"""The power of the parallax by which rays near soft edges become ambiguous."""
 MOST_PARALLAX_PX = 1e6
 
 RAY_BYTES, STATISTICS_BYTES = 21, 12
@@ -84,13 +89,13 @@ NO_COST = CostEstimates(*3 * [CostEstimate(0.0, 0)])
 @dataclass(frozen=True, eq=False)
 class ParallaxStatistics:
     """How content moves in the outermost view, px. step (H, W): the largest difference between neighbours near each
-    pixel. change (H, W): from least to most around it. softness: see `DisparityStatistics`. most_px: of all content.
-    frame_px: of what lies at the frame. hole_share: of the pixels, those it shows and the photo hides, at most.
+    pixel. softness, soft (H, W): see `DisparityStatistics`. most_px: of all content. frame_px: of what lies at the
+    frame. hole_share: of the pixels, those it shows and the photo hides, at most.
     """
 
     step: FloatImage
-    change: FloatImage
     softness: float
+    soft: NDArray[np.bool_]
     most_px: float
     frame_px: float
     hole_share: float
@@ -117,9 +122,8 @@ class ParallaxStatistics:
     def ambiguous_share(self, parallax: float) -> float:
         """Share of the rays that are ambiguous there: more where edges are soft."""
         if not self.is_soft:
-            return self.meeting_share(parallax)
-        # What changes by that much within the reach of the search changes by half of it within this shorter one.
-        return float((self.change * np.float32(parallax) > 0.5 * AMBIGUOUS_AROUND_PX).mean())
+            return OPEN_SHARE * self.meeting_share(parallax)
+        return float(self.soft.mean() * parallax**SOFT_GROWTH)
 
 
 def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatistics:
@@ -133,8 +137,8 @@ def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatist
     frame = np.concatenate([moved[0], moved[-1], moved[:, 0], moved[:, -1]])
     return ParallaxStatistics(
         around.step[0],
-        around.high[0] - around.low[0],
         around.softness,
+        around.soft,
         float(np.abs(moved).max()),
         float(np.abs(frame).max()),
         _hole_share(moved),

@@ -1,4 +1,7 @@
-"""Ambiguous rays: what they show lies near a depth edge of its source, so that it is open which surface they show.
+"""Ambiguous rays: those of which the closed form leaves open which surface they show.
+
+Either it covers them in part, or by several surfaces whose shares nothing tells, or a soft edge of the map lies near:
+then it is sure of a surface that may be the wrong one. Of all others it is right, and T has no say.
 
 For each of them K hypotheses are laid out: surfaces that land within a few pixels, as different from each other as
 possible. A hypothesis says "this ray shows the source ray that disparity d leads to"; its features say how well that
@@ -14,8 +17,9 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ambiguity import AMBIGUOUS_AROUND_PX, AMBIGUOUS_PX, SOFT
+from iibr_core.rendering.ambiguity import AMBIGUOUS_AROUND_PX, SOFT
 from iibr_core.rendering.candidates import Candidates
+from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
 from iibr_core.rendering.resampling import cubic, resample
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
@@ -99,10 +103,12 @@ def find_ambiguous_rays(
     parallax = max(*map(abs, candidates.offset), 1e-9)
     is_soft = around.softness > SOFT
     looks = len(AROUND) if is_soft else AROUND_SHARP
-    certain = candidates.smooth & (not every and not is_soft)
+    in_band = candidates.first_row, candidates.first_row + len(candidates.count)
+    near_soft = land_marked(rays.cells, from_sources, rays.soft_cells, in_band, REACH_PX)
     selected = _select_rays(
-        certain, candidates.count, weights, *shown, around.step, from_sources,
-        parallax, is_soft, looks, candidates.first_row, first, last, every, pixel,
+        candidates.smooth & (not every), near_soft, candidates.count, candidates.source, weights, *shown,
+        around.soft, is_soft, from_sources,
+        rays.photo_images, parallax, looks, candidates.first_row, first, last, every, pixel,
     )  # fmt: skip
     count = _collect_hypotheses(
         selected, candidates.count, candidates.disparity, candidates.source, weights, *shown, rays.size.height,
@@ -189,41 +195,63 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
 
 
 @kernel
+def _is_near_soft_edge(soft, is_soft, d, image, x, y, offsets, photo_images):
+    """Whether the source ray that shows at (x, y) lies near a soft edge; is_soft: what inpainted ones take for that."""
+    if image >= photo_images:
+        return is_soft
+    height, width = soft.shape
+    u = min(max(nearest_pixel(x + d * offsets[image, 1]), 0), width - 1)
+    v = min(max(nearest_pixel(y + d * offsets[image, 0]), 0), height - 1)
+    return soft[v, u]
+
+
+@kernel
+def _is_open(count, source, weights, photo_images, y, x):
+    """Whether the closed form leaves open what a ray shows: it covers the ray in part, or by several surfaces of which
+    none is a fringe: a fringe tells the shares.
+    """
+    heavy, fringed, covered = 0, False, 0.0
+    for k in range(np.int64(count[y, x])):
+        covered += weights[k, y, x]
+        if weights[k, y, x] > LEAST_WEIGHT:
+            heavy += 1
+            fringed |= 0 < source[k, y, x] < photo_images
+    return covered < 1.0 - LEAST_WEIGHT or (heavy != 1 and not fringed)
+
+
+@kernel
 def _select_rays(
-    certain, count, weights, shown_disparity, shown_source, step, offsets,
-    parallax, is_soft, looks, first_row, first, last, every, pixel,
+    smooth, near_soft, count, candidate_source, weights, shown_disparity, shown_source, soft, is_soft, offsets,
+    photo_images, parallax, looks, first_row, first, last, every, pixel,
 ):  # fmt: skip
-    """Write the (row, column) of the ambiguous rays, none in certain cells, to pixel; returns how many they are."""
-    rows = len(count)
-    _, height, width = step.shape
+    """Write the (row, column) of the ambiguous rays to pixel; returns how many they are. In smooth cells there are none
+    but where soft edges are near.
+    """
+    rows, width = count.shape
     found = 0
     for y in range(first, last):
         # Band rows count from first_row, cells from the picture's first row.
-        certain_cells = certain[(y + first_row % CELL_PX) // CELL_PX]
+        cell_row = (y + first_row % CELL_PX) // CELL_PX
         for x in range(width):
-            if certain_cells[x // CELL_PX]:
+            cell = x // CELL_PX
+            if smooth[cell_row, cell] and not near_soft[cell_row, cell]:
                 continue
-            # Ambiguous by its weights: several surfaces share the pixel, or they leave some of it open.
-            heavy = 0
-            covered = 0.0
-            for k in range(np.int64(count[y, x])):
-                heavy += weights[k, y, x] > LEAST_WEIGHT
-                covered += weights[k, y, x]
-            is_ambiguous = every or heavy != 1 or covered < 1.0 - LEAST_WEIGHT
-            if not is_ambiguous and is_soft:
-                # Soft edges: another surface shows near by.
+            is_ambiguous = every or _is_open(count, candidate_source, weights, photo_images, y, x)
+            if not is_ambiguous and near_soft[cell_row, cell]:
+                # Another surface shows near by, and a soft edge lies between.
+                d, image = shown_disparity[y, x], np.int64(shown_source[y, x])
+                is_soft_here = _is_near_soft_edge(soft, is_soft, d, image, x, first_row + y, offsets, photo_images)
                 for i in range(looks):
                     v, u = y + AROUND[i, 0], x + AROUND[i, 1]
-                    if 0 <= v < rows and 0 <= u < width and count[v, u] > 0:
-                        apart = abs(shown_disparity[v, u] - shown_disparity[y, x]) * parallax
-                        is_ambiguous |= apart > AMBIGUOUS_AROUND_PX
-            elif not is_ambiguous:
-                # Sharp edges: the source ray that shows here has a depth edge beside it.
-                d, source = shown_disparity[y, x], np.int64(shown_source[y, x])
-                t, s = offsets[source, 0], offsets[source, 1]
-                u = min(max(nearest_pixel(x + d * s), 0), width - 1)
-                v = min(max(nearest_pixel(first_row + y + d * t), 0), height - 1)
-                is_ambiguous = step[source, v, u] * parallax > AMBIGUOUS_PX
+                    if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
+                        continue
+                    other, image = shown_disparity[v, u], np.int64(shown_source[v, u])
+                    if abs(other - d) * parallax > AMBIGUOUS_AROUND_PX and (
+                        is_soft_here
+                        or _is_near_soft_edge(soft, is_soft, other, image, u, first_row + v, offsets, photo_images)
+                    ):
+                        is_ambiguous = True
+                        break
             if is_ambiguous:
                 pixel[found, 0], pixel[found, 1] = y, x
                 found += 1

@@ -12,6 +12,7 @@ from iibr_core.rendering.ambiguous_rays import (
     FEATURES,
     HYPOTHESES,
     LEAST_VOTE,
+    LEAST_WEIGHT,
     PLAIN,
     SHARE,
     AmbiguousRays,
@@ -20,10 +21,12 @@ from iibr_core.rendering.ambiguous_rays import (
     hypothesis_colors,
 )
 from iibr_core.rendering.candidates import find_candidates
+from iibr_core.rendering.disparity_statistics import SOFT_AROUND_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.training.degradation import blur
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import photo_of, smooth_texture, square_before_wall
 
@@ -53,6 +56,55 @@ def test_only_rays_near_depth_edges_are_ambiguous():
     assert len(flat.pixel) == 0
     everything, _, _ = ambiguous_of(photo, np.zeros_like(disparity.values), every=True)
     assert len(everything.pixel) == disparity.values.size
+
+
+def test_rays_that_the_closed_form_leaves_open_are_ambiguous_and_no_others():
+    """Sharp edges, against a slow twin: covered in part, or by several surfaces, none of which is a fringe."""
+    photo, disparity = square_before_wall()
+    # The pixels just left of the square hold a third of its colour.
+    pixels, values = photo.pixels.copy(), disparity.values
+    y, x = np.nonzero((values[:, 1:] > 0) & (values[:, :-1] == 0))
+    pixels[:] = np.where(values[..., None] > 0, np.float32(0.1), np.float32(0.8))
+    pixels[y, x] = srgb_from_linear(linear_from_srgb(np.float32([0.1, 0.8])) @ np.float32([1 / 3, 2 / 3]))
+    photo = photo_of(pixels)
+    rays = rays_of_photo(photo.pixels, values, 2.0, 0)
+    assert len(rays) == 2
+    candidates = find_candidates(rays, OFFSET, (0, photo.size.height))
+    weights = visibility_weights(candidates)
+    ambiguous, _, _ = ambiguous_of(photo, disparity.values)
+    heavy = weights > LEAST_WEIGHT
+    fringed = (heavy & (candidates.source == 1)).any(axis=0)
+    is_open = (weights.sum(axis=0) < 1 - LEAST_WEIGHT) | ((heavy.sum(axis=0) > 1) & ~fringed)
+    asked = np.zeros_like(is_open)
+    asked[tuple(ambiguous.pixel.T)] = True
+    assert not (asked & ~is_open).any()
+    # Where only one surface is near, there is nothing to decide.
+    assert asked[:, 8:-8].sum() > 0.5 * is_open[:, 8:-8].sum()
+    assert (fringed & ~is_open).sum() > 20
+
+
+@pytest.mark.parametrize("slope", [-0.9, -0.5, 0.3, 0.6])
+def test_no_ray_of_a_steep_surface_is_ambiguous(slope):
+    x = np.arange(90, dtype=np.float32)
+    photo = photo_of(smooth_texture(60, 90, seed=1))
+    for surface in (slope * (x - 45), slope * 64 / (2 * np.pi) * np.cos(x * 2 * np.pi / 64)):
+        ambiguous, _, _ = ambiguous_of(photo, np.tile(surface, (60, 1)).astype(np.float32), offset=ViewOffset(0, 1))
+        # Nothing covers what lies beyond the frame, which a compressed plane leaves earlier.
+        inside = 0.6 * 45 * min(1 - slope, 1)
+        assert not (np.abs(ambiguous.pixel[:, 1] - 45) < inside).any()
+
+
+def test_only_near_soft_edges_covered_rays_are_ambiguous():
+    """A map that is soft on the left and sharp on the right."""
+    photo, disparity = square_before_wall()
+    values = disparity.values.copy()
+    values[:, :35] = blur(values, 2)[:, :35]
+    ambiguous, weights, rays = ambiguous_of(photo, values, offset=ViewOffset(1.0, 0.0))
+    assert 0 < rays.statistics.soft.mean() < 0.6
+    heavy = (weights > LEAST_WEIGHT).sum(axis=0)
+    certain = ((weights.sum(axis=0) >= 1 - LEAST_WEIGHT) & (heavy == 1))[tuple(ambiguous.pixel.T)]
+    assert certain.sum() > 30
+    assert ambiguous.pixel[certain, 1].max() < 35 + SOFT_AROUND_PX
 
 
 def test_hypotheses_are_the_surfaces_around_and_differ():
