@@ -55,8 +55,10 @@ INPAINTED_APART_PX = 100.0
 PROFILE_PX = (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)
 """Where the disparity around a source ray is sampled, along the parallax and across it."""
 MOST_PX = 1e4
-SHARE = 6
-"""The feature that is the closed form's weight."""
+SHARE, INPAINTED, SOFTNESS, UNCOVERED = 6, 8, 11, 12
+"""Features: the closed form's weight, whether inpainted, the map's softness, the share that nothing covers."""
+SAY = 0.6
+"""T's say, 0..1, where surfaces of the photo share a ray they cover, at sharp edges: both are as often right there."""
 PROFILE = 15
 FEATURES = PROFILE + 2 * len(PROFILE_PX) + 1
 """The last is 0: a multiple of four suits the arithmetic."""
@@ -125,6 +127,18 @@ def find_ambiguous_rays(
     pixel[:, 0] += candidates.first_row
     mask = np.arange(hypotheses) < number[:, None]
     return AmbiguousRays(candidates.offset, pixel, mask, disparity, source, features)
+
+
+def bound_weights(ambiguous: AmbiguousRays, weights: FloatImage) -> FloatImage:
+    """T's weights (N, K), moved towards the closed form's on rays that this one is fairly sure of: see SAY."""
+    share = ambiguous.features[..., SHARE] * ambiguous.mask
+    first = ambiguous.features[:, 0]
+    has_inpainted = ((share > 0) & (ambiguous.features[..., INPAINTED] > 0)).any(axis=1)
+    sure = (first[:, UNCOVERED] <= LEAST_WEIGHT) & (first[:, SOFTNESS] <= SOFT) & ~has_inpainted
+    closed = share[sure] / np.maximum(share[sure].sum(axis=1, keepdims=True), np.float32(LEAST_WEIGHT))
+    bounded = weights.copy()
+    bounded[sure] = SAY * weights[sure] + (1 - SAY) * closed
+    return bounded
 
 
 def hypothesis_colors(rays: RaySet, ambiguous: AmbiguousRays) -> FloatImage:
@@ -412,10 +426,10 @@ def _describe_hypotheses(
             out[5] = _softsign((d - back) * parallax)  # ... and the farthest
             out[SHARE] = share[n, a]
             out[7] = nearest[n, a] / (REACH_PX + 1.0)  # how far away the surface lands, 0..1
-            out[8] = 1.0 if k >= photo_images else 0.0  # inpainted
+            out[INPAINTED] = 1.0 if k >= photo_images else 0.0  # inpainted
             out[9] = log_parallax
             out[10] = coverage[k, v, u]
-            out[11] = softness
-            out[12] = max(uncovered, 0.0)  # share of the pixel that nothing covers
+            out[SOFTNESS] = softness
+            out[UNCOVERED] = max(uncovered, 0.0)  # share of the pixel that nothing covers
             out[13] = _softsign(step[k, v, u] * parallax)  # the depth edge beside it
             out[14] = 1.0 if source[n, a] >= PLAIN else 0.0

@@ -21,6 +21,7 @@ from iibr_core.rendering.ambiguous_rays import (
     REACH_PX,
     AmbiguousRays,
     blend_hypotheses,
+    bound_weights,
     find_ambiguous_rays,
 )
 from iibr_core.rendering.candidates import Candidates, find_candidates
@@ -186,6 +187,8 @@ class ViewSynthesis:
         raise_if_stopped(self._should_stop)
         colors, disparity, source = resample_colors(rays, candidates, weights, wanted)
         chosen = self._transformer(ambiguous)
+        if not self._every:
+            chosen = bound_weights(ambiguous, chosen)
         raise_if_stopped(self._should_stop)
         colors[at], disparity[at], source[at] = blend_hypotheses(rays, ambiguous, chosen)
         return colors, disparity, source

@@ -157,6 +157,9 @@ def field_on_disk(folder, value):
 FINITE = {
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
     "rendering.ambiguous_rays.blend_hypotheses": lambda v, _: decided(v),
+    "rendering.ambiguous_rays.bound_weights": lambda v, _: ambiguous_rays.bound_weights(
+        contest(v), generating.transformer_for("exact")(contest(v))
+    ),
     "rendering.ambiguous_rays.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
     "rendering.ambiguous_rays.hypothesis_colors": lambda v, _: ambiguous_rays.hypothesis_colors(rays(v), contest(v)),
     "generation.cost_model.estimate_costs": lambda v, _: [
