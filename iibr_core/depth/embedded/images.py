@@ -22,6 +22,8 @@ PNG_END = b"IEND\xaeB`\x82"
 PNG_START, JPEG_START = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 GREY_TOLERANCE = 10
 """By how many of 255 steps the channels of a grey picture may differ: it may have been a JPEG."""
+READ_ROWS = 64
+"""Looked at together: as RGB and as floats a large map takes many times its own memory."""
 
 # What Pillow raises for damaged PNGs and JPEGs.
 DECODE_ERRORS = (
@@ -84,7 +86,11 @@ def _grey(picture: Image.Image) -> FloatImage | None:
         return np.asarray(picture, np.float32) * np.float32(1 / 65535)
     if picture.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
         return None
-    values = np.asarray(picture.convert("RGB"))
-    if (np.ptp(values, axis=2) > GREY_TOLERANCE).any():
-        return None
-    return values[..., 0].astype(np.float32) * np.float32(1 / 255)
+    result = np.empty((picture.height, picture.width), np.float32)
+    for top in range(0, picture.height, READ_ROWS):
+        rows = result[top : top + READ_ROWS]
+        colors = np.asarray(picture.crop((0, top, picture.width, top + len(rows))).convert("RGB"))
+        if (np.ptp(colors, axis=2) > GREY_TOLERANCE).any():
+            return None
+        rows[:] = colors[..., 0].astype(np.float32) * np.float32(1 / 255)
+    return result

@@ -52,7 +52,8 @@ def _of_heic(path: Path) -> EmbeddedDepth | None:
 def _of_jpeg(path: Path) -> EmbeddedDepth | None:
     with open_binary(path) as file:
         start = file.read(3)
-        data = start + file.read() if is_jpeg(start) and path.stat().st_size <= MAX_FILE_BYTES else b""
+        file.seek(0)  # joined to what follows, the file would be there twice
+        data = file.read() if is_jpeg(start) and path.stat().st_size <= MAX_FILE_BYTES else b""
     return embedded_in_jpeg(data) if data else None
 
 
