@@ -36,6 +36,10 @@ MAP_BYTES, DEPTH_MAP_BYTES = 6, 26
 """Of one pixel of a disparity map at its own size; more where it is depth."""
 STORED_BYTES, STORED_HDR_BYTES = 7, 10
 """Of one pixel of a view in a light field: colours and disparity."""
+TARGET_BYTES, MOST_TARGET_PIXELS = 24, 8_000_000
+"""Of one pixel of what a picture is drawn into; larger ones are drawn in parts."""
+PICTURE_BYTES, FLOAT_PICTURE_BYTES = 9, 64
+"""Of one pixel of a picture on its way to a file: 8 bits a channel, or linear light."""
 USUAL_RAY_IMAGES, USUAL_HOLE_BYTES, USUAL_AMBIGUOUS_SHARE = 10, 20, 0.2
 """What scenes take while their views are made, before anything is known of them."""
 USUAL_GRID = GridShape(5, 5)
@@ -160,6 +164,14 @@ def require_field(budget: Budget, name: str, size: ImageSize, grid: GridShape) -
     budget.require(
         needed, f"{name}: {grid.columns} x {grid.rows} views of {size}", "raise --memory, or take fewer views"
     )
+
+
+def require_picture(budget: Budget, size: ImageSize, is_float: bool) -> None:
+    """Raise InputError where a picture of this (height, width) cannot be drawn and written, whatever it shows."""
+    pixels = math.prod(size)
+    drawing = min(pixels, MOST_TARGET_PIXELS) * TARGET_BYTES
+    needed = VIEWER_BYTES + drawing + pixels * (FLOAT_PICTURE_BYTES if is_float else PICTURE_BYTES)
+    budget.require(needed, f"a picture of {size}", "give a smaller --size or raise --memory")
 
 
 def mebibytes(count: float) -> str:

@@ -343,7 +343,7 @@ READS_OR_TELLS = {
     "runtime.kernel_cache": "KernelCache sources_hash",
     "runtime.resources": "resource_folder",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
-    "largest_side require_reading require_decoding require_map require_views require_field mebibytes",
+    "largest_side require_reading require_decoding require_map require_views require_field require_picture mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "rendering.view_synthesis": "ViewSynthesis",

@@ -13,7 +13,7 @@ from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.files import is_folder, status_of
 from iibr_core.formats.light_fields.registry import WRITERS
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.types import GridShape, InputError, Quality, ViewOffset
+from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
 from viewer.model.layout import ScreenSize
 
 if TYPE_CHECKING:
@@ -134,6 +134,14 @@ def require_memory(memory_bytes: int | None, keeps_views: bool) -> None:
     from iibr_core.generation.memory_model import budget_of, require_process
 
     require_process(budget_of(memory_bytes), keeps_views)
+
+
+def require_picture_memory(size: ScreenSize | None, memory_bytes: int | None, is_float: bool) -> None:
+    """Raise InputError where a picture of that size, None for the usual one, takes more than may be taken."""
+    from iibr_core.generation.memory_model import budget_of, require_picture
+
+    if size is not None:
+        require_picture(budget_of(memory_bytes), ImageSize(size.height, size.width), is_float)
 
 
 def require_existing(source: Source) -> None:

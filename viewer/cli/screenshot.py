@@ -38,6 +38,7 @@ from viewer.cli.options import (
     require_heeded,
     require_memory,
     require_model,
+    require_picture_memory,
     require_utf8,
     size_from_text,
     view_from_text,
@@ -177,6 +178,7 @@ def screenshot(
         require_utf8(path, disparity, depth_model)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
+    require_picture_memory(shot.size, shot.source.depth.memory_bytes, output.suffix.lower() == ".exr")
     require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)
     require_model(choice)
     shot = replace(shot, lens=_LensOptions(view, focus, aperture))

@@ -17,6 +17,7 @@ from iibr_core.generation.memory_model import (
     pixels_within,
     require_decoding,
     require_map,
+    require_picture,
     require_process,
     require_reading,
     require_views,
@@ -135,3 +136,10 @@ def test_the_whole_is_what_the_plan_says():
     made = plan_for_viewing(photo, disparity)
     whole = whole_bytes(math.prod(photo.size), made.field_bytes, made.peak_bytes, keeps_views=True)
     assert f"{math.ceil(whole / MIB)} MiB in all" in made.reasons[-1]
+
+
+def test_the_picture_counts_and_floats_count_more():
+    size, budget = ImageSize(9000, 9000), Budget(2 * GIB, "--memory is")
+    require_picture(budget, size, is_float=False)
+    with pytest.raises(InputError, match="a picture of 9000x9000 takes"):
+        require_picture(budget, size, is_float=True)
