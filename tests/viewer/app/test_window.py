@@ -13,10 +13,12 @@ import pytest
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
+from viewer.app.main_loop import App
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
+from viewer.model.actions import SetDepthStrength
 from viewer.model.state.app_state import Source
-from viewer.model.state.optics import Optics
+from viewer.model.state.optics import MoveEye, Optics
 
 Opener = Callable[..., Driver]
 
@@ -194,3 +196,23 @@ def test_a_dropped_name_that_is_no_text_is_told_as_not_found(viewer: Driver) -> 
     ((_, callback),) = glfw._window_drop_callback_repository.values()
     callback(viewer.app.window.handle, 1, (ctypes.c_char_p * 1)(b"/gone/\xff.png"))
     viewer.until(lambda app: any("no such file" in notice.text for notice in app.state.notices))
+
+
+def test_views_come_nearest_first_to_where_the_user_looks(open_window: Opener, photo_path: Path) -> None:
+    """From the hand to the worker: the viewpoint in a corner, the views made anew."""
+    driver = open_window(photo_path, grid=GridShape(9, 9))
+    driver.until_idle()
+    before = driver.app.state.scene
+    driver.app.do(MoveEye(ViewOffset(-4.0, -4.0)), SetDepthStrength(1.5, is_finished=True))
+    driver.until(lambda app: app.state.scene is not before)
+    arrived: list[tuple[int, int]] = []
+
+    def is_done(app: App) -> bool:
+        arrived.extend(sorted(app.state.views_there.difference(arrived)))
+        return len(arrived) == 81
+
+    driver.until(is_done)
+    distances = [row + column for row, column in arrived]
+    # The photo and the outer views come first, wherever the user looks.
+    first, last = distances[9:45], distances[45:]
+    assert sum(first) < 0.7 * sum(last)
