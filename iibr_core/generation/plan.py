@@ -26,8 +26,17 @@ from iibr_core.generation.memory_model import (
     view_bytes,
     whole_bytes,
 )
-from iibr_core.generation.relief import measure_relief
-from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, Disparity, GridShape, InputError, Photo, Quality
+from iibr_core.generation.relief import Relief, measure_relief
+from iibr_core.types import (
+    DEFAULT_QUALITY,
+    TOTAL_PARALLAX,
+    Disparity,
+    FloatImage,
+    GridShape,
+    InputError,
+    Photo,
+    Quality,
+)
 
 STEP_PX = 4.0
 """For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity."""
@@ -94,7 +103,8 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
         raise InputError(f"--depth-strength {wanted.depth_strength:g}: give a number up to {MOST_STRENGTH:g}")
     budget = budget_of(wanted.memory_bytes)
     relief = measure_relief(disparity.values)
-    disparity = replace(disparity, values=np.clip(disparity.values, relief.low, relief.high))
+    given = disparity.values
+    disparity = replace(disparity, values=np.clip(given, relief.low, relief.high))
     zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
     width = photo.size.width
     parallax_px = 0.0
@@ -116,6 +126,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
         reasons.append(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
+    reasons += _wild_reasons(given, relief)
     plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons)
     _require_room(plan, photo, budget, wanted.quality, keeps_views=True)
     return replace(plan, given_range=(relief.low, relief.high))
@@ -199,6 +210,15 @@ def _complete_plan(
         (*reasons, *_cost_reasons(statistics, costs, field_bytes, whole_bytes(pixels, field_bytes, peak_bytes, True))),
         costs,
     )
+
+
+def _wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
+    """A sentence where the map holds what lies far beyond its relief."""
+    far, near = relief.low - relief.range / 2, relief.high + relief.range / 2
+    count = int(np.count_nonzero((given < far) | (given > near))) if relief.range > 0 else 0
+    if not count:
+        return []
+    return [f"{count} pixels lie far beyond that range, as mistakes do: they count as the nearest or the farthest."]
 
 
 def _cost_reasons(statistics: ParallaxStatistics, costs: CostEstimates, field_bytes: int, in_all: int) -> list[str]:

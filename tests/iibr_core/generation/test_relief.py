@@ -64,6 +64,8 @@ def test_lone_wild_pixels_neither_set_the_range_nor_move_beyond_it(wild, count):
     values.flat[places] = wild
     assert planned(values).disparity_scale == pytest.approx(expected.disparity_scale, rel=0.02)
     assert drawn_px(values) == pytest.approx(TOTAL_PARALLAX * WIDTH, rel=1e-3)
+    assert [reason for reason in planned(values).reasons if f"{len(set(places))} pixels lie far beyond" in reason]
+    assert not [reason for reason in expected.reasons if "beyond" in reason]
 
 
 @pytest.mark.parametrize("strength", [0.25, 1.0, 3.0])
