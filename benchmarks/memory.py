@@ -1,7 +1,8 @@
 """What memory the commands take at most under `--memory`, and what stays after many photos in one process.
 
-python -m benchmarks.memory bounds | day | speed: the peaks of fresh processes for photos of 12 to 100 MP; memory after
-10 and after 150 photos, by what is done about freed memory; the time that this costs a light field.
+python -m benchmarks.memory bounds [12 24 ...] | day | speed: the peaks of fresh processes for photos of so many MP;
+memory after 10 and after 150 photos, by what is done about freed memory; the time that this costs a light field.
+docs/memory.md has what they printed.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from iibr_core.types import GridShape
 
 MIB = 2**20
 SIZES = {12: (3000, 4000), 24: (4000, 6000), 48: (6000, 8000), 100: (8660, 11547)}
-BUDGETS = ("700M", "1G", "2G", "4G")
-KINDS = (".jpg", ".png", ".tif", ".exr")
+BUDGETS = ("700M", "1G", "2G")
+KINDS = (".jpg", ".png", ".exr")
 PHOTOS, LOOKED_AT, LARGEST = 150, 10, 600_000
 POLICIES = {
     "glibc's own ways": {},
@@ -37,6 +38,8 @@ SHIPPED = "two heaps, trimmed"
 
 def main() -> None:
     ways = {"bounds": bounds, "day": day, "speed": speed, "photos": photos_in_turn, "views": views_once}
+    if len(sys.argv) < 2 or sys.argv[1] not in ways:
+        sys.exit(__doc__)
     ways[sys.argv[1]](*sys.argv[2:])
 
 
@@ -58,8 +61,8 @@ def _peaks(photo: Path, budget: str) -> Iterator[str]:
     commands = {
         "plan": [],
         "plan --max-pixels 100000000": [],
-        "screenshot": ["-o", str(out / "picture.png")],
-        "generate --grid 5": ["--out", str(out / "field")],
+        "screenshot": ["-o", str(out / "picture.png"), "--force"],
+        "generate --grid 5": ["--out", str(out / "field"), "--force"],
     }
     for command, more in commands.items():
         name, *options = command.split()
@@ -70,7 +73,7 @@ def _peaks(photo: Path, budget: str) -> Iterator[str]:
 def peak_of(arguments: list[str]) -> tuple[int, float]:
     """Exit code of the command line in a process of its own, and its peak, MiB; this one's counts too, but is less."""
     silent = subprocess.DEVNULL
-    child = subprocess.Popen([sys.executable, "-m", "viewer", *arguments], stdout=silent, stderr=silent)
+    child = subprocess.Popen([sys.executable, "-P", "-m", "viewer", *arguments], stdout=silent, stderr=silent)
     _, status, used = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
     return child.returncode, used.ru_maxrss / 1024
