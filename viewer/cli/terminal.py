@@ -61,8 +61,11 @@ def show_progress(doing: str) -> Iterator[Callable[..., None]]:
     from rich.progress import Progress
 
     console = Console(stderr=True)
-    # Elsewhere a bar leaves empty lines, and an error is to be the only line.
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+    if not console.is_terminal:
+        # A bar leaves empty lines there, and an error is to be the only line.
+        yield lambda *_: None
+        return
+    with Progress(console=console, transient=True) as bar:
         task = bar.add_task(doing, total=None)
 
         def show(done: int, total: int, now: str = "") -> None:

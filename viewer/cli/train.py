@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iibr_core.formats.files import is_file
-from iibr_core.types import ReportProgress
+from iibr_core.types import ReportProgress, ignore_progress
 from viewer.cli.options import Force
 
 if TYPE_CHECKING:
@@ -104,6 +104,9 @@ def _show_bar() -> Iterator[ReportProgress]:
 
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[loss]}"), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Progress("training", *columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    if not console.is_terminal:
+        yield ignore_progress
+        return
+    with Progress("training", *columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=None, loss="")
         yield lambda done, total, doing: bar.update(task, completed=done, total=total, loss=doing)
