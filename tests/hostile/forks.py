@@ -33,7 +33,9 @@ def run_in_fork(
     if process.exitcode is None:
         process.kill()
         return KILLED
-    return process.exitcode
+    # Written by the process itself: threads that start others may have taken the exit code for themselves.
+    code = told / "code"
+    return int(code.read_text()) if code.exists() else process.exitcode
 
 
 def _become_command(arguments: tuple[str, ...], work: Path, environment: dict[str, str], told: Path) -> None:
@@ -48,4 +50,8 @@ def _become_command(arguments: tuple[str, ...], work: Path, environment: dict[st
     sys.argv = ["iibr", *arguments]
     from viewer.entry import main
 
-    main()
+    try:
+        main()
+    except SystemExit as ending:
+        (told / "code").write_text(str(ending.code or 0))
+        raise
