@@ -26,7 +26,7 @@ RunCase = Callable[[Case], Ended]
 
 @pytest.fixture(scope="session")
 def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunCase]:
-    """Tells how a case ended. All that this session asks for are started at once, where it does not share the tests."""
+    """Tells how a case ended. All that are asked for are started at once, where no other worker shares the tests."""
     folder = tmp_path_factory.mktemp("hostile")
     template = folder / "template"
     make_template(template)
