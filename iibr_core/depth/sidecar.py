@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.files import is_file
 from iibr_core.types import Disparity, ImageSize
 
@@ -27,6 +28,13 @@ def find_sidecar(photo_path: Path) -> Path | None:
             if is_file(candidate) and candidate != photo_path:
                 return candidate
     return None
+
+
+def map_to_read(photo_path: Path, choice: DepthChoice) -> Path | None:
+    """The map that the user names; else the one beside the photo, where the search for depth begins with it."""
+    if choice.file is not None:
+        return Path(choice.file)
+    return find_sidecar(photo_path) if choice.start == "auto" else None
 
 
 def flat_disparity(size: ImageSize) -> Disparity:

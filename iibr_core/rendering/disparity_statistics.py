@@ -65,11 +65,6 @@ def _measure_rows(disparity: FloatImage, found: list[FloatImage], should_stop: S
     in_bands(lambda first, last: _window_extremes(disparity, first, last, *found), image_size(disparity), should_stop)
 
 
-def edge_softness(disparity: FloatImage, least_edge: float, should_stop: ShouldStop = never) -> float:
-    """The softness that `find_soft_edges` gives."""
-    return find_soft_edges(disparity, least_edge, should_stop)[1]
-
-
 def find_soft_edges(
     disparity: FloatImage, least_edge: float, should_stop: ShouldStop = never
 ) -> tuple[NDArray[np.bool_], float]:

@@ -247,7 +247,6 @@ FINITE = {
         joined_rays.join_rays(depths(v), 0.5, 0.5)
     ),
     "rendering.disparity_statistics.find_soft_edges": lambda v, _: disparity_statistics.find_soft_edges(depths(v), 0.5),
-    "rendering.disparity_statistics.edge_softness": lambda v, _: disparity_statistics.edge_softness(depths(v), 0.5),
     "rendering.disparity_statistics.measure_disparity": lambda v, _: (
         disparity_statistics.measure_disparity(depths(v)[None], 1.0).softness
     ),
@@ -305,7 +304,7 @@ READS_OR_TELLS = {
     "depth.models.package_models": "run_package",
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
-    "depth.sidecar": "find_sidecar flat_disparity",
+    "depth.sidecar": "find_sidecar map_to_read flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
     "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
@@ -327,7 +326,7 @@ READS_OR_TELLS = {
     "formats.images.oiio_writer": "write_image_file",
     "formats.images.oiio_names": "oiio_name",
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
-    "complaint_of",
+    "complaint_of full_scale",
     "formats.images.header": "PhotoHeader read_photo_header",
     "formats.light_fields.stanford": "read_stanford",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",

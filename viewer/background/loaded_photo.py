@@ -147,20 +147,16 @@ def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, tuple[str, 
 
 def _require_map(source: Source, budget: Budget, keeps_views: bool) -> None:
     """Raise InputError where the map to be read is too large; one that nobody named may be a bad one."""
-    from iibr_core.depth.sidecar import find_sidecar
+    from iibr_core.depth.sidecar import map_to_read
     from iibr_core.formats.maps.reader import read_map_header
 
-    named, path = source.depth.file, None
-    if named is not None:
-        path = Path(named)
-    elif source.depth.start == "auto":
-        path = find_sidecar(Path(source.path))
+    path = map_to_read(Path(source.path), source.depth)
     if path is None:
         return
     try:
         header = read_map_header(path)
     except InputError:
-        if named is not None:
+        if source.depth.file is not None:
             raise
         return
     require_map(budget, path.name, header.size, header.bytes_beside, keeps_views)

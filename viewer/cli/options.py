@@ -161,11 +161,11 @@ def require_model(choice: DepthChoice) -> None:
 
 def inputs_with_sidecar(source: Source, *more: Path | None) -> tuple[Path, ...]:
     """What a command reads, and nothing may be written onto: the source, the map that lies beside it, and more."""
-    from iibr_core.depth.sidecar import find_sidecar
+    from iibr_core.depth.sidecar import map_to_read
     from viewer.app.save_places import inputs_of
 
-    beside = find_sidecar(Path(source.path)) if source.depth.start == "auto" and source.depth.file is None else None
-    return (*inputs_of(source), *(path for path in (beside, *more) if path is not None))
+    map_path = map_to_read(Path(source.path), source.depth)
+    return (*inputs_of(source), *(path for path in (map_path, *more) if path is not None))
 
 
 def require_utf8(*names: object) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
-from iibr_core.formats.images.oiio_reader import Raster
+from iibr_core.formats.images.oiio_reader import Raster, full_scale
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage, ImageSize
 
@@ -58,13 +58,12 @@ def linear_light(raster: Raster) -> FloatImage:
     """Linear light over black, (H, W, 3), of finite pixels."""
     pixels = raster.pixels
     if pixels.dtype.kind == "u":
-        steps = np.iinfo(pixels.dtype).max
+        steps = full_scale(pixels.dtype)
         linear = linear_from_srgb(np.arange(steps + 1, dtype=np.float32) / steps)[pixels]
     else:
         linear = np.maximum(pixels, 0)
     if raster.alpha is not None and raster.spec.get_int_attribute("oiio:UnassociatedAlpha"):
-        full = np.iinfo(raster.alpha.dtype).max if raster.alpha.dtype.kind == "u" else 1
-        alpha = np.nan_to_num(raster.alpha.astype(np.float32) / full)
+        alpha = np.nan_to_num(raster.alpha.astype(np.float32) / full_scale(raster.alpha.dtype))
         linear = linear * np.clip(alpha, 0, 1)[..., None]
     return np.ascontiguousarray(np.repeat(linear, 3, axis=2) if linear.shape[2] == 1 else linear, np.float32)
 

@@ -107,7 +107,7 @@ class PictureRows:
             self._kept = np.concatenate([self._kept, rows]) if len(self._kept) else rows
         rows = self._kept[: last - first]
         alpha = np.ascontiguousarray(rows[..., self._alpha_at]) if self._alpha_at >= 0 else None
-        if alpha is not None and (alpha >= (_full(alpha.dtype))).all():
+        if alpha is not None and (alpha >= full_scale(alpha.dtype)).all():
             alpha = None
         return Raster(rows[..., : self._colors], alpha, self.spec)
 
@@ -193,7 +193,8 @@ def require_whole_png(path: Path) -> None:
                 raise InputError(f"{path}: damaged or cut off (it ends at byte {end}); get the whole file again")
 
 
-def _full(dtype: Any) -> int:
+def full_scale(dtype: Any) -> int:
+    """The value of pixels of this type that is white, or opaque."""
     return np.iinfo(dtype).max if dtype.kind == "u" else 1
 
 

@@ -9,7 +9,6 @@ from iibr_core.rendering.disparity_statistics import (
     SOFT_AROUND_PX,
     SOFT_EDGES_PX,
     STEP_AROUND_PX,
-    edge_softness,
     find_soft_edges,
     measure_disparity,
 )
@@ -92,7 +91,7 @@ def slow_softness(disparity: np.ndarray, least_edge: float) -> float:
 def test_softness_against_a_slow_twin(shape: tuple[int, int], unknown: float):
     disparity = np.cumsum(random_disparity(np.random.default_rng(4), shape, 0.0), axis=1)
     disparity[np.random.default_rng(5).random(shape) < unknown] = np.nan
-    assert edge_softness(disparity, 1.5) == pytest.approx(slow_softness(disparity, 1.5), rel=1e-5)
+    assert find_soft_edges(disparity, 1.5)[1] == pytest.approx(slow_softness(disparity, 1.5), rel=1e-5)
 
 
 @pytest.mark.parametrize("unknown", [0.0, 0.02])
@@ -125,12 +124,12 @@ def test_soft_edges_are_marked_where_they_are():
     soft, softness = find_soft_edges(disparity, 0.5)
     assert soft[24:40, 12:20].all()
     assert not soft[24:40, 32:].any()
-    assert 0.1 < softness < edge_softness(blur(disparity, 2), 0.5)
+    assert 0.1 < softness < find_soft_edges(blur(disparity, 2), 0.5)[1]
 
 
 def test_softness_tells_steps_from_slopes():
-    assert edge_softness(square(), 0.5) == 0
-    softness = [edge_softness(blur(square(), sigma), 0.5) for sigma in (0.5, 1, 2, 4)]
+    assert find_soft_edges(square(), 0.5)[1] == 0
+    softness = [find_soft_edges(blur(square(), sigma), 0.5)[1] for sigma in (0.5, 1, 2, 4)]
     assert softness == sorted(softness)
     assert softness[-1] > 0.8 > 0.5 > softness[0] > 0
 
@@ -147,4 +146,4 @@ def test_softness_tells_steps_from_slopes():
     ],
 )
 def test_maps_without_depth_edges_have_softness_0(disparity: np.ndarray):
-    assert edge_softness(disparity.astype(np.float32), 0.5) == 0
+    assert find_soft_edges(disparity.astype(np.float32), 0.5)[1] == 0

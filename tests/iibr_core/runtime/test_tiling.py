@@ -14,7 +14,7 @@ from iibr_core.generation.light_field import generate
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.rendering.disparity_statistics import edge_softness, measure_disparity
+from iibr_core.rendering.disparity_statistics import find_soft_edges, measure_disparity
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
@@ -64,7 +64,7 @@ STAGES = {
     "render": rendered,
     "fill": filled,
     "survey": surveyed,
-    "softness": lambda stop: [edge_softness(SOFT, 0.5, stop)],
+    "softness": lambda stop: list(find_soft_edges(SOFT, 0.5, stop)),
     "refine": lambda stop: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, stop)],
     "blur": lambda stop: [measure_edge_blur(COLORS, SOFT, stop).sigma_px],
     "offline": lambda stop: [estimate_from_cues(Photo(COLORS, 100.0, "test"), stop).values],
