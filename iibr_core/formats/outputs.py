@@ -154,8 +154,10 @@ class UnfinishedFolder:
             self._around, self._lock = _make_temporary(self._real.parent, Path.mkdir)
             self.path = self._around / NEW / self._real.name
             self.path.mkdir(parents=True)
-        except OSError as error:
+        except BaseException as error:
             self.discard()
+            if not isinstance(error, OSError):
+                raise
             raise InputError(
                 f"{folder}: cannot be created ({error.strerror or error}); choose another place"
             ) from error

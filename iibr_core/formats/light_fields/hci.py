@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from threading import Semaphore
 from types import TracebackType
 
 import numpy as np
@@ -53,6 +54,8 @@ class HciWriter:
         self._size = ImageSize(0, 0)
         self._range = (math.inf, -math.inf)
         self._pending: list[Future[None]] = []
+        self._writing = Semaphore(WRITING_THREADS)
+        self._is_over = False
 
     @staticmethod
     def require_place(folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
@@ -96,7 +99,14 @@ class HciWriter:
             if kind is None:
                 self._finish()
         finally:
+            self._end_writing()
             self._unfinished.discard()
+
+    def _end_writing(self) -> None:
+        """Wait for what is being written: the pool knows no thread that an interruption struck while it began."""
+        self._is_over = True
+        for _ in range(WRITING_THREADS):
+            self._writing.acquire()
 
     def _finish(self) -> None:
         for pending in self._pending:
@@ -109,7 +119,9 @@ class HciWriter:
 
     def _write(self, update: ViewUpdate) -> None:
         try:
-            self._write_view(update)
+            with self._writing:
+                if not self._is_over:
+                    self._write_view(update)
         except InputError as error:  # the temporary folder's name says nothing to people
             raise InputError(str(error).replace(str(self._unfinished.path), str(self.folder))) from error
 

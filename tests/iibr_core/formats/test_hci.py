@@ -1,6 +1,8 @@
 """Light-field folders: written whole or not at all, read in order, refused by the name of what is wrong."""
 
 import configparser
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import OpenImageIO as oiio
@@ -8,6 +10,7 @@ import pytest
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.light_fields import hci
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.formats.light_fields.registry import find_light_field, open_light_field
 from iibr_core.formats.light_fields.views import read_views
@@ -106,6 +109,37 @@ def test_views_without_any_disparity(tmp_path):
     scene, found = read_light_field(tmp_path / "lf")
     assert scene.range_px == (0, 0)
     assert all(view.disparity is None for view in found)
+
+
+def test_an_interruption_while_a_thread_starts_leaves_nothing(tmp_path, monkeypatch):
+    """The pool does not wait for such a thread, and what it writes must not come after all was removed."""
+    has_begun, pool_is_down = threading.Event(), threading.Event()
+    start, shutdown, write_map = threading.Thread.start, ThreadPoolExecutor.shutdown, hci.write_pfm
+    files = []
+
+    def interrupted_start(thread):
+        start(thread)
+        if thread.name == "hci-writer_0":
+            assert has_begun.wait(60)
+            raise KeyboardInterrupt
+
+    def told_shutdown(*args, **kwargs):
+        shutdown(*args, **kwargs)
+        pool_is_down.set()
+
+    def late_map(path, *args):
+        has_begun.set()
+        assert pool_is_down.wait(60)
+        write_map(path, *args)
+        files.append(path.exists())
+
+    monkeypatch.setattr(threading.Thread, "start", interrupted_start)
+    monkeypatch.setattr(ThreadPoolExecutor, "shutdown", told_shutdown)
+    monkeypatch.setattr(hci, "write_pfm", late_map)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "field", updates())
+    assert files == [True]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_centre_comes_first_then_the_nearest(tmp_path):
