@@ -2,10 +2,15 @@
 
 Numba inlines kernels and constants of other files, but stamps an entry by the kernel's own file only: an edit elsewhere
 would go unnoticed. Here the stamp is of that file and of all that it imports from this package, directly or not.
+
+An installation brings its kernels along, compiled (`viewer/precompile.py`): they count where the sources, Numba, Python
+and the kind of processor are the same, and whoever asks has none of their own. Code is only ever loaded from this
+package's own folder and from where Numba keeps what this user compiled.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import inspect
 import os
@@ -36,23 +41,60 @@ def _import_numba() -> Any:
         if yaml is not None:
             sys.modules["yaml"] = yaml
     numba.core.config._config_fname = os.devnull  # it looks again whenever it compiles
+    _settle_processor(numba)
     return numba
+
+
+PROCESSOR = "x86-64-v3"
+PROCESSOR_FEATURES = {"avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "sse4.2"}
+"""Of the x86-64 psABI's level 3, in LLVM's names: nearly every such processor since 2015."""
+
+
+def _settle_processor(numba: Any) -> None:
+    """Compile for PROCESSOR wherever this one is of that kind, so that kernels compiled elsewhere count here, and
+    results do not depend on the model. Whoever told Numba otherwise has it so; other processors get code of their own.
+    """
+    config = numba.core.config
+    if config.CPU_NAME is None and config.CPU_FEATURES is None:
+        found = {name[1:] for name in numba.core.codegen.get_host_cpu_features().split(",") if name.startswith("+")}
+        if found >= PROCESSOR_FEATURES:
+            config.CPU_NAME, config.CPU_FEATURES = PROCESSOR, ""
 
 
 numba = _import_numba()
 """All of the core has it from here."""
 
 PACKAGE = Path(__file__).resolve().parents[1]
+PRECOMPILED = PACKAGE / "_kernels"
+"""What comes along with an installation: the folders of the package again, with its compiled kernels."""
 _NAMES = re.compile(rf"\b{PACKAGE.name}(?:\.\w+)*".encode())
 _LINE_NUMBER = re.compile(r"-\d+(?=\.py\d+\w*$)")
 
 
-class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-defined]  # numba has no types
-    """Of one kernel: Numba's, but for the stamp, the names of the files, and that nothing goes wrong in it: what cannot
-    be read is a miss and goes, what cannot be written is compiled anew the next time.
+class _Nowhere(numba.core.caching.InTreeCacheLocator):  # type: ignore[misc, name-defined]  # numba has no types
+    """The package's folder where nothing can be written in any place."""
 
-    Raises OSError or RuntimeError where the kernel's source cannot be read, or nothing can be written.
+    def ensure_cache_path(self) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Nowhere:
+        return cls(py_func, py_file)
+
+
+class _Implementation(numba.core.caching.CompileResultCacheImpl):  # type: ignore[misc, name-defined]
+    _locator_classes = (*numba.core.caching.CompileResultCacheImpl._locator_classes, _Nowhere)
+
+
+class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-defined]
+    """Of one kernel: Numba's, but for the stamp, the names of the files, that what came along is read too, and that
+    nothing goes wrong in it: what cannot be read is a miss and goes, what cannot be written is compiled anew the next
+    time.
+
+    Raises OSError or RuntimeError where the kernel's source cannot be read, or Numba is told of no place to write to.
     """
+
+    _impl_class = _Implementation
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
@@ -60,14 +102,23 @@ class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-
         self._file_name = _LINE_NUMBER.sub("", self._impl.filename_base)
         stamp = sources_hash(Path(inspect.getfile(function)).resolve())
         self._cache_file = _CheckedFiles(self.cache_path, self._file_name, stamp)
+        folder = PRECOMPILED.joinpath(*function.__module__.split(".")[1:-1])
+        self._precompiled = _CheckedFiles(str(folder), self._file_name, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled kernel for a signature; None where there is none, or a damaged one."""
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
         except Exception:  # damaged bytes raise whatever they like when they are unpickled
             self.flush()
-            return None
+            found = None
+        return self._load_precompiled(sig, target_context) if found is None else found
+
+    def _load_precompiled(self, sig: Any, target_context: Any) -> Any:
+        with suppress(Exception):
+            data = self._precompiled.load(self._index_key(sig, target_context.codegen()))
+            return data and self._impl.rebuild(target_context, data)
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled kernel, where the disk has room for it and nothing else lies in its place."""

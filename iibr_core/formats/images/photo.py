@@ -114,8 +114,9 @@ def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
     """
     if raster.pixels.dtype.kind == "u" and raster.alpha is None:
         encoded = raster.pixels.astype(np.float32) * np.float32(1 / np.iinfo(raster.pixels.dtype).max)
-        whole = np.ascontiguousarray(np.broadcast_to(encoded, (*encoded.shape[:2], 3)))
-        return whole, True, OddValues(0, 0.0)
+        # Writable, as all other photos are: kernels are compiled once more for arrays that are not.
+        whole = np.repeat(encoded, 3, axis=2) if encoded.shape[2] == 1 else encoded
+        return np.ascontiguousarray(whole), True, OddValues(0, 0.0)
     pixels, odd = finite_pixels(raster.pixels)
     return _encode_in_place(linear_light(Raster(pixels, raster.alpha, raster.spec))), raster.alpha is None, odd
 

@@ -6,12 +6,14 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import iibr_core
+from iibr_core.runtime import kernel_cache
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.kernel_cache import numba
+from iibr_core.runtime.kernel_cache import PROCESSOR, PROCESSOR_FEATURES, numba
 
 ENCODING = """
 from iibr_core.encoding_constants import GAIN
@@ -181,3 +183,81 @@ def test_without_a_place_to_keep_them_kernels_run(package):
 
 def test_kernels_run_without_compiler(package):
     assert encode_in_new_process(package, NUMBA_DISABLE_JIT="1") == (pytest.approx(0.01292), False)
+
+
+@pytest.fixture
+def equipped(package):
+    """The package with its kernels compiled, at another place than where they were, and no cache of the user's."""
+    encode_in_new_process(package)
+    place = package.parent / "elsewhere" / "iibr_core"
+    shutil.copytree(package, place, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in (package, package / "runtime"):
+        subpath = numba.core.caching.UserProvidedCacheLocator.get_suitable_cache_subpath(str(folder / "jit.py"))
+        shutil.copytree(package.parent / "kept" / subpath, place / "_kernels" / folder.relative_to(package))
+    return place
+
+
+def test_kernels_that_come_along_are_not_compiled(equipped):
+    assert encode_in_new_process(equipped) == (pytest.approx(0.01292), True)
+    assert kept_files(equipped) == []
+
+
+def test_kernels_that_come_along_serve_where_nothing_can_be_written(equipped):
+    for folder in (equipped, equipped / "runtime"):
+        folder.chmod(0o500)
+    nowhere = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": os.devnull, "HOME": os.devnull}
+    assert encode_in_new_process(equipped, *WITHOUT_PRIVILEGES, **nowhere) == (pytest.approx(0.01292), True)
+    for folder in (equipped, equipped / "runtime"):
+        folder.chmod(0o700)
+
+
+def test_kernels_that_come_along_do_not_count_for_other_sources_or_processors(equipped):
+    before = kernel_files_along(equipped)
+    assert encode_in_new_process(equipped, NUMBA_CPU_NAME="generic") == (pytest.approx(0.01292), False)
+    edit(equipped / "encoding_constants.py", "1.0", "2.0")
+    assert encode_in_new_process(equipped) == (pytest.approx(0.02584), False)
+    assert encode_in_new_process(equipped) == (pytest.approx(0.02584), True), "now from the user's"
+    assert kernel_files_along(equipped) == before
+
+
+@pytest.mark.parametrize("damage", [cut_off, empty, overwrite_with_garbage, lose_a_block])
+def test_damaged_kernels_that_come_along_are_a_miss(equipped, damage):
+    for path in (equipped / "_kernels").glob("encoding.encode.*"):
+        damage(path)
+    before = kernel_files_along(equipped)
+    assert encode_in_new_process(equipped) == (pytest.approx(0.01292), False)
+    assert kernel_files_along(equipped) == before
+
+
+def kernel_files_along(package):
+    return {path: path.read_bytes() for path in (package / "_kernels").rglob("*.nb?")}
+
+
+def numba_with(features, **config):
+    """As much of Numba as knows the processor."""
+    core = SimpleNamespace(
+        config=SimpleNamespace(**({"CPU_NAME": None, "CPU_FEATURES": None} | config)),
+        codegen=SimpleNamespace(get_host_cpu_features=lambda: features),
+    )
+    return SimpleNamespace(core=core)
+
+
+LEVEL_3 = ",".join(f"+{name}" for name in sorted(PROCESSOR_FEATURES))
+
+
+@pytest.mark.parametrize(
+    ("fake", "name"),
+    [
+        (numba_with(f"{LEVEL_3},+avx512f,-amx-tile"), PROCESSOR),
+        (numba_with(LEVEL_3.replace("+avx2", "-avx2")), None),
+        (numba_with("+neon,+fp-armv8"), None),
+        (numba_with(""), None),
+        (numba_with(LEVEL_3, CPU_NAME="generic"), "generic"),
+        (numba_with(LEVEL_3, CPU_FEATURES="+sse4.2"), None),
+    ],
+    ids=["newer", "older", "arm", "unknown", "named", "features named"],
+)
+def test_kernels_are_compiled_for_one_kind_of_processor_where_this_one_is_of_that_kind(fake, name):
+    kernel_cache._settle_processor(fake)
+    config = fake.core.config
+    assert (config.CPU_NAME, config.CPU_FEATURES == "") == (name, name == PROCESSOR)
