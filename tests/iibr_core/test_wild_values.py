@@ -299,7 +299,7 @@ READS_OR_TELLS = {
     "depth.models.estimate_cache": "cache_folder key_of load",
     "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
     "depth.models.config": "read_config package_for read_preparation",
-    "depth.models.catalog": "known_model model_to_use is_installed cached_folder weight_files bytes_of fetch "
+    "depth.models.catalog": "known_model model_to_use lacking_package cached_folder weight_files bytes_of fetch "
     "require_unchanged",
     "depth.models.package_models": "run_package",
     "depth.embedded.images": "picture_file decode_map",
@@ -341,6 +341,7 @@ READS_OR_TELLS = {
     "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes",
     "runtime.kernel_cache": "KernelCache sources_hash",
     "runtime.resources": "resource_folder",
+    "runtime.extras": "is_installed require_extra",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",

@@ -18,6 +18,7 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
+from iibr_core.runtime.extras import is_installed
 from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto
@@ -63,11 +64,13 @@ class PairReady:
 
 @dataclass(frozen=True)
 class PairScored:
-    """How far the pair of this request is apart: PSNR (infinite where equal), and the mean of FLIP."""
+    """How far the pair of this request is apart: PSNR (infinite where equal), and the mean of FLIP, None where its
+    package is not installed.
+    """
 
     request: InspectionRequest
     psnr_db: float
-    flip: float
+    flip: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +115,8 @@ class ComparisonJob:
         yield self._pair
         if request.is_scored and not should_stop():
             left, right = self._pair.left, self._pair.right
-            yield PairScored(request, psnr(left, right), flip(left, right))
+            flip_mean = flip(left, right) if is_installed("flip_evaluator") else None
+            yield PairScored(request, psnr(left, right), flip_mean)
 
     def _make_pair(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]

@@ -220,6 +220,6 @@ def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> Lo
 
 
 def _models_here() -> tuple[str, ...]:
-    from iibr_core.depth.models.catalog import KNOWN_MODELS, cached_folder, is_installed
+    from iibr_core.depth.models.catalog import KNOWN_MODELS, cached_folder, lacking_package
 
-    return tuple(model.name for model in KNOWN_MODELS if is_installed(model.package) and cached_folder(model))
+    return tuple(model.name for model in KNOWN_MODELS if not lacking_package(model.package) and cached_folder(model))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -13,6 +12,7 @@ import typer
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.files import is_file, status_of
+from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError, Quality
 from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, quality_from_text, require_model
 from viewer.cli.terminal import print_notes, show_progress
@@ -66,7 +66,9 @@ def evaluate(
 
     Example: iibr evaluate hci/dino hci/cotton --out report
     """
-    _require_packages("scipy", "skimage", "jinja2")
+    require_extra("evaluate", "scipy", "skimage", "jinja2", "flip_evaluator")
+    if lpips is not None:
+        require_extra("train", "torch")
     from iibr_core.evaluation.report_folder import require_report_folder
 
     others = [Path(os.path.expanduser(path)) for path in (disparity, depth_model, lpips) if path is not None]
@@ -94,13 +96,6 @@ def evaluate(
     notes = dict.fromkeys(f"{result.scene}: {note}" for result in results for note in result.notes)
     print(out / "index.html")
     print_notes(tuple(notes))
-
-
-def _require_packages(*names: str) -> None:
-    """Raise InputError naming those that are not installed: only evaluation needs them, so they are extras."""
-    missing = [name for name in names if find_spec(name) is None]
-    if missing:
-        raise InputError(f"this needs {' and '.join(missing)}; install them with: pip install 'iibr[evaluate]'")
 
 
 def _disparity_source(text: str) -> DisparityFrom | Path:

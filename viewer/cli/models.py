@@ -44,7 +44,7 @@ def get(
 
     Example: iibr models get depth-anything-v2-small
     """
-    from iibr_core.depth.models.catalog import bytes_of, cached_folder, fetch, is_installed, known_model
+    from iibr_core.depth.models.catalog import bytes_of, cached_folder, fetch, known_model, lacking_package
 
     model = known_model(name)
     folder = cached_folder(model)
@@ -63,8 +63,9 @@ def get(
     folder = fetch(model)
     print(f"{folder} ({bytes_of(folder) / 1e6:,.0f} MB, commit {folder.name})")
     print(f"Use it: iibr view PHOTO --depth-model {model.name}")
-    if not is_installed(model.package):
-        print(f"It also needs the package {model.package}: {model.install}")
+    lacking = lacking_package(model.package)
+    if lacking is not None:
+        print(f"It also needs the package {lacking}: {model.install}")
 
 
 def _is_at_end(file: Any) -> bool:
@@ -83,8 +84,9 @@ def _agrees() -> bool:
 
 
 def _state(model: KnownModel) -> str:
-    from iibr_core.depth.models.catalog import cached_folder, is_installed
+    from iibr_core.depth.models.catalog import cached_folder, lacking_package
 
     if cached_folder(model) is None:
         return "not here"
-    return "here" if is_installed(model.package) else f"lacks {model.package}"
+    lacking = lacking_package(model.package)
+    return "here" if lacking is None else f"lacks {lacking}"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iibr_core.formats.files import is_file
+from iibr_core.runtime.extras import require_extra
 from iibr_core.types import ReportProgress, ignore_progress
 from viewer.cli.options import Force
 
@@ -38,6 +39,7 @@ def train(
 
     Example: iibr train --steps 2500 --learning-rate 3e-3 --out weights.safetensors
     """
+    require_extra("train", "torch")
     from iibr_core.training.run_files import require_run_files
 
     require_run_files(out, may_replace=force or resume)

@@ -6,7 +6,6 @@ Only safetensors files are ever fetched or read: pickled weights run code.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
 import os
 import re
@@ -17,6 +16,7 @@ from pathlib import Path
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.files import is_file, is_folder, reason_of
 from iibr_core.formats.outputs import atomic_write
+from iibr_core.runtime.extras import is_installed
 from iibr_core.types import InputError
 
 TRANSFORMERS = "transformers"
@@ -137,7 +137,7 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
     wanted = choice.model
     if wanted is None:
         usual = known_model(USUAL_MODEL)
-        folder = cached_folder(usual) if is_installed(usual.package) else None
+        folder = cached_folder(usual) if lacking_package(usual.package) is None else None
         if folder is None and choice.asks_for_model:
             raise InputError(f"--depth model: none is on this machine; get one with: iibr models get {USUAL_MODEL}")
         return LocalModel(usual.title, folder, usual.package) if folder is not None else None
@@ -156,9 +156,9 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
     return LocalModel(model.title, folder, model.package)
 
 
-def is_installed(package: str) -> bool:
-    """Whether Python finds a package, without importing it."""
-    return importlib.util.find_spec(package) is not None
+def lacking_package(package: str) -> str | None:
+    """Which of the packages that a model runs on is not installed, its own or torch; None where both are."""
+    return next((name for name in (package, "torch") if not is_installed(name)), None)
 
 
 def cached_folder(model: KnownModel) -> Path | None:
@@ -267,5 +267,6 @@ def _model_in(folder: Path) -> LocalModel:
 
 
 def _require_installed(what: str, package: str, install: str) -> None:
-    if not is_installed(package):
-        raise InputError(f"{what} needs the package {package}, which is not installed: {install}")
+    lacking = lacking_package(package)
+    if lacking is not None:
+        raise InputError(f"{what} needs the package {lacking}, which is not installed: {install}")

@@ -119,7 +119,7 @@ def test_ctrl_c_leaves_nothing(monkeypatch: pytest.MonkeyPatch, data: Path, tmp_
 def test_missing_packages_are_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path
 ) -> None:
-    monkeypatch.setattr("viewer.cli.evaluate.find_spec", lambda name: None)
+    monkeypatch.setattr("iibr_core.runtime.extras.find_spec", lambda name: None)
     assert run(monkeypatch, "evaluate", data, "--out", data / "report") == 2
     assert "pip install 'iibr[evaluate]'" in capsys.readouterr().err
 

@@ -266,6 +266,7 @@ def test_words() -> None:
     assert view_label((0, 4), GRID) == "view 1 → 2 ↑"
     assert view_label((3, 3), GRID) == "view 1 ↓"
     assert score_text(41.234, 0.03125) == "41.23 dB PSNR, 0.0312 FLIP"
+    assert score_text(41.234, None) == "41.23 dB PSNR"
     assert score_text(math.inf, 0.0) == "identical"
     assert "still" in score_text(None, None)
     hover = Hover(12.3, 4.0, -0.5)

@@ -33,7 +33,8 @@ class GroundTruth:
 class Pair:
     """Two images of one view, side by side. view: in the scene's grid, or the ground truth's ("truth").
 
-    psnr_db (infinite where they are equal) and flip (mean, 0..1): of sRGB-encoded values; None until they are known.
+    psnr_db (infinite where they are equal) and flip (mean, 0..1): of sRGB-encoded values; None until they are known,
+    FLIP also where its package is not installed.
     """
 
     generation: int

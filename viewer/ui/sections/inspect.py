@@ -46,10 +46,14 @@ def inspect_section(state: AppState, scene: Scene, layout: Layout) -> list[Actio
 
 
 def score_text(psnr_db: float | None, flip: float | None) -> str:
-    """PSNR and FLIP in one line: "41.2 dB PSNR, 0.031 FLIP"; "identical" where nothing differs."""
-    if psnr_db is None or flip is None:
+    """PSNR and FLIP in one line: "41.2 dB PSNR, 0.031 FLIP", PSNR alone where there is no FLIP; "identical" where
+    nothing differs.
+    """
+    if psnr_db is None:
         return "PSNR and FLIP follow when all is still"
-    return "identical" if math.isinf(psnr_db) else f"{psnr_db:.2f} dB PSNR, {flip:.4f} FLIP"
+    if math.isinf(psnr_db):
+        return "identical"
+    return f"{psnr_db:.2f} dB PSNR" + (f", {flip:.4f} FLIP" if flip is not None else "")
 
 
 def _toggles(state: AppState, layout: Layout) -> list[Action]:

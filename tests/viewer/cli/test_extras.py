@@ -1,0 +1,91 @@
+"""A plain installation, without any of the extras: what it does, and what it says about the rest."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.viewer.conftest import write_scene
+
+ROOT = Path(__file__).parents[3]
+EXTRAS = (
+    "torch",
+    "transformers",
+    "huggingface_hub",
+    "scipy",
+    "skimage",
+    "jinja2",
+    "flip_evaluator",
+    "matplotlib",
+    "cv2",
+)
+START = f"""
+import sys
+sys.modules.update(dict.fromkeys({EXTRAS!r}))  # None: there is no such module
+from viewer.entry import main
+main()
+"""
+
+
+def run_plain(*words: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-P", "-c", START, *(str(word) for word in words)]
+    return subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("generate", "{photo}", "--grid", 3, "--quality", "balanced", "--out", "{dir}/field"),
+        ("screenshot", "{photo}", "--view", "1,0", "--size", "96x64", "-o", "{dir}/picture.png"),
+        ("plan", "{photo}"),
+        ("models",),
+        ("train", "--help"),
+        ("evaluate", "--help"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_viewing_needs_no_extra(tmp_path: Path, words: tuple[object, ...]) -> None:
+    photo = write_scene(tmp_path)
+    done = run_plain(*(str(word).format(photo=photo, dir=tmp_path) for word in words))
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("train", "--steps", 1, "--out", "{dir}/w.safetensors"), "torch; install with: pip install 'iibr[train]'"),
+        (("evaluate", "{dir}", "--out", "{dir}/report"), "flip_evaluator; install with: pip install 'iibr[evaluate]'"),
+        (("plan", "{photo}", "--depth-model", "depth-anything-v2-small"), "pip install 'iibr[depth]'"),
+    ],
+    ids=["train", "evaluate", "depth model"],
+)
+def test_what_needs_one_names_it_in_one_line(tmp_path: Path, words: tuple[object, ...], said: str) -> None:
+    photo = write_scene(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    done = run_plain(*(str(word).format(photo=photo, dir=tmp_path) for word in words))
+    (line,) = done.stderr.splitlines()
+    assert (done.returncode, line.startswith("iibr: "), said in line) == (2, True, True), line
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_lpips_asks_for_torch(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    from viewer.cli.main import main
+
+    monkeypatch.setitem(sys.modules, "torch", None)
+    monkeypatch.setattr(sys, "argv", ["iibr", "evaluate", str(tmp_path), "--out", str(tmp_path / "r"), "--lpips", "x"])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert "torch; install with: pip install 'iibr[train]'" in capsys.readouterr().err
+
+
+def test_the_extras_are_no_dependencies() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert not [need for need in project["dependencies"] if need.startswith(EXTRAS)]
+    assert {"depth", "train", "evaluate"} <= set(project["optional-dependencies"])
