@@ -312,6 +312,7 @@ READS_OR_TELLS = {
     "formats.light_fields.numbered_grid": "read_numbered_grid",
     "formats.light_fields.hci": "read_hci HciWriter",
     "formats.images.downsampling": "downsampled_linear finite_pixels linear_light OddValues Rows",
+    "formats.images.color_profile": "ColorProfile UnusableProfileError color_profile color_profile_of",
     "formats.images.heic": "is_heic read_heic heic_size read_heic_depth",
     "formats.light_fields.llff": "read_llff",
     "formats.light_fields.middlebury": "read_middlebury",

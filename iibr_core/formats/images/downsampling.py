@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
+from iibr_core.formats.images.color_profile import color_profile_of
 from iibr_core.formats.images.oiio_reader import Raster, full_scale
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage, ImageSize
@@ -55,9 +56,12 @@ def downsampled_linear(open_rows: Callable[[], Rows], size: ImageSize) -> tuple[
 
 
 def linear_light(raster: Raster) -> FloatImage:
-    """Linear light over black, (H, W, 3), of finite pixels."""
+    """Linear light over black, (H, W, 3), of finite pixels; by the profile that comes with them."""
     pixels = raster.pixels
-    if pixels.dtype.kind == "u":
+    profile = color_profile_of(raster.spec)[0]
+    if profile is not None and pixels.dtype.kind == "u" and pixels.shape[2] == 3:
+        linear: NDArray[Any] = profile.linear_srgb(pixels)
+    elif pixels.dtype.kind == "u":
         steps = full_scale(pixels.dtype)
         linear = linear_from_srgb(np.arange(steps + 1, dtype=np.float32) / steps)[pixels]
     else:

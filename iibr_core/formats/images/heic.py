@@ -112,7 +112,8 @@ def _describe(spec: Any, info: dict[str, Any]) -> None:
     except (*DECODE_ERRORS, struct.error, TypeError, ZeroDivisionError, KeyError):
         pass  # a photo is one without its Exif too
     if info.get("icc_profile"):
-        spec.attribute("ICCProfile", 1)
+        profile = np.frombuffer(info["icc_profile"], np.uint8)
+        spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(profile)}]"), profile)
         spec.attribute("ICCProfile:profile_description", _profile_name(info["icc_profile"]))
 
 

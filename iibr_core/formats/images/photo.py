@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file, shown_name
+from iibr_core.formats.images.color_profile import color_profile_of
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
 from iibr_core.formats.images.heic import is_heic, read_heic
 from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute
@@ -110,9 +111,9 @@ def _open_rows(path: Path) -> PictureRows | Raster:
 def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
     """sRGB-encoded (H, W, 3) at the stored size, whether it is opaque, and what of it was not finite.
 
-    Opaque integer files pass untouched: they are encoded already.
+    Opaque integer files without a profile pass untouched: they are encoded already.
     """
-    if raster.pixels.dtype.kind == "u" and raster.alpha is None:
+    if raster.pixels.dtype.kind == "u" and raster.alpha is None and color_profile_of(raster.spec)[0] is None:
         encoded = raster.pixels.astype(np.float32) * np.float32(1 / np.iinfo(raster.pixels.dtype).max)
         # Writable, as all other photos are: kernels are compiled once more for arrays that are not.
         whole = np.repeat(encoded, 3, axis=2) if encoded.shape[2] == 1 else encoded
@@ -142,15 +143,11 @@ def _alpha_notes(is_opaque: bool) -> tuple[str, ...]:
 
 
 def _color_notes(spec: Any) -> tuple[str, ...]:
-    notes: tuple[str, ...] = ()
     stored_as = text_attribute(spec, "jpeg:ColorSpace") or text_attribute(spec, "tiff:ColorSpace")
     if "CMYK" in stored_as or "YCCK" in stored_as:
-        notes += ("CMYK was converted to RGB without its colour profile.",)
-    elif spec.getattribute("ICCProfile") is not None:
-        profile = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
-        if "sRGB" not in profile:
-            notes += (f"The colour profile '{profile}' is ignored: colours are taken as sRGB.",)
-    return notes
+        return ("CMYK was converted to RGB without its colour profile.",)
+    note = color_profile_of(spec)[1]
+    return (note,) if note else ()
 
 
 def _exif_focal_px(spec: Any) -> float | None:

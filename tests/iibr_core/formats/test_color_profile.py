@@ -1,0 +1,184 @@
+"""Colour profiles: against Pillow's conversion of the same profile, in closed form, and damaged ones."""
+
+from __future__ import annotations
+
+import struct
+from io import BytesIO
+
+import numpy as np
+import pillow_heif
+import pytest
+from PIL import Image, ImageCms
+
+from iibr_core.color import linear_from_srgb
+from iibr_core.formats.images.color_profile import ColorProfile, UnusableProfileError, color_profile
+from iibr_core.formats.images.photo import read_photo
+
+P3 = ((0.51512, 0.24120, -0.00105), (0.29198, 0.69225, 0.04189), (0.15710, 0.06657, 0.78407))
+"""XYZ under D50 of Display P3's red, green and blue, as in Apple's profile."""
+ADOBE = ((0.60974, 0.31111, 0.01947), (0.20528, 0.62567, 0.06087), (0.14919, 0.06322, 0.74457))
+SRGB_CURVE = ("para", 3, (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045))
+RNG = np.random.default_rng(4)
+COLORS = RNG.integers(0, 256, (40, 60, 3), np.uint8)
+
+
+def fixed(*values):
+    return b"".join(struct.pack(">i", round(65536 * value)) for value in values)
+
+
+def curve_tag(kind, which, values):
+    """ "para", kind of formula, parameters; or "curv", number of entries, entries."""
+    if kind == "para":
+        return b"para" + bytes(4) + struct.pack(">HH", which, 0) + fixed(*values)
+    return b"curv" + bytes(4) + struct.pack(f">I{len(values)}H", which, *values)
+
+
+def profile_bytes(primaries=P3, curve=SRGB_CURVE, space=b"RGB ", name="made here", leave_out=()):
+    """A profile as displays and cameras have them."""
+    text = name.encode("utf-16-be")
+    description = b"mluc" + bytes(4) + struct.pack(">II", 1, 12) + b"enUS" + struct.pack(">II", len(text), 28) + text
+    tags = {b"desc": description, b"cprt": description, b"wtpt": b"XYZ " + bytes(4) + fixed(0.9642, 1, 0.8249)}
+    for channel, xyz in zip("rgb", primaries):
+        tags[f"{channel}XYZ".encode()] = b"XYZ " + bytes(4) + fixed(*xyz)
+        tags[f"{channel}TRC".encode()] = curve_tag(*curve)
+    tags = {signature: data + bytes(-len(data) % 4) for signature, data in tags.items() if signature not in leave_out}
+    at = 132 + 12 * len(tags)
+    table, body = struct.pack(">I", len(tags)), b""
+    for signature, data in tags.items():
+        table += struct.pack(">4sII", signature, at + len(body), len(data))
+        body += data
+    header = struct.pack(">I4s4s4s4s4s12s4s", at + len(body), b"", b"\4\x30\0\0", b"mntr", space, b"XYZ ", b"", b"acsp")
+    return header + bytes(28) + fixed(0.9642, 1, 0.8249) + bytes(128 - len(header) - 40) + table + body
+
+
+def converted(colors, data):
+    """By Pillow (littleCMS), which has 8 bits."""
+    source = ImageCms.ImageCmsProfile(BytesIO(data))
+    target = ImageCms.createProfile("sRGB")
+    intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
+    return np.asarray(ImageCms.profileToProfile(Image.fromarray(colors), source, target, intent))
+
+
+CURVES = {
+    "sRGB": SRGB_CURVE,
+    "gamma": ("curv", 1, (563,)),
+    "linear": ("curv", 0, ()),
+    "table": ("curv", 1024, tuple(np.rint(65535 * np.linspace(0, 1, 1024) ** 1.8).astype(int))),
+    "power": ("para", 0, (2.2,)),
+    "BT.709": ("para", 3, (1 / 0.45, 1 / 1.099, 0.099 / 1.099, 1 / 4.5, 0.081)),
+    "raised": ("para", 4, (2.4, 0.9, 0.05, 0.5, 0.04, 0.01, 0.0)),
+    "shifted": ("para", 1, (2.0, 1.1, -0.1)),
+    "lifted": ("para", 2, (2.0, 0.9, -0.05, 0.05)),
+}
+
+
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
+@pytest.mark.parametrize("primaries", [P3, ADOBE], ids=["P3", "Adobe"])
+def test_photos_are_converted_as_littlecms_does(tmp_path, primaries, curve):
+    data = profile_bytes(primaries, curve)
+    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=data)
+    photo = read_photo(tmp_path / "a.png")
+    difference = np.abs(255 * photo.pixels - converted(COLORS, data).astype(float))
+    assert difference.max() < 1.6, "its eight bits are rounded, ours are not"
+    assert photo.notes == ("Colours were converted to sRGB by the photo's profile, 'made here'.",)
+    assert not photo.is_hdr
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.webp", "a.heic"])
+def test_of_every_format_that_has_profiles(tmp_path, name):
+    patch = np.full((32, 32, 3), (200, 80, 60), np.uint8)
+    if name.endswith("heic"):
+        pillow_heif.from_pillow(Image.fromarray(patch)).save(tmp_path / name, icc_profile=profile_bytes(), quality=100)
+    else:
+        exact = {"quality": 100} if name.endswith("jpg") else {"lossless": True} if name.endswith("webp") else {}
+        Image.fromarray(patch).save(tmp_path / name, icc_profile=profile_bytes(), **exact)
+    for max_pixels in (2000, 100):
+        photo = read_photo(tmp_path / name, max_pixels)
+        assert np.abs(255 * photo.pixels - (216, 69, 50)).max() < 2.5, "P3's (200, 80, 60)"
+
+
+def test_sixteen_bits_stay_so(tmp_path):
+    """A ramp so fine that 8 bits would hold four of its steps."""
+    import OpenImageIO as oiio
+
+    ramp = np.repeat(np.arange(30000, 31024, dtype=np.uint16)[None, :, None], 3, axis=2)
+    spec, data = oiio.ImageSpec(1024, 1, 3, "uint16"), np.frombuffer(profile_bytes(), np.uint8)
+    spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(data)}]"), data)
+    target = oiio.ImageOutput.create(str(tmp_path / "a.png"))
+    assert target.open(str(tmp_path / "a.png"), spec)
+    assert target.write_image(ramp)
+    assert target.close()
+    green = read_photo(tmp_path / "a.png").pixels[0, :, 1]
+    assert np.all(np.diff(green) > 0)
+
+
+def test_alpha_is_taken_over_black_in_linear_light(tmp_path):
+    patch = np.full((4, 4, 4), (200, 80, 60, 128), np.uint8)
+    Image.fromarray(patch).save(tmp_path / "a.png", icc_profile=profile_bytes())
+    linear = linear_from_srgb(read_photo(tmp_path / "a.png").pixels)
+    opaque = color_profile(profile_bytes()).linear_srgb(patch[..., :3])
+    assert np.allclose(linear, opaque * (128 / 255), atol=1e-5)
+
+
+def test_grey_stays_grey():
+    grey = np.repeat(np.arange(256, dtype=np.uint8)[:, None, None], 3, axis=2)
+    linear = color_profile(profile_bytes()).linear_srgb(grey)
+    assert np.ptp(linear, axis=2).max() < 1e-3, "the profile's own numbers are rounded"
+    assert np.allclose(linear[..., 1], linear_from_srgb(grey[..., 1] / 255), atol=1e-3)
+
+
+@pytest.mark.parametrize("named", ["sRGB IEC61966-2.1", "sRGB built-in"])
+def test_srgb_passes_untouched(tmp_path, named):
+    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=profile_bytes(name=named))
+    photo = read_photo(tmp_path / "a.png")
+    assert np.array_equal(np.rint(255 * photo.pixels), COLORS)
+    assert photo.notes == ()
+
+
+BAD = {
+    "empty": b"",
+    "cut off in its header": profile_bytes()[:100],
+    "cut off in its table": profile_bytes()[:170],
+    "cut off in its curves": profile_bytes()[:-60],
+    "garbage": bytes(RNG.integers(0, 256, 3000, np.uint8)),
+    "CMYK": profile_bytes(space=b"CMYK"),
+    "grey": profile_bytes(space=b"GRAY"),
+    "tables only": profile_bytes(leave_out=(b"rXYZ",)),
+    "no curve": profile_bytes(leave_out=(b"gTRC",)),
+    "primaries on a line": profile_bytes((P3[0], P3[0], P3[1])),
+    "no primaries": profile_bytes(((0, 0, 0),) * 3),
+    "absurd table": profile_bytes(curve=("curv", 2**31, (1, 2))),
+    "another curve": profile_bytes(curve=("para", 9, (1.0,))),
+    "absurd power": profile_bytes(curve=("para", 0, (-2.0,))),
+    "larger than any": profile_bytes() + bytes(5 * 2**20),
+}
+
+
+@pytest.mark.parametrize("data", BAD.values(), ids=BAD)
+def test_what_cannot_be_used_is_refused(data):
+    with pytest.raises(UnusableProfileError):
+        color_profile(data)
+
+
+def test_and_said_and_the_photo_taken_as_srgb(tmp_path):
+    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=BAD["tables only"])
+    photo = read_photo(tmp_path / "a.png")
+    assert np.array_equal(np.rint(255 * photo.pixels), COLORS)
+    assert photo.notes == (
+        "The colour profile 'made here' has no curves with a matrix and is ignored: colours are taken as sRGB.",
+    )
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_flipped_bytes_give_colours_or_a_refusal(seed):
+    rng = np.random.default_rng(seed)
+    data = np.frombuffer(profile_bytes(curve=CURVES["raised"]), np.uint8).copy()
+    data[rng.integers(0, len(data), 12)] = rng.integers(0, 256, 12)
+    try:
+        profile = color_profile(data.tobytes())
+    except UnusableProfileError:
+        return
+    assert isinstance(profile, ColorProfile)
+    linear = profile.linear_srgb(COLORS)
+    assert np.isfinite(linear).all()
+    assert 0 <= linear.min() <= linear.max() <= 1
