@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from iibr_core.types import ViewOffset
-from viewer.model.actions import Action, DoTask, EndGesture, OpenPath, Quit, ReturnHome, SetHover, ShowPrompt
+from viewer.model.actions import Action, DoTask, EndGesture, OpenPath, ReturnHome, SetHover, ShowPrompt
 from viewer.model.commands import BY_NAME, COMMANDS, Chord
 from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, Rect, pixel_at
@@ -129,7 +129,7 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     """What the keys ask for. Esc closes what is open in the window first."""
     actions: list[Action] = []
     if keys.is_escape:
-        actions.append(_escape_action(state))
+        actions += _escape_actions(state)
     actions += [BY_NAME[name].action(state) for name in keys.commands]
     if any(keys.arrows):
         eye = state.optics.eye
@@ -138,15 +138,15 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     return actions
 
 
-def _escape_action(state: AppState) -> Action:
-    """What Esc closes: a prompt, the sheet of views, a stroke, the brush, then the program."""
+def _escape_actions(state: AppState) -> list[Action]:
+    """What Esc closes, one at a time: a prompt, a stroke, the sheet of views, the brush. It never quits."""
     if state.prompt is not None:
-        return ShowPrompt(None)
+        return [ShowPrompt(None)]
     if state.stroke is not None:
-        return DropStroke()
-    if state.brush.is_on and not state.inspection.shows_grid:
-        return SetBrush(replace(state.brush, is_on=False))
-    return ShowGrid(False) if state.inspection.shows_grid else Quit()
+        return [DropStroke()]
+    if state.inspection.shows_grid:
+        return [ShowGrid(False)]
+    return [SetBrush(replace(state.brush, is_on=False))] if state.brush.is_on else []
 
 
 def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bool = False) -> list[Action]:
@@ -285,5 +285,7 @@ def read_keys() -> Keys:
     down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
     right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
     commands = tuple(command.name for command in COMMANDS if any(map(is_struck, command.chords)))
-    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False))
+    # A drop-down that is open takes Esc for itself.
+    is_menu_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False)) and not is_menu_open
     return Keys(ViewOffset(float(down), float(right)), is_escape, commands)

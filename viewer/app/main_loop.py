@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -70,6 +71,9 @@ MOTION_FRAME_S = 1 / 60
 DIALOG_LOOK_S = 0.1
 """How often an open file dialog is asked for its answer."""
 
+FRAMES_OF_A_CLICK = 3
+"""A press and its release, and the next press, are heard of in as many frames."""
+
 SETTLING_FRAMES = 3
 """ImGui hands out quick events over several frames and lays out in two: so many must look the same before a sleep."""
 
@@ -119,6 +123,7 @@ class App:
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
         self._stepped_at = 0.0
+        self._took_s: deque[float] = deque(maxlen=FRAMES_OF_A_CLICK)
         self._shown: Frame | None = None
         self._same_frames = 0
         self._is_busy = True
@@ -131,6 +136,7 @@ class App:
     def step(self) -> None:
         """One turn of the loop; sleeps first where nothing was going on in the last ones."""
         self.window.poll(self.wait_s)
+        start = time.perf_counter()
         news = self._drain() + self._take_dropped() + self._take_events()
         self.do(*news)
         self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
@@ -140,7 +146,7 @@ class App:
         if picture and self.scene_view.report != self.state.report:
             self.do(PictureDrawn(self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
-        self._ui.begin(layout, look)
+        self._ui.begin(layout, look, sum(self._took_s))
         pointer = read_pointer()
         actions = gesture_start(pointer, self.state)
         actions += build_screen(self.state, layout, self.scene_view.texture if picture else None, textures)
@@ -152,6 +158,7 @@ class App:
         self._is_busy |= bool(actions) or self._side_effects.is_drawing
         self._direct_worker()
         self._keep_recent()
+        self._took_s.append(time.perf_counter() - start)
 
     @property
     def wait_s(self) -> float:
@@ -253,7 +260,7 @@ class App:
         actions += actions_from_hover(pointer, layout, self.state, pick)
         actions += actions_from_keys(read_keys(), self.state)
         actions += gesture_end(pointer)
-        return [*actions, Quit()] if self.window.should_close else actions
+        return [*actions, Quit()] if self.window.take_closing() else actions
 
     def _inspect(self, is_moving: bool) -> None:
         """Tell what is under the pointer, and have worked out what else is looked at."""

@@ -20,7 +20,7 @@ from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.jobs import message_of
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
-from viewer.model.actions import Action, Notify, ShowPrompt
+from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
 from viewer.model.state.app_state import AppState, Notice, SavedSettings, SavePrompt, SaveTask
 from viewer.model.state.saving import Saving, SavingChanged
 
@@ -114,10 +114,10 @@ class PictureSaver:
         result = self._writer.next_result()
         if result is None and not self._writer.is_lost:
             return []
-        path = self._requests[0].path
+        path, edits = self._requests[0].path, self._requests[0].settings.depth_edits
         if isinstance(result, Done):
             self._next()
-            return [Notify(Notice(f"Saved {path}"))]
+            return [Notify(Notice(f"Saved {path}")), EditsSaved(edits)]
         return self._fail(result.message if result is not None else f"{path}: writing it stopped unexpectedly")
 
     def _fail(self, message: str) -> list[Action]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.formats.outputs import AlreadyThereError
-from iibr_core.types import InputError
+from iibr_core.types import FloatImage, InputError
 from viewer.app.dialogs import Dialog, has_dialogs
 from viewer.app.image_export import export_map
 from viewer.app.picture_saver import PictureSaver
@@ -19,7 +20,7 @@ from viewer.app.save_places import inputs_of_scene, map_path
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, AskForPath, Notify, ShowPrompt, TaskTaken
+from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import (
     AppState,
@@ -118,14 +119,14 @@ class SideEffects:
             return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, what="map"))]
         except InputError as error:
             return [Notify(Notice(str(error), is_error=True))]
-        self._submit(partial(export_map, path, self._scene_view.loaded.disparity.values))
+        self._submit(partial(_save_map, path, self._scene_view.loaded.disparity.values, state.depth.edits))
         return []
 
     def _take_results(self, state: AppState) -> list[Action]:
         actions: list[Action] = []
         while (result := self._files.next_result()) is not None:
             self._under_way.discard(result.id)
-            actions.append(_action_from(result, state))
+            actions += _actions_from(result, state)
         if self._files.is_lost and self._under_way:
             self._under_way.clear()
             actions.append(Notify(Notice("Reading or writing a file stopped unexpectedly.", is_error=True)))
@@ -146,15 +147,30 @@ def is_scene_open(state: AppState) -> bool:
     return state.scene is not None and state.scene.source is state.source
 
 
-def _action_from(result: FileResult, state: AppState) -> Action:
+def _actions_from(result: FileResult, state: AppState) -> list[Action]:
     if isinstance(result, Failed):
-        return Notify(Notice(result.message, is_error=True))
+        return [Notify(Notice(result.message, is_error=True))]
     match result.value:
         case ApertureMask() as mask:
-            return SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))
+            return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
         case GroundTruth() as truth:
-            return TruthRead(truth)
-    return Notify(Notice(str(result.value)))
+            return [TruthRead(truth)]
+        case SavedMap(sentence, edits):
+            return [Notify(Notice(sentence)), EditsSaved(edits)]
+    raise AssertionError(f"nothing comes of {result.value!r}")
+
+
+@dataclass(frozen=True)
+class SavedMap:
+    """A map was written. sentence: for people. edits: that it has."""
+
+    sentence: str
+    edits: DepthEdits
+
+
+def _save_map(path: Path, values: FloatImage, edits: DepthEdits) -> SavedMap:
+    """Raises InputError where it cannot be written."""
+    return SavedMap(export_map(path, values), edits)
 
 
 def read_truth(path: str) -> GroundTruth:

@@ -82,10 +82,11 @@ class Window:
         scale: float = glfw.get_window_content_scale(self.handle)[0]
         return max(scale / self.pixel_ratio, 1.0)
 
-    @property
-    def should_close(self) -> bool:
-        """Whether the user closed it."""
-        return bool(glfw.window_should_close(self.handle))
+    def take_closing(self) -> bool:
+        """Whether the user wanted it closed since the last call."""
+        wanted = bool(glfw.window_should_close(self.handle))
+        glfw.set_window_should_close(self.handle, False)
+        return wanted
 
     def set_title(self, title: str) -> None:
         """Write this in the title bar."""

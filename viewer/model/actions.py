@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from iibr_core.depth.editing.edits import DepthEdits
 from viewer.model.state.app_state import (
     ChoiceOf,
     DrawReport,
@@ -247,7 +248,16 @@ class PlaceWindow:
 
 @dataclass(frozen=True)
 class Quit:
-    """Close the window."""
+    """Close the window; is_sure: also where that loses depth edits, else it is asked."""
+
+    is_sure: bool = False
+
+
+@dataclass(frozen=True)
+class EditsSaved:
+    """A file has these depth edits now."""
+
+    edits: DepthEdits
 
 
 MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
@@ -281,5 +291,6 @@ Action = (
     | SetHover
     | Notify
     | DismissNotice
+    | EditsSaved
     | Quit
 )

@@ -17,6 +17,7 @@ from viewer.ui.style import Look, apply_style, load_fonts
 
 VERTEX_BYTES = 20
 INDEX_BYTES = 2
+DOUBLE_CLICK_S = 0.3
 
 
 class UiHost:
@@ -33,8 +34,11 @@ class UiHost:
             imgui.backends.glfw_init_for_opengl(ctypes.cast(window, ctypes.c_void_p).value or 0, True)
         imgui.backends.opengl3_init("#version 330")
 
-    def begin(self, layout: Layout, look: Look) -> None:
-        """Start a frame of this look. Without a window its size and time step come from here."""
+    def begin(self, layout: Layout, look: Look, behind_s: float = 0.0) -> None:
+        """Start a frame of this look. Without a window its size and time step come from here.
+
+        behind_s: how late the last frames may have heard of a click: a double click may take that much longer.
+        """
         if look != self._look:
             apply_style(look)
             self._look = look
@@ -46,6 +50,7 @@ class UiHost:
             io.display_size = imgui.ImVec2(layout.window.width, layout.window.height)
             io.display_framebuffer_scale = imgui.ImVec2(layout.pixel_ratio, layout.pixel_ratio)
             io.delta_time = 1 / 60
+        imgui.get_io().mouse_double_click_time = DOUBLE_CLICK_S + behind_s
         imgui.new_frame()
 
     def end(self) -> bytes:

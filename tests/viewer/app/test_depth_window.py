@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import glfw
 import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
 from viewer.app.main_loop import App
@@ -126,6 +127,23 @@ def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
     viewer.send("key", "Escape")
     viewer.until(lambda app: not app.state.brush.is_on)
     assert not viewer.app.state.should_quit
+
+
+def test_closing_the_window_asks_before_depth_edits_are_lost(viewer: Driver, tmp_path: Path) -> None:
+    viewer.app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
+    viewer.until(lambda app: is_made(app))
+    viewer.until_idle()
+    glfw.set_window_should_close(viewer.app.window.handle, True)
+    viewer.until(lambda app: app.state.prompt == "quit")
+    viewer.until_idle()
+    viewer.press("Save the depth map…", "prompt str")
+    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
+    viewer.until_idle()
+    viewer.send("key", "Return")
+    viewer.until(lambda app: not app.state.has_unsaved_edits)
+    viewer.until_idle()
+    glfw.set_window_should_close(viewer.app.window.handle, True)
+    viewer.until(lambda app: app.state.should_quit)
 
 
 def test_the_brush_is_taken_from_the_panel_and_by_key(viewer: Driver) -> None:

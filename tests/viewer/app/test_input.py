@@ -20,7 +20,7 @@ from viewer.app.input import (
     gesture_start,
     units_per_view,
 )
-from viewer.model.actions import EndGesture, OpenPath, Quit, ReturnHome, SetHover, ShowPrompt, Undo
+from viewer.model.actions import EndGesture, OpenPath, ReturnHome, SetHover, ShowPrompt, Undo
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
 from viewer.model.layout import Rect as R
@@ -126,7 +126,7 @@ def test_nothing_is_asked_for_without_a_scene_or_room() -> None:
 def test_keys() -> None:
     assert actions_from_keys(Keys(), STATE) == []
     reset = "Reset viewpoint, focus and aperture"
-    assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [Quit(), ResetOptics(), Undo()]
+    assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [ResetOptics(), Undo()]
     assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [ShowPrompt(None)]
     assert reset in BY_NAME
     (move,) = actions_from_keys(Keys(arrows=ViewOffset(1, -1)), STATE)

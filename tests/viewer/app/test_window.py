@@ -162,8 +162,11 @@ def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
     assert not viewer.app.state.notices
 
 
-def test_escape_quits(viewer: Driver) -> None:
+def test_escape_never_quits_and_ctrl_q_does(viewer: Driver) -> None:
     viewer.send("key", "Escape")
+    viewer.until_idle()
+    assert not viewer.app.state.should_quit
+    viewer.send("key", "ctrl+q")
     viewer.until(lambda app: app.state.should_quit)
 
 

@@ -158,7 +158,7 @@ def test_a_path_can_be_typed_where_there_is_no_dialog(viewer: Driver, tmp_path: 
     assert viewer.app.state.recent == (str(other), str(tmp_path / "scene.png"))
 
 
-def test_f1_shows_the_map_and_escape_closes_it_before_it_quits(viewer: Driver) -> None:
+def test_f1_shows_the_map_and_escape_closes_it(viewer: Driver) -> None:
     viewer.send("key", "F1")
     viewer.until(lambda app: app.state.prompt == "help")
     viewer.until_idle()

@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import (
     DismissNotice,
+    EditsSaved,
     Notify,
     OpenFailed,
     OpenPath,
@@ -38,9 +40,10 @@ from viewer.model.lens.limits import (
     is_finite,
 )
 from viewer.model.lens.presets import PRESETS
+from viewer.model.reducers.notices import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
-from viewer.model.reducers.worker_events import NOTICES_KEPT
 from viewer.model.state.app_state import AppState, Hover, Notice, Picture, Progress, SavedSettings, Scene, Source
+from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     EXPOSURE_LIMIT_STOPS,
@@ -187,6 +190,46 @@ def test_what_the_presets_are_for() -> None:
     assert sharp.aperture_diameter == 0
 
 
+def test_a_portrait_keeps_what_the_user_made_sharp_and_lets_the_light_be() -> None:
+    state = reduce(state_with(scene_of(subject_disparity_px=1.5)), SetHighlightRecovery(0.2))
+    chosen = reduce(reduce(state, FocusOn((0.1, -0.2), 2.5)), ApplyPreset("portrait")).optics
+    assert chosen.focus_disparity == 2.5
+    assert chosen.highlight_recovery == 0.2
+    reset = reduce(reduce(state, FocusOn((0.1, -0.2), 2.5)), ResetOptics())
+    assert reduce(reset, ApplyPreset("portrait")).optics.focus_disparity == 1.5
+
+
+@pytest.mark.parametrize("action", [FocusOn((0.0, 0.0), 1.0), SetFocus(1.0)])
+def test_the_first_focusing_opens_the_aperture_and_says_so_once(action: FocusOn | SetFocus) -> None:
+    """Through a pinhole everything is sharp: a click would seem to do nothing."""
+    first = reduce(state_with(scene_of()), action)
+    assert 0 < first.optics.aperture_diameter < aperture_limit(GridShape(9, 9))
+    assert len(first.notices) == 1
+    assert reduce(first, Undo()).optics == Optics()
+    again = reduce(replace(reduce(first, Undo()), notices=()), action)
+    assert again.optics == first.optics
+    assert again.notices == ()
+
+
+def test_focusing_leaves_an_aperture_alone_that_the_user_chose() -> None:
+    for chosen in (SetAperture(0), SetAperture(2), ApplyPreset("everything sharp")):
+        before = reduce(state_with(scene_of()), chosen)
+        assert reduce(before, SetFocus(1.0)).optics.aperture_diameter == before.optics.aperture_diameter
+    one_view = reduce(state_with(scene_of(GridShape(1, 1))), SetFocus(1.0))
+    assert (one_view.optics.aperture_diameter, one_view.notices) == (0, ())
+
+
+def test_quitting_asks_where_depth_edits_would_be_lost() -> None:
+    edits = replace(UNEDITED, gamma=1.5)
+    edited = replace(state_with(scene_of()), depth=DepthSettings(edits=edits))
+    asked = reduce(edited, Quit())
+    assert (asked.prompt, asked.should_quit) == ("quit", False)
+    assert reduce(asked, Quit(is_sure=True)).should_quit
+    assert reduce(reduce(edited, EditsSaved(edits)), Quit()).should_quit
+    assert not reduce(reduce(edited, EditsSaved(replace(edits, gamma=2.0))), Quit()).should_quit
+    assert reduce(state_with(scene_of()), Quit()).should_quit
+
+
 def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> None:
     state = state_with(scene_of(GridShape(5, 5)))
     optics = Optics(eye=ViewOffset(9, 9), aperture_diameter=20, focus_disparity=1)
@@ -304,7 +347,7 @@ def test_reset_brings_the_first_optics_back() -> None:
 )
 def test_what_an_edit_costs(action: object, draws: bool, restarts: bool) -> None:
     """The picture is drawn anew only if its record differs, the worker restarts only if the generation does."""
-    before = state_with(scene_of())
+    before = replace(state_with(scene_of()), has_chosen_aperture=True)
     after = reduce(before, action)  # type: ignore[arg-type]
     picture = [Picture(1, 5, state.optics, (60, 40)) for state in (before, after)]
     assert (picture[0] != picture[1]) == draws

@@ -11,23 +11,27 @@ from viewer.model.state.optics import ApertureShape, Optics, PresetName
 PRESETS: tuple[PresetName, ...] = ("portrait", "macro", "everything sharp")
 
 PORTRAIT_APERTURE = 0.6
+FIRST_APERTURE = 0.3
+"""Of the widest: enough to see what focusing does."""
 PORTRAIT_RANGE = 0.06
 """Of all the disparity there is: a face is sharp from nose to ear."""
 
 
-def preset_optics(name: PresetName, optics: Optics, scene: Scene) -> Optics:
-    """The optics for this purpose; viewpoint, dolly and exposure stay as they are."""
-    plain = replace(optics, focus_range=0.0, focus_tilt=(0.0, 0.0), highlight_recovery=0.0)
+def preset_optics(name: PresetName, optics: Optics, scene: Scene, has_chosen_focus: bool) -> Optics:
+    """The optics for this purpose; viewpoint, dolly, exposure and highlights stay as they are.
+
+    has_chosen_focus: whether the user said what is sharp; then it is the portrait's subject.
+    """
+    plain = replace(optics, focus_range=0.0, focus_tilt=(0.0, 0.0))
     widest = aperture_limit(scene.grid)
     match name:
         case "portrait":
             return replace(
                 plain,
-                focus_disparity=scene.subject_disparity_px,
+                focus_disparity=optics.focus_disparity if has_chosen_focus else scene.subject_disparity_px,
                 focus_range=PORTRAIT_RANGE * focus_span(scene),
                 aperture_diameter=PORTRAIT_APERTURE * widest,
                 aperture_shape=ApertureShape(),
-                highlight_recovery=0.4,
             )
         case "macro":
             return replace(

@@ -8,7 +8,7 @@ from math import hypot, isfinite
 from iibr_core.depth.editing.edits import GAMMA_LIMITS, MOST_POINTS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
 from viewer.model.lens.limits import clamp
 from viewer.model.reducers.history import record_edit
-from viewer.model.reducers.worker_events import add_notice
+from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState, Notice
 from viewer.model.state.depth_editing import (
     Brush,

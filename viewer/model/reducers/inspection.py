@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from viewer.model.lens.limits import clamp
-from viewer.model.reducers.worker_events import add_notice
+from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState, ChooseTask, Hover, Notice, Scene
 from viewer.model.state.inspection import (
     Compare,

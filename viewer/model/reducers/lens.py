@@ -7,8 +7,9 @@ from dataclasses import replace
 from iibr_core.types import ViewOffset
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
 from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, is_finite
-from viewer.model.lens.presets import preset_optics
-from viewer.model.state.app_state import AppState, Scene, TiltHandles
+from viewer.model.lens.presets import FIRST_APERTURE, preset_optics
+from viewer.model.reducers.notices import add_notice
+from viewer.model.state.app_state import AppState, Notice, Scene, TiltHandles
 from viewer.model.state.optics import (
     ApplyPreset,
     FocusOn,
@@ -27,18 +28,48 @@ from viewer.model.state.optics import (
     SetTilt,
 )
 
+APERTURE_OPENED = "Focusing opened the aperture a little: what is nearer or farther blurs. Its slider sets how much."
+
 
 def reduce_lens(state: AppState, action: LensAction) -> AppState:
     """The state with edited optics; the same state where no scene is open or a value is not finite."""
-    if state.scene is None:
+    scene = state.scene
+    if scene is None:
         return state
-    optics = _edit_optics(state.optics, state.scene, action)
     if isinstance(action, MoveTiltHandle):
-        return _move_handle(state, state.scene, action)
-    return replace(state, optics=clamp_optics(optics, state.scene)) if is_finite(optics) else state
+        return _move_handle(state, scene, action)
+    optics = _edit_optics(state, scene, action)
+    if not is_finite(optics):
+        return state
+    edited = replace(_note_choice(state, action), optics=clamp_optics(optics, scene))
+    return _open_for_focus(edited, scene) if isinstance(action, FocusOn | SetFocus) else edited
 
 
-def _edit_optics(optics: Optics, scene: Scene, action: LensAction) -> Optics:
+def _note_choice(state: AppState, action: LensAction) -> AppState:
+    """Remember what the user has decided about focus and aperture."""
+    match action:
+        case FocusOn() | SetFocus():
+            return replace(state, has_chosen_focus=True)
+        case SetAperture():
+            return replace(state, has_chosen_aperture=True)
+        case ApplyPreset():
+            return replace(state, has_chosen_aperture=True, has_chosen_focus=False)
+        case ResetOptics():
+            return replace(state, has_chosen_aperture=False, has_chosen_focus=False)
+    return state
+
+
+def _open_for_focus(state: AppState, scene: Scene) -> AppState:
+    """A pinhole shows everything sharp: the first focusing opens it a little, unless the user chose it."""
+    widest = aperture_limit(scene.grid)
+    if state.has_chosen_aperture or state.optics.aperture_diameter > 0 or widest == 0:
+        return state
+    opened = replace(state, optics=replace(state.optics, aperture_diameter=FIRST_APERTURE * widest), told_aperture=True)
+    return opened if state.told_aperture else add_notice(opened, Notice(APERTURE_OPENED))
+
+
+def _edit_optics(state: AppState, scene: Scene, action: LensAction) -> Optics:
+    optics = state.optics
     match action:
         case MoveEye(eye):
             return replace(optics, eye=eye)
@@ -61,7 +92,7 @@ def _edit_optics(optics: Optics, scene: Scene, action: LensAction) -> Optics:
         case SetExposure(stops):
             return replace(optics, exposure_stops=stops)
         case ApplyPreset(name):
-            return preset_optics(name, optics, scene)
+            return preset_optics(name, optics, scene, state.has_chosen_focus)
         case ResetOptics():
             return Optics()
     return optics

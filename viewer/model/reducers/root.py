@@ -12,6 +12,7 @@ from viewer.model.actions import (
     AskToSave,
     DismissNotice,
     DoTask,
+    EditsSaved,
     EndGesture,
     MotionAction,
     Notify,
@@ -54,7 +55,8 @@ from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
 from viewer.model.reducers.lens import reduce_lens
-from viewer.model.reducers.worker_events import add_notice, reduce_worker_event, stop_work
+from viewer.model.reducers.notices import add_notice
+from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import (
     SECTIONS,
     AppState,
@@ -106,8 +108,11 @@ def reduce(state: AppState, action: Action) -> AppState:
             return undo(state)
         case Redo():
             return redo(state)
-        case Quit():
-            return replace(state, should_quit=True)
+        case EditsSaved(edits):
+            return replace(state, saved_edits=edits)
+        case Quit(is_sure):
+            asks = state.has_unsaved_edits and not is_sure
+            return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
     return _file_or_prompt(state, action)
 
 

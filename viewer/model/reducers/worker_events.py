@@ -8,11 +8,11 @@ from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerEvent
 from viewer.model.reducers.history import map_optics
 from viewer.model.reducers.lens import carry_optics
+from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
 from viewer.model.state.app_state import AppState, History, Motion, Notice, Progress, Scene
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import of_next_scene
 
-NOTICES_KEPT = 5
 RECENT_KEPT = 8
 
 
@@ -29,12 +29,6 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
             return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
             return _leave_job(add_notice(state, Notice(message, is_error=True)))
-
-
-def add_notice(state: AppState, notice: Notice) -> AppState:
-    """The state with one more notice; the oldest go."""
-    others = tuple(other for other in state.notices if other != notice)
-    return replace(state, notices=(*others, notice)[-NOTICES_KEPT:])
 
 
 def stop_work(state: AppState) -> AppState:
@@ -70,7 +64,17 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
     depth = DepthSettings(scene.source.depth.refine)
-    return replace(opened, notices=notices, history=History(), motion=motion, recent=recent, depth=depth, stroke=None)
+    return replace(
+        opened,
+        notices=notices,
+        history=History(),
+        motion=motion,
+        recent=recent,
+        depth=depth,
+        stroke=None,
+        has_chosen_focus=False,
+        has_chosen_aperture=False,
+    )
 
 
 def remember_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:

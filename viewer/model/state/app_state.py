@@ -231,7 +231,8 @@ class PalettePrompt:
     text: str = ""
 
 
-Prompt = PathPrompt | SavePrompt | PalettePrompt | Literal["help"]
+Prompt = PathPrompt | SavePrompt | PalettePrompt | Literal["help", "quit"]
+"""quit: whether to close although depth edits are saved nowhere."""
 
 
 @dataclass(frozen=True)
@@ -303,7 +304,9 @@ class AppState:
 
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
-    depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saving: None without.
+    depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
+    file has them. saving: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this scene what
+    is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -329,7 +332,16 @@ class AppState:
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None
+    saved_edits: DepthEdits = UNEDITED
     saving: Saving | None = None
+    has_chosen_focus: bool = False
+    has_chosen_aperture: bool = False
+    told_aperture: bool = False
+
+    @property
+    def has_unsaved_edits(self) -> bool:
+        """Whether closing would lose what was done to the depth."""
+        return self.stroke is not None or self.depth.edits not in (UNEDITED, self.saved_edits)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DoTask, ShowPrompt
+from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
 from viewer.model.commands import COMMANDS, action_for_path, commands_matching
 from viewer.model.layout import Layout, ScreenSize
 from viewer.model.state.app_state import AppState, PalettePrompt, PathPrompt, Prompt, SavePrompt, SaveTask
@@ -25,7 +25,7 @@ MOUSE = (
     ("Drop", "Open a photo, a folder, a disparity map"),
     ("Ctrl+click a slider", "Type a value"),
     ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
-    ("Esc", "Close, put the brush away, then quit"),
+    ("Esc", "Close what is open, put the brush away"),
 )
 MAP_ENDINGS = "The name's ending decides: .pfm, .exr, .npy, or .png (16 bits, scaled)."
 PATH_WORDS = {
@@ -73,7 +73,9 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
             return _path(prompt, state, layout)
         case PalettePrompt():
             return _palette(prompt, state, layout)
-        case _:
+        case "quit":
+            return _quit(layout)
+        case "help":
             return _help(layout)
 
 
@@ -162,6 +164,18 @@ def _help(layout: Layout) -> list[Action]:
         imgui.end_table()
     gap(layout, 2)
     return [ShowPrompt(None)] if button("Close", layout) else []
+
+
+def _quit(layout: Layout) -> list[Action]:
+    imgui.text("The depth edits are not saved.")
+    gap(layout, 2)
+    if button("Save the depth map…", layout):
+        return [AskToSave("map")]
+    imgui.same_line()
+    if button("Quit without saving", layout):
+        return [Quit(is_sure=True)]
+    imgui.same_line()
+    return [ShowPrompt(None)] if button("Cancel", layout) else []
 
 
 def _prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:

@@ -1,0 +1,15 @@
+"""Notices: the newest last, the oldest go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.model.state.app_state import AppState, Notice
+
+NOTICES_KEPT = 5
+
+
+def add_notice(state: AppState, notice: Notice) -> AppState:
+    """The state with one more notice; the same again takes the place of the earlier."""
+    others = tuple(other for other in state.notices if other != notice)
+    return replace(state, notices=(*others, notice)[-NOTICES_KEPT:])
