@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from typing import Any
@@ -11,13 +12,12 @@ from viewer.model.state.app_state import ChoiceOf
 UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first it finds."""
 
-PHOTO_SUFFIXES = "*.jpg *.jpeg *.png *.tif *.tiff *.exr *.hdr *.webp *.bmp *.heic"
 FILE_KINDS: dict[ChoiceOf, str] = {
-    "photo": PHOTO_SUFFIXES,
-    "mask": "*.png *.jpg *.jpeg *.tif *.tiff *.bmp *.exr",
-    "map": "*.pfm *.exr *.npy *.png *.tif *.tiff",
+    "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif",
+    "mask": "png jpg jpeg tif tiff bmp exr",
+    "map": "pfm exr npy png tif tiff",
 }
-"""What is no folder."""
+"""Endings of what is no folder."""
 
 DIALOG_TITLES: dict[ChoiceOf, str] = {
     "photo": "Open a photo",
@@ -34,19 +34,27 @@ def has_dialogs() -> bool:
     return sys.platform in ("win32", "darwin") or any(map(shutil.which, UNIX_HELPERS))
 
 
+def file_patterns(what: ChoiceOf) -> str:
+    """For the dialog to choose from; cameras write endings in capitals, and dialogs tell them apart."""
+    endings = FILE_KINDS[what].split()
+    return " ".join(f"*.{ending}" for ending in (*endings, *map(str.upper, endings)))
+
+
 class Dialog:
     """An open dialog. what: what it asks for."""
 
-    def __init__(self, what: ChoiceOf) -> None:
+    def __init__(self, what: ChoiceOf, beside: str = "") -> None:
+        """beside: the file or folder that is open; the dialog begins in the folder that holds it."""
         from imgui_bundle import portable_file_dialogs as dialogs
 
         self.what = what
         self._dialog: Any
-        kinds = FILE_KINDS.get(what)
-        if kinds is None:
-            self._dialog = dialogs.select_folder(DIALOG_TITLES[what])
+        start = os.path.join(os.path.dirname(os.path.abspath(beside)), "") if beside else ""
+        if what not in FILE_KINDS:
+            self._dialog = dialogs.select_folder(DIALOG_TITLES[what], start)
         else:
-            self._dialog = dialogs.open_file(DIALOG_TITLES[what], filters=["Images", kinds, "All files", "*"])
+            filters = ["Images", file_patterns(what), "All files", "*"]
+            self._dialog = dialogs.open_file(DIALOG_TITLES[what], start, filters)
 
     def answer(self) -> str | None:
         """The path chosen, "" where the user chose none; None while it is open."""

@@ -83,7 +83,7 @@ class SideEffects:
             case ChooseTask(what):
                 if not has_dialogs():
                     return [AskForPath(what)]
-                self._dialog = self._dialog or Dialog(what)
+                self._dialog = self._dialog or Dialog(what, state.source.path if state.source else "")
             case ReadMaskTask(path):
                 self._masks.append(Path(os.path.expanduser(path)))
                 self._submit(partial(_read_mask, self._masks[-1]))

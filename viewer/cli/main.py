@@ -28,7 +28,8 @@ EXIT_INTERRUPTED = 130
 app = typer.Typer(
     name="iibr",
     cls=Commands,
-    no_args_is_help=True,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -68,11 +69,14 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def iibr(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show it.")
     ] = False,
 ) -> None:
     """One photo becomes a light field you can hold: drag the viewpoint, click to refocus, open the aperture."""
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 @app.command(hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})

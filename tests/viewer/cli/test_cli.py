@@ -48,6 +48,15 @@ def test_help_has_an_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
         assert len(line.split()) > 2, f"no help: {line}"
 
 
+@pytest.mark.parametrize("words", [[], ["-h"], ["plan", "-h"]])
+def test_help_comes_without_asking_and_by_its_short_name(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    assert run(monkeypatch, *words) == 0
+    shown = capsys.readouterr()
+    assert ("Usage: " in shown.out, shown.err) == (True, "")
+
+
 def test_generate_writes_a_light_field_that_opens(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:
