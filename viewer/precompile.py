@@ -86,7 +86,7 @@ def _collect(kept: Path, folder: Path) -> None:
     """From where Numba keeps them, under digests of the places of the sources, to folders named like the package's."""
     from iibr_core.runtime.kernel_cache import PACKAGE, numba
 
-    locator = numba.core.caching.UserProvidedCacheLocator
+    locator = numba.core.caching._CacheLocator
     for place in (PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir())):
         compiled = kept / locator.get_suitable_cache_subpath(str(place / "any.py"))
         if compiled.is_dir():

@@ -71,15 +71,24 @@ _NAMES = re.compile(rf"\b{PACKAGE.name}(?:\.\w+)*".encode())
 _LINE_NUMBER = re.compile(r"-\d+(?=\.py\d+\w*$)")
 
 
-class _Nowhere(numba.core.caching.InTreeCacheLocator):  # type: ignore[misc, name-defined]  # numba has no types
-    """The package's folder where nothing can be written in any place."""
+class _Nowhere(numba.core.caching._CacheLocator):  # type: ignore[misc, name-defined]  # numba has no types
+    """Stands in where nothing can be written in any place: kernels that come along are read all the same."""
+
+    def get_cache_path(self) -> str:
+        return os.devnull
 
     def ensure_cache_path(self) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
+    def get_source_stamp(self) -> None:
+        pass
+
+    def get_disambiguator(self) -> str:
+        return "0"
+
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Nowhere:
-        return cls(py_func, py_file)
+        return cls()
 
 
 class _Implementation(numba.core.caching.CompileResultCacheImpl):  # type: ignore[misc, name-defined]

@@ -92,7 +92,7 @@ def _open(path: Path) -> Any:
 
 def _pixels(path: Path, picture: Any) -> NDArray[Any]:
     try:
-        pixels = np.asarray(picture)
+        pixels = np.array(picture)  # a copy: pillow-heif 1.0's own array does not outlive the file
     except DECODE_ERRORS as error:
         raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
     return pixels.reshape(*pixels.shape[:2], -1)

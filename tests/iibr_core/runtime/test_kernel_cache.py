@@ -192,7 +192,7 @@ def equipped(package):
     place = package.parent / "elsewhere" / "iibr_core"
     shutil.copytree(package, place, ignore=shutil.ignore_patterns("__pycache__"))
     for folder in (package, package / "runtime"):
-        subpath = numba.core.caching.UserProvidedCacheLocator.get_suitable_cache_subpath(str(folder / "jit.py"))
+        subpath = numba.core.caching._CacheLocator.get_suitable_cache_subpath(str(folder / "jit.py"))
         shutil.copytree(package.parent / "kept" / subpath, place / "_kernels" / folder.relative_to(package))
     return place
 
