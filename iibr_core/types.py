@@ -128,11 +128,11 @@ class Disparity:
 
 @dataclass(frozen=True, eq=False)
 class ViewUpdate:
-    """One finished view of a light field.
+    """One view of a light field.
 
     row, column: its index (v, u). colors: (H, W, 3), see StoredColors. disparity: (H, W) float32 of this view, or
     None where a light field read from disk has none. inpainted: (H, W) bool, True where the photo saw nothing, or
-    None where not known.
+    None where not known. is_final: whether it stays as it is; else it comes once more.
     """
 
     row: int
@@ -140,6 +140,7 @@ class ViewUpdate:
     colors: StoredColors
     disparity: FloatImage | None
     inpainted: NDArray[np.bool_] | None = None
+    is_final: bool = True
 
 
 def ignore_progress(done: float, total: float, doing: str) -> None:

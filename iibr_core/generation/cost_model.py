@@ -36,6 +36,8 @@ WORKING_BYTES = 18
 """Of one pixel of a view in the making: float colours, disparity, flags."""
 CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
 """Of one pixel of the band of rows in the making: its candidates and weights; hypotheses and features if ambiguous."""
+DRAFT_BYTES, UNDECIDED_BYTES = 8, 68
+"""Of one pixel of a draft: the view as it is stored; of one that the transformer is still to be asked for, more."""
 NUMBER_BYTES, HOLE_BYTES = 4, 148
 """Of one pixel of a view while its holes are filled; of one in a hole, more: what surrounds it in all directions."""
 
@@ -64,11 +66,12 @@ NANOSECONDS = Workload(100.0, 52.0, 680.0, 45.0, 1650.0, 2000.0, 870.0)
 
 class CostEstimate(NamedTuple):
     """What making all views takes: seconds on all cores of a machine like the one measured on, and memory at most,
-    the finished views not counted.
+    the finished views not counted. draft_bytes: beside that, where all views may wait as drafts.
     """
 
     seconds: float
     peak_bytes: int
+    draft_bytes: int = 0
 
 
 class CostEstimates(NamedTuple):
@@ -168,7 +171,8 @@ def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstim
     for quality in get_args(Quality):
         work = estimate_workload(statistics, grid, quality)
         seconds = sum(amount * each for amount, each in zip(work, NANOSECONDS)) * 1e-9 / CORES
-        found.append(CostEstimate(seconds, _peak_bytes(statistics, grid, quality)))
+        drafts = _draft_bytes(statistics, grid) if quality == "balanced" else 0
+        found.append(CostEstimate(seconds, _peak_bytes(statistics, grid, quality), drafts))
     return CostEstimates(*found)
 
 
@@ -207,3 +211,11 @@ def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Qualit
     in_flight = pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + asked * AMBIGUOUS_BYTES)
     filling = pixels * (NUMBER_BYTES + statistics.hole_share * HOLE_BYTES) if statistics.has_disocclusion else 0.0
     return round(pixels * ray * (2 + _inpainted_views(statistics, grid)) + CORES * in_flight + filling)
+
+
+def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:
+    """What drafts take once all views are there. Those of inpainted views lie in the ray set."""
+    views = grid.rows * grid.columns - 1
+    drafts = views - _inpainted_views(statistics, grid)
+    undecided = _sum_over_views(statistics.ambiguous_share, grid) * drafts / max(views, 1)
+    return round(statistics.step.size * (drafts * DRAFT_BYTES + undecided * UNDECIDED_BYTES))

@@ -11,9 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from iibr_core.color import stored_from_encoded
 from iibr_core.generation.outer_views import farthest_views, outer_views_of_grid
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.generation.stored_views import Draft, StoredViews, encode_for_storage
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter
@@ -22,7 +22,7 @@ from iibr_core.rendering.ambiguous_rays import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
 from iibr_core.runtime.resources import resource_folder
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import (
     DEFAULT_QUALITY,
     Disparity,
@@ -30,7 +30,6 @@ from iibr_core.types import (
     InputError,
     Photo,
     Quality,
-    StoredColors,
     ViewOffset,
     ViewUpdate,
     image_size,
@@ -45,14 +44,20 @@ def generate(
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
     quality: Quality = DEFAULT_QUALITY,
     inpaint: str = DEFAULT_INPAINTER,
+    draft_bytes: int | None = None,
 ) -> Generator[ViewUpdate, None, None]:
     """Yield every view of `plan.grid` once: the photo's own first, then the outer ones, then those nearest to
     `nearest_to()`.
 
     disparity is the field's (`plan.field_disparity(given)`). should_stop is asked every few milliseconds; once it
     is true the generator returns. Pixels do not depend on the order of the views. quality: "fast" weighs by the
-    closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for every ray;
-    the outer views then come with the others, once the ray set is complete. inpaint: a name among `INPAINTERS`.
+    closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for every ray.
+    inpaint: a name among `INPAINTERS`.
+
+    draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
+    views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
+    transformer's say, again nearest first, and nothing else is made again. Outer views, whose drafts are kept anyway,
+    do so whatever it is. None: every view comes once, final, in balanced and exact quality the outer ones last.
 
     Raises ValueError if photo and disparity differ in size, InputError if the trained weights cannot be read or there
     is no such way of inpainting.
@@ -60,7 +65,7 @@ def generate(
     if disparity.values.shape != photo.size:
         raise ValueError(f"disparity is {image_size(disparity.values)}, the photo {photo.size}")
     with suppress(Cancelled):
-        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, quality, inpaint)
+        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, quality, inpaint, draft_bytes)
 
 
 def _generate_views(
@@ -71,29 +76,40 @@ def _generate_views(
     nearest_to: Callable[[], ViewOffset],
     quality: Quality,
     inpaint: str,
+    draft_bytes: int | None,
 ) -> Iterator[ViewUpdate]:
     grid = plan.grid
-    colors = _encode_for_storage(photo.pixels, photo.is_hdr, should_stop)
+    colors = encode_for_storage(photo.pixels, photo.is_hdr, should_stop)
     yield ViewUpdate(*grid.centre, colors, disparity.values, np.zeros(photo.size, np.bool_))
-    index_of = {grid.offset(v, u): (v, u) for v in range(grid.rows) for u in range(grid.columns)}
-    remaining = [offset for offset, index in index_of.items() if index != grid.centre]
-    if not remaining:
+    if grid == (1, 1):
         return
-
-    def update(offset: ViewOffset, view: RenderedView, threads: int | None = None) -> ViewUpdate:
-        colors = _encode_for_storage(view.colors, photo.is_hdr, should_stop, threads)
-        return ViewUpdate(*index_of[offset], colors, view.disparity, view.inpainted)
-
     transformer, inpainter = transformer_for(quality), load_inpainter(inpaint)
     rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter)
-    for offset, view in outer_views:
-        if transformer is None:
-            remaining.remove(offset)
-            yield update(offset, view)
     with ViewSynthesis(should_stop, transformer, quality == "exact", inpainter=inpainter) as synthesis:
+        views = StoredViews(synthesis, rays, grid, photo.is_hdr, should_stop)
+        inner = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
+        # What is left to be done for views that are there, or in the ray set.
+        unfinished: dict[ViewOffset, Callable[[], ViewUpdate]] = {}
+        for offset, view in outer_views:
+            inner.remove(offset)
+            if transformer is not None:
+                known = len(rays) - 1 if view.occluded.any() else None
+                unfinished[offset] = partial(views.make, offset, known)
+            if transformer is None or draft_bytes is not None:
+                yield views.update(offset, view, is_final=transformer is None)
+        room = draft_bytes or 0 if quality == "balanced" else 0
+
+        def start(offset: ViewOffset) -> Draft:
+            return views.draft(offset) if room > 0 else Draft(views.make(offset), [])
+
+        for draft in synthesis.side_by_side(start, _nearest_first(inner, nearest_to)):
+            if draft.undecided:
+                room -= draft.nbytes
+                v, u = draft.update.row, draft.update.column
+                unfinished[grid.offset(v, u)] = partial(views.finish, draft)
+            yield draft.update
         yield from synthesis.side_by_side(
-            lambda offset: update(offset, synthesis.render_alone(rays, offset), threads=1),
-            _nearest_first(remaining, nearest_to),
+            lambda offset: unfinished.pop(offset)(), _nearest_first(list(unfinished), nearest_to)
         )
 
 
@@ -142,16 +158,3 @@ def _nearest_first(remaining: list[ViewOffset], nearest_to: Callable[[], ViewOff
 
 def _square_distance(one: ViewOffset, other: ViewOffset) -> float:
     return (other.t - one.t) ** 2 + (other.s - one.s) ** 2
-
-
-def _encode_for_storage(
-    encoded: FloatImage, is_hdr: bool, should_stop: ShouldStop, threads: int | None = None
-) -> StoredColors:
-    """`stored_from_encoded`, in bands."""
-    stored = np.empty(encoded.shape, np.float16 if is_hdr else np.uint8)
-
-    def band(first: int, last: int) -> None:
-        stored[first:last] = stored_from_encoded(encoded[first:last], is_hdr)
-
-    in_bands(band, image_size(encoded), should_stop, threads)
-    return stored

@@ -71,7 +71,8 @@ class ScenePlan:
     disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3
     px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
     of the light field, and at most while generating in the default quality, the field not counted. reasons: the same
-    in sentences. costs: time and memory of making all views, in each quality.
+    in sentences. costs: time and memory of making all views, in each quality. draft_bytes: beside those, what drafts of
+    views may take.
     """
 
     grid: GridShape
@@ -85,6 +86,7 @@ class ScenePlan:
     reasons: tuple[str, ...]
     costs: CostEstimates = NO_COST
     given_range: tuple[float, float] | None = None
+    draft_bytes: int = 0
 
     def field_disparity(self, given: Disparity) -> Disparity:
         """The disparity the light field is generated from (px per view step of this plan's grid)."""
@@ -127,7 +129,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
     reasons += _wild_reasons(given, relief)
-    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons)
+    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, budget, wanted.quality)
     _require_room(plan, photo, budget, wanted.quality, keeps_views=True)
     return replace(plan, given_range=(relief.low, relief.high))
 
@@ -188,9 +190,16 @@ def _grid_reason(grid: GridShape, parallax_px: float) -> str:
 
 
 def _complete_plan(
-    photo: Photo, disparity: Disparity, grid: GridShape, scale: float, zero: float, reasons: list[str]
+    photo: Photo,
+    disparity: Disparity,
+    grid: GridShape,
+    scale: float,
+    zero: float,
+    reasons: list[str],
+    draft_budget: Budget | None = None,
+    quality: Quality = DEFAULT_QUALITY,
 ) -> ScenePlan:
-    """The plan with what follows from grid and scale."""
+    """The plan with what follows from grid and scale. draft_budget: what it leaves may go to drafts in this quality."""
     if grid.rows < 1 or grid.columns < 1:
         raise InputError(f"--grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
     field = (disparity.values - np.float32(zero)) * np.float32(scale)
@@ -198,6 +207,12 @@ def _complete_plan(
     costs = estimate_costs(statistics, grid)
     pixels, peak_bytes = photo.size.height * photo.size.width, costs.of(DEFAULT_QUALITY).peak_bytes
     field_bytes = grid.rows * grid.columns * view_bytes(pixels, photo.is_hdr)
+    draft_bytes = 0
+    if draft_budget is not None:
+        cost = costs.of(quality)
+        left = draft_budget.bytes - whole_bytes(pixels, field_bytes, cost.peak_bytes, keeps_views=True)
+        draft_bytes = max(min(cost.draft_bytes, left), 0)
+    in_all = whole_bytes(pixels, field_bytes, peak_bytes + draft_bytes, keeps_views=True)
     return ScenePlan(
         grid,
         scale,
@@ -207,8 +222,9 @@ def _complete_plan(
         statistics.has_disocclusion,
         field_bytes,
         peak_bytes,
-        (*reasons, *_cost_reasons(statistics, costs, field_bytes, whole_bytes(pixels, field_bytes, peak_bytes, True))),
+        (*reasons, *_cost_reasons(statistics, costs, field_bytes, draft_bytes, in_all)),
         costs,
+        draft_bytes=draft_bytes,
     )
 
 
@@ -221,13 +237,15 @@ def _wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
     return [f"{count} pixels lie far beyond that range, as mistakes do: they count as the nearest or the farthest."]
 
 
-def _cost_reasons(statistics: ParallaxStatistics, costs: CostEstimates, field_bytes: int, in_all: int) -> list[str]:
+def _cost_reasons(
+    statistics: ParallaxStatistics, costs: CostEstimates, field_bytes: int, draft_bytes: int, in_all: int
+) -> list[str]:
     inpainted = (
         "holes behind them are inpainted."
         if statistics.has_disocclusion
         else "nothing is disoccluded, so nothing is inpainted."
     )
-    making = costs.of(DEFAULT_QUALITY).peak_bytes
+    making = costs.of(DEFAULT_QUALITY).peak_bytes + draft_bytes
     return [
         f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}",
         f"Making all views takes about {_seconds(costs.fast.seconds)} in fast, {_seconds(costs.balanced.seconds)} in"

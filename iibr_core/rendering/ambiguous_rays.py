@@ -80,6 +80,31 @@ class AmbiguousRays:
     features: FloatImage
 
 
+@dataclass(frozen=True, eq=False)
+class UndecidedRays:
+    """Ambiguous rays (N) of one view before T is asked, as small as they can wait for it.
+
+    hypotheses: K. pixel (N): index into the view's pixels, row by row. number (N): hypotheses of each, at most K.
+    uncovered (N): share of the ray that nothing covers. disparity, source, share, nearest: of all hypotheses, those of
+    one ray after those of the other; share is the closed form's weight, nearest how many pixels away its surface lands.
+    """
+
+    offset: ViewOffset
+    hypotheses: int
+    pixel: NDArray[np.int32]
+    number: NDArray[np.uint8]
+    uncovered: FloatImage
+    disparity: FloatImage
+    source: NDArray[np.uint8]
+    share: FloatImage
+    nearest: FloatImage
+
+    @property
+    def nbytes(self) -> int:
+        """Memory they take."""
+        return sum(part.nbytes for part in vars(self).values() if isinstance(part, np.ndarray))
+
+
 def find_ambiguous_rays(
     rays: RaySet,
     candidates: Candidates,
@@ -94,14 +119,29 @@ def find_ambiguous_rays(
     shown: what `resampling.heaviest_candidate` gives: disparity and source (N, W). every: take all rays near which
     anything lands, ambiguous or not. hypotheses: K, at least 2.
     """
+    return describe_rays(rays, find_undecided_rays(rays, candidates, weights, shown, rows, every, hypotheses))
+
+
+def find_undecided_rays(
+    rays: RaySet,
+    candidates: Candidates,
+    weights: FloatImage,
+    shown: tuple[FloatImage, NDArray[np.uint8]],
+    rows: tuple[int, int],
+    every: bool = False,
+    hypotheses: int = HYPOTHESES,
+    decided: NDArray[np.bool_] | None = None,
+) -> UndecidedRays:
+    """The rays of `find_ambiguous_rays`, but for those already decided (N, W), and as little as will do to describe
+    them later.
+    """
     first, last = rows
     shape = (last - first) * candidates.count.shape[1], hypotheses
     pixel, number = np.empty((shape[0], 2), np.int64), np.zeros(shape[0], np.int64)
     disparity, source = np.empty(shape, np.float32), np.empty(shape, np.uint8)
     share, nearest = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    offsets, _, surfaces, coverage, _ = rays.arrays
+    from_sources = np.array(candidates.offset) - rays.arrays[0]
     around = rays.statistics
-    from_sources = np.array(candidates.offset) - offsets
     parallax = max(*map(abs, candidates.offset), 1e-9)
     is_soft = around.softness > SOFT
     looks = len(AROUND) if is_soft else AROUND_SHARP
@@ -117,16 +157,35 @@ def find_ambiguous_rays(
         from_sources, rays.photo_images, parallax, looks, candidates.first_row, every,
         pixel, number, disparity, source, share, nearest,
     )  # fmt: skip
-    pixel, number, disparity, source = pixel[:count], number[:count], disparity[:count], source[:count]
-    features = np.zeros((count, hypotheses, FEATURES), np.float32)
-    _describe_hypotheses(
-        surfaces, coverage, around.low, around.high, around.step, around.softness, from_sources, rays.photo_images,
-        candidates.count, weights, candidates.first_row, parallax,
-        pixel, number, disparity, source, share[:count], nearest[:count], features,
+    if decided is None:
+        decided = np.zeros(candidates.count.shape, np.bool_)
+    packed = _pack(
+        candidates.count, weights, decided, candidates.first_row, pixel[:count], number, disparity, source, share,
+        nearest,
     )  # fmt: skip
-    pixel[:, 0] += candidates.first_row
-    mask = np.arange(hypotheses) < number[:, None]
-    return AmbiguousRays(candidates.offset, pixel, mask, disparity, source, features)
+    return UndecidedRays(candidates.offset, hypotheses, *packed)
+
+
+def describe_rays(rays: RaySet, undecided: UndecidedRays) -> AmbiguousRays:
+    """With the features that T decides by."""
+    offsets, _, surfaces, coverage, _ = rays.arrays
+    around = rays.statistics
+    mask = np.arange(undecided.hypotheses) < undecided.number[:, None]
+    disparity, share, nearest = (np.zeros(mask.shape, np.float32) for _ in range(3))
+    source = np.zeros(mask.shape, np.uint8)
+    for part, packed in (
+        (disparity, undecided.disparity), (source, undecided.source), (share, undecided.share),
+        (nearest, undecided.nearest),
+    ):  # fmt: skip
+        _unpack(packed, undecided.number, part)
+    pixel = np.stack(np.divmod(undecided.pixel.astype(np.int64), rays.size.width), axis=1)
+    features = np.zeros((*mask.shape, FEATURES), np.float32)
+    _describe_hypotheses(
+        surfaces, coverage, around.low, around.high, around.step, around.softness,
+        np.array(undecided.offset) - offsets, rays.photo_images, max(*map(abs, undecided.offset), 1e-9),
+        pixel, undecided.number, undecided.uncovered, disparity, source, share, nearest, features,
+    )  # fmt: skip
+    return AmbiguousRays(undecided.offset, pixel, mask, disparity, source, features)
 
 
 def bound_weights(ambiguous: AmbiguousRays, weights: FloatImage) -> FloatImage:
@@ -358,6 +417,45 @@ def _collect_hypotheses(
 
 
 @kernel
+def _pack(count, weights, decided, first_row, pixel, number, disparity, source, share, nearest):
+    """The arrays of `UndecidedRays`, in their order: of the rays of pixel, those that are not decided."""
+    width = decided.shape[1]
+    rays = hypotheses = 0
+    for n in range(len(pixel)):
+        if not decided[pixel[n, 0], pixel[n, 1]]:
+            rays, hypotheses = rays + 1, hypotheses + number[n]
+    index, used = np.empty(rays, np.int32), np.empty(rays, np.uint8)
+    uncovered = np.empty(rays, np.float32)
+    surfaces, images = np.empty(hypotheses, np.float32), np.empty(hypotheses, np.uint8)
+    shares, distances = np.empty(hypotheses, np.float32), np.empty(hypotheses, np.float32)
+    ray = at = 0
+    for n in range(len(pixel)):
+        y, x = pixel[n]
+        if decided[y, x]:
+            continue
+        left = 1.0
+        for slot in range(np.int64(count[y, x])):
+            left -= weights[slot, y, x]
+        index[ray], used[ray], uncovered[ray] = (first_row + y) * width + x, number[n], max(left, 0.0)
+        ray += 1
+        for a in range(number[n]):
+            surfaces[at], images[at] = disparity[n, a], source[n, a]
+            shares[at], distances[at] = share[n, a], nearest[n, a]
+            at += 1
+    return index, used, uncovered, surfaces, images, shares, distances
+
+
+@kernel
+def _unpack(packed, number, rows):
+    """What `_pack` made of rows (N, K), back into rows."""
+    at = 0
+    for n in range(len(number)):
+        for a in range(number[n]):
+            rows[n, a] = packed[at]
+            at += 1
+
+
+@kernel
 def _softsign(px):
     """Pixels on a scale of -4..4 where small differences count most; 0 where there is no difference to tell."""
     if px != px:
@@ -369,8 +467,8 @@ def _softsign(px):
 
 @kernel
 def _describe_hypotheses(
-    surfaces, coverage, low, high, step, softness, offsets, photo_images,
-    count, weights, first_row, parallax, pixel, number, disparity, source, share, nearest, features,
+    surfaces, coverage, low, high, step, softness, offsets, photo_images, parallax,
+    pixel, number, uncovered, disparity, source, share, nearest, features,
 ):  # fmt: skip
     _, height, width = surfaces.shape
     # Unit vectors along each source's parallax.
@@ -380,19 +478,16 @@ def _describe_hypotheses(
     log_parallax = np.log1p(parallax)
     for n in range(len(pixel)):
         y, x = pixel[n]
-        # What the whole ray has in common: its nearest and farthest hypothesis, and the share that nothing covers.
+        # What the whole ray has in common: its nearest and farthest hypothesis.
         front = back = disparity[n, 0]
         for a in range(number[n]):
             front, back = max(front, disparity[n, a]), min(back, disparity[n, a])
-        uncovered = 1.0
-        for slot in range(np.int64(count[y, x])):
-            uncovered -= weights[slot, y, x]
         for a in range(number[n]):
             # Backward warp: where in its source the hypothesis looks.
             d, k = disparity[n, a], np.int64(source[n, a]) % np.int64(PLAIN)
             t, s = offsets[k, 0], offsets[k, 1]
             source_x = min(max(x + d * s, -0.5), width - 0.5)
-            source_y = min(max(first_row + y + d * t, -0.5), height - 0.5)
+            source_y = min(max(y + d * t, -0.5), height - 0.5)
 
             # The disparity that the source really has there, bilinear over its surfaces.
             column, row = floor(source_x), floor(source_y)
@@ -430,6 +525,6 @@ def _describe_hypotheses(
             out[9] = log_parallax
             out[10] = coverage[k, v, u]
             out[SOFTNESS] = softness
-            out[UNCOVERED] = max(uncovered, 0.0)  # share of the pixel that nothing covers
+            out[UNCOVERED] = uncovered[n]  # share of the pixel that nothing covers
             out[13] = _softsign(step[k, v, u] * parallax)  # the depth edge beside it
             out[14] = 1.0 if source[n, a] >= PLAIN else 0.0

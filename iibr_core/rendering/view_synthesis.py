@@ -20,14 +20,17 @@ from iibr_core.rendering.ambiguous_rays import (
     HYPOTHESES,
     REACH_PX,
     AmbiguousRays,
+    UndecidedRays,
     blend_hypotheses,
     bound_weights,
-    find_ambiguous_rays,
+    describe_rays,
+    find_undecided_rays,
 )
-from iibr_core.rendering.candidates import Candidates, find_candidates
+from iibr_core.rendering.candidates import find_candidates
+from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import entropy, occlusion_mask
-from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.ray_set import CELL_PX, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, heaviest_candidate, resample_colors
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
@@ -55,6 +58,18 @@ class RenderedView:
     occluded: NDArray[np.bool_]
     inpainted: NDArray[np.bool_]
     entropy: FloatImage | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class DecidedRays:
+    """Rays (N) of one view: pixel, the index into its pixels row by row; colors (N, 3), disparity (N) and inpainted (N)
+    as in `RenderedView`.
+    """
+
+    pixel: NDArray[np.int32]
+    colors: FloatImage
+    disparity: FloatImage
+    inpainted: NDArray[np.bool_]
 
 
 def rays_of_photo(
@@ -113,11 +128,40 @@ class ViewSynthesis:
 
         Raises Cancelled once should_stop is true, ValueError for an offset that is not finite.
         """
-        return self._view(rays, offset, tiling.THREADS)
+        return self._view(rays, offset, tiling.THREADS, None)
 
-    def render_alone(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
-        """The same view, its row bands one after the other in the calling thread: the way for many views."""
-        return self._view(rays, offset, 1)
+    def render_alone(self, rays: RaySet, offset: ViewOffset, known: int | None = None) -> RenderedView:
+        """The same view, its row bands one after the other in the calling thread: the way for many views.
+
+        known: the image of the ray set that was this view before it and the images after it joined. Only what those
+        change is looked up anew; the view is the same.
+        """
+        return self._view(rays, offset, 1, known)
+
+    def render_draft(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, list[UndecidedRays]]:
+        """The view in closed form, alone; and the rays that are the transformer's, none where there is nothing to
+        decide. Written over with what `decide` says of them, it is the view of `render`.
+        """
+        view = self._begin_view(rays, offset)
+        undecided = in_bands(
+            lambda first, last: self._render_rows(rays, offset, (first, last), view),
+            rays.size, self._should_stop, 1, self._most_band_pixels,
+        )  # fmt: skip
+        self._fill(rays, offset, view, 1)
+        return view, [part for part in undecided if part is not None and len(part.pixel)]
+
+    def decide(self, rays: RaySet, undecided: UndecidedRays) -> DecidedRays:
+        """What undecided rays show is the transformer's choice. Raises Cancelled once should_stop is true."""
+        assert self._transformer is not None
+        raise_if_stopped(self._should_stop)
+        ambiguous = describe_rays(rays, undecided)
+        raise_if_stopped(self._should_stop)
+        chosen = self._transformer(ambiguous)
+        if not self._every:
+            chosen = bound_weights(ambiguous, chosen)
+        raise_if_stopped(self._should_stop)
+        colors, disparity, source = blend_hypotheses(rays, ambiguous, chosen)
+        return DecidedRays(undecided.pixel, colors, disparity, source >= rays.photo_images)
 
     def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """The results of work on all items, in their order. An item is only taken when a thread is free for it."""
@@ -132,25 +176,42 @@ class ViewSynthesis:
     def _should_stop(self) -> bool:
         return self._is_over or self._asked_to_stop()
 
-    def _view(self, rays: RaySet, offset: ViewOffset, threads: int) -> RenderedView:
+    def _view(self, rays: RaySet, offset: ViewOffset, threads: int, known: int | None) -> RenderedView:
+        def band(first: int, last: int) -> DecidedRays | None:
+            undecided = self._render_rows(rays, offset, (first, last), view, known)
+            return self.decide(rays, undecided) if undecided is not None else None
+
+        view = self._begin_view(rays, offset)
+        decided = in_bands(band, rays.size, self._should_stop, threads, self._most_band_pixels)
+        self._fill(rays, offset, view, threads)
+        for part in filter(None, decided):
+            at = np.unravel_index(part.pixel, rays.size)
+            view.colors[at], view.disparity[at], view.inpainted[at] = part.colors, part.disparity, part.inpainted
+        return view
+
+    def _begin_view(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
         if not np.isfinite(offset).all():
             raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
         if self._transformer:
             rays.survey(self._should_stop)
-        view = _blank_view(rays.size, self._keeps_entropy)
-        most_pixels = tiling.MOST_BAND_PIXELS // (EVERY_COST if self._every else 1)
-        in_bands(
-            lambda first, last: self._render_rows(rays, offset, (first, last), view),
-            rays.size, self._should_stop, threads, most_pixels,
-        )  # fmt: skip
+        return _blank_view(rays.size, self._keeps_entropy)
+
+    def _fill(self, rays: RaySet, offset: ViewOffset, view: RenderedView, threads: int) -> None:
         if view.occluded.any():
             self._inpainter(
                 view.colors, view.disparity, view.occluded, rays.photo_disparity, offset, self._should_stop, threads
             )
-        return view
 
-    def _render_rows(self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: RenderedView) -> None:
-        """Write rows [first, last) of the view, holes not filled yet."""
+    @property
+    def _most_band_pixels(self) -> int:
+        return tiling.MOST_BAND_PIXELS // (EVERY_COST if self._every else 1)
+
+    def _render_rows(
+        self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: RenderedView, known: int | None = None
+    ) -> UndecidedRays | None:
+        """Write rows [first, last) of the view in closed form, holes not filled yet; the rays that are the
+        transformer's to decide, if there is one.
+        """
         around = REACH_PX if self._transformer else 0
         above = min(rows[0], around)
         candidates = find_candidates(
@@ -161,37 +222,38 @@ class ViewSynthesis:
         occluded = occlusion_mask(weights)
         inner = slice(above, above + rows[1] - rows[0])
         raise_if_stopped(self._should_stop)
+        wanted = np.zeros(occluded.shape, np.bool_)
+        wanted[inner] = True if known is None else _changed_pixels(rays, offset, rows, known)
+        colors, disparity, source = resample_colors(rays, candidates, weights, wanted)
+        raise_if_stopped(self._should_stop)
+        undecided = None
         if self._transformer:
-            colors, disparity, source = self._resample_with_transformer(rays, candidates, weights, inner)
-        else:
-            colors, disparity, source = resample_colors(rays, candidates, weights)
+            disparity, source = heaviest_candidate(candidates, weights)
+            undecided = find_undecided_rays(
+                rays, candidates, weights, (disparity, source), (inner.start, inner.stop), self._every,
+                self._hypotheses, occluded,
+            )  # fmt: skip
         shown = slice(*rows)
         view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
+        if known is not None:
+            before = rays.arrays[1][known, shown]
+            np.copyto(view.colors[shown], before, where=~wanted[inner][..., None])
         view.occluded[shown] = occluded[inner]
         view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
+        return undecided
 
-    def _resample_with_transformer(
-        self, rays: RaySet, candidates: Candidates, weights: FloatImage, inner: slice
-    ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
-        """What `resample_colors` gives for the inner rows, but what ambiguous rays show is the transformer's choice."""
-        assert self._transformer is not None
-        rows = inner.start, inner.stop
-        shown = heaviest_candidate(candidates, weights)
-        ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, rows, self._every, self._hypotheses)
-        at = ambiguous.pixel[:, 0] - candidates.first_row, ambiguous.pixel[:, 1]
-        wanted = np.zeros(candidates.count.shape, np.bool_)
-        wanted[inner] = True
-        wanted[at] = False
-        raise_if_stopped(self._should_stop)
-        colors, disparity, source = resample_colors(rays, candidates, weights, wanted)
-        chosen = self._transformer(ambiguous)
-        if not self._every:
-            chosen = bound_weights(ambiguous, chosen)
-        raise_if_stopped(self._should_stop)
-        colors[at], disparity[at], source[at] = blend_hypotheses(rays, ambiguous, chosen)
-        return colors, disparity, source
+
+def _changed_pixels(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], known: int) -> NDArray[np.bool_]:
+    """Where, in rows [first, last) of a view, images from `known` on may show: (N, W)."""
+    cells = rays.cells
+    later = np.zeros(cells.low.shape, np.bool_)
+    later[known:] = True
+    landed = land_marked(cells, np.array(offset) - rays.arrays[0], later, rows, 0)
+    pixels = landed.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
+    above = rows[0] % CELL_PX
+    return np.asarray(pixels[above : above + rows[1] - rows[0], : rays.size.width])
 
 
 def _blank_view(size: ImageSize, with_entropy: bool) -> RenderedView:

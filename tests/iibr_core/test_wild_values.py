@@ -93,6 +93,11 @@ def contest(value):
     )
 
 
+def undecided(value):
+    weights, (_, disparity, origin) = shown(value)
+    return ambiguous_rays.find_undecided_rays(rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]))
+
+
 def in_use(asked):
     """Features, and what of the hypotheses is no leftover memory."""
     return asked.features, asked.disparity[asked.mask]
@@ -160,7 +165,9 @@ FINITE = {
     "rendering.ambiguous_rays.bound_weights": lambda v, _: ambiguous_rays.bound_weights(
         contest(v), generating.transformer_for("exact")(contest(v))
     ),
+    "rendering.ambiguous_rays.describe_rays": lambda v, _: ambiguous_rays.describe_rays(rays(v), undecided(v)),
     "rendering.ambiguous_rays.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
+    "rendering.ambiguous_rays.find_undecided_rays": lambda v, _: undecided(v),
     "rendering.ambiguous_rays.hypothesis_colors": lambda v, _: ambiguous_rays.hypothesis_colors(rays(v), contest(v)),
     "generation.cost_model.estimate_costs": lambda v, _: [
         cost_model.estimate_costs(cost_model.measure_parallax(depths(values), 4.0), GRID) for values in (1.0, v)
@@ -270,6 +277,7 @@ ELEMENTWISE = {
 
 FINITE_BY_CONTRACT = {
     "color.bytes_from_encoded": "of photos and of views, as for `stored_from_encoded`",
+    "generation.stored_views.encode_for_storage": "of rendered views only, as for `stored_from_encoded`",
     "color.stored_from_encoded": "made for every view; Photo and the synthesis see to it",
     "geometry.distance_between": "of lines that `line_of` made",
     "geometry.offset_of_line": "lines along the plane give infinity or NaN, as it says",
@@ -332,6 +340,7 @@ READS_OR_TELLS = {
     "formats.light_fields.stanford": "read_stanford",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
     "generation.light_field": "transformer_for",
+    "generation.stored_views": "StoredViews",
     "generation.view_maker": "ViewMaker quantise_as_stored",
     "generation.outer_views": "outer_views outer_views_of_grid farthest_views",
     "generation.update_loop": "render_outer_views complete_ray_set",

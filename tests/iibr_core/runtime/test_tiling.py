@@ -111,17 +111,21 @@ def test_a_stage_asks_for_every_band_and_ends_wherever_it_is_told_to(name):
 
 
 @pytest.mark.usefixtures("narrow")
-@pytest.mark.parametrize("quality", ["fast", "balanced", "exact"])
-def test_a_field_ends_wherever_it_is_told_to(quality):
+@pytest.mark.parametrize(
+    ("quality", "draft_bytes", "updates"),
+    [("fast", None, 9), ("balanced", None, 9), ("exact", None, 9), ("balanced", 1 << 40, 17)],
+)
+def test_a_field_ends_wherever_it_is_told_to(quality, draft_bytes, updates):
     photo, disparity = square_before_wall()
     plan, watch = literal_plan(photo, disparity, 3), Telling()
-    assert len(list(generate(photo, disparity, plan, watch, quality=quality))) == 9
+    options = {"quality": quality, "draft_bytes": draft_bytes}
+    assert len(list(generate(photo, disparity, plan, watch, **options))) == updates
     counts = [
-        len(list(generate(photo, disparity, plan, Telling(n), quality=quality)))
+        len(list(generate(photo, disparity, plan, Telling(n), **options)))
         for n in np.linspace(1, watch.asked, 7).astype(int)
     ]
     assert counts[0] == 0
-    assert counts[-1] < 9
+    assert counts[-1] < updates
 
 
 @pytest.mark.parametrize("threads", [1, 3])

@@ -1,0 +1,84 @@
+"""Views of one ray set as a light field stores them: final at once, or as drafts that are finished later.
+
+A draft keeps its view and, of each ray that the transformer is still to be asked for, what that needs: nothing else is
+made again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from iibr_core.color import stored_from_encoded
+from iibr_core.rendering.ambiguous_rays import UndecidedRays
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis
+from iibr_core.runtime.tiling import ShouldStop, in_bands
+from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """A view in closed form, and its rays that the transformer is still to be asked for: see `ViewSynthesis`."""
+
+    update: ViewUpdate
+    undecided: list[UndecidedRays]
+
+    @property
+    def nbytes(self) -> int:
+        """Memory it takes."""
+        view = (self.update.colors, self.update.disparity, self.update.inpainted)
+        return sum(part.nbytes for part in view if part is not None) + sum(part.nbytes for part in self.undecided)
+
+
+class StoredViews:
+    """Makes views of one ray set as they are handed over, each in the thread that asks."""
+
+    def __init__(
+        self, synthesis: ViewSynthesis, rays: RaySet, grid: GridShape, is_hdr: bool, should_stop: ShouldStop
+    ) -> None:
+        """should_stop: once it is true, all raise Cancelled."""
+        self._synthesis, self._rays, self._grid = synthesis, rays, grid
+        self._is_hdr, self._should_stop = is_hdr, should_stop
+
+    def make(self, offset: ViewOffset, known: int | None = None) -> ViewUpdate:
+        """A final view. known: see `ViewSynthesis.render_alone`."""
+        return self.update(offset, self._synthesis.render_alone(self._rays, offset, known))
+
+    def draft(self, offset: ViewOffset) -> Draft:
+        """A view in closed form, final where nothing is left to be decided."""
+        view, undecided = self._synthesis.render_draft(self._rays, offset)
+        return Draft(self.update(offset, view, is_final=not undecided), undecided)
+
+    def finish(self, draft: Draft) -> ViewUpdate:
+        """The final view: its undecided rays are written over, the draft itself stays as it is."""
+        drafted = draft.update
+        assert drafted.disparity is not None
+        assert drafted.inpainted is not None
+        colors, disparity, inpainted = drafted.colors.copy(), drafted.disparity.copy(), drafted.inpainted.copy()
+        for part in draft.undecided:
+            decided = self._synthesis.decide(self._rays, part)
+            at = np.unravel_index(decided.pixel, self._rays.size)
+            colors[at] = stored_from_encoded(decided.colors, self._is_hdr)
+            disparity[at], inpainted[at] = decided.disparity, decided.inpainted
+        return replace(drafted, colors=colors, disparity=disparity, inpainted=inpainted, is_final=True)
+
+    def update(self, offset: ViewOffset, view: RenderedView, is_final: bool = True) -> ViewUpdate:
+        """A rendered view as it is stored."""
+        colors = encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
+        (v, u), (t, s) = self._grid.centre, offset
+        return ViewUpdate(v + round(t), u + round(s), colors, view.disparity, view.inpainted, is_final)
+
+
+def encode_for_storage(
+    encoded: FloatImage, is_hdr: bool, should_stop: ShouldStop, threads: int | None = None
+) -> StoredColors:
+    """`stored_from_encoded`, in bands."""
+    stored = np.empty(encoded.shape, np.float16 if is_hdr else np.uint8)
+
+    def band(first: int, last: int) -> None:
+        stored[first:last] = stored_from_encoded(encoded[first:last], is_hdr)
+
+    in_bands(band, image_size(encoded), should_stop, threads)
+    return stored
