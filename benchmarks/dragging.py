@@ -79,7 +79,7 @@ def drag(app: App) -> Drag:
 
 def settle(app: App) -> None:
     """Turn the loop until every view is there and nothing is left to do."""
-    while not (0 < app.state.progress.total == app.state.progress.done and app.wait_s > 0):
+    while not (app.state.progress.is_complete and app.wait_s > 0):
         app.step()
 
 

@@ -156,7 +156,7 @@ def _watch(worker, scene_view, generation: int, views: int) -> None:  # type: ig
         elif isinstance(result, ViewReady) and result.generation == generation:
             scene_view.add(result.view)
             scene_view.upload_all()
-            seen += 1
+            seen += result.view.is_final
 
 
 def _apply(policy: str) -> None:

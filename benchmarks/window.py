@@ -54,9 +54,7 @@ def main() -> None:
 
 def all_views(app: App, since: float) -> None:
     """Turn the loop until every view is on the screen and nothing is left to do."""
-    while not (
-        0 < app.state.progress.total == app.state.progress.done and app.wait_s > 0 and app.scene_view.shows_all_views()
-    ):
+    while not (app.state.progress.is_complete and app.wait_s > 0 and app.scene_view.shows_all_views()):
         app.step()
     frames, total = app.frames_shown, app.state.progress.total
     print(f"all {total} views in the window: {time.perf_counter() - since:.1f} s, {frames} frames shown", flush=True)

@@ -103,7 +103,7 @@ class Driver:
     def until_idle(self) -> None:
         """Turn the loop until every view is there and nothing is left to do; what was sent before is heard first."""
         self.app.step()
-        self.until(lambda app: 0 < app.state.progress.total == app.state.progress.done and app.wait_s == 1.0)
+        self.until(lambda app: app.state.progress.is_complete and app.wait_s == 1.0)
 
     def send(self, *words: object) -> None:
         """Let xdotool do something."""

@@ -77,7 +77,9 @@ class HeadlessViewer:
         self.do(OpenPath(source))
         on_progress(self.state.progress)
         depth_settings = DepthSettings(source.depth.refine, edits)
-        request = SceneRequest(self.state.generation, source, depth_strength, depth_settings=depth_settings)
+        request = SceneRequest(
+            self.state.generation, source, depth_strength, depth_settings=depth_settings, takes_drafts=False
+        )
         for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
             if isinstance(result, SceneReady):
                 on_ready(result.scene)

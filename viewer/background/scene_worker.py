@@ -32,13 +32,17 @@ UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 
 @dataclass(frozen=True, eq=False)
 class SceneRequest:
-    """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says."""
+    """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says.
+
+    takes_drafts: views may come twice, so that there is something to look at soon; else each comes once, final.
+    """
 
     generation: int
     source: Source
     depth_strength: float = 1.0
     loaded: LoadedPhoto | None = None
     depth_settings: DepthSettings | None = None
+    takes_drafts: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,7 @@ class SceneReady:
 
 @dataclass(frozen=True, eq=False)
 class ViewReady:
-    """One more view, and how far the job is with it."""
+    """One more view, or one that is there as it will stay; and how far the job is with it."""
 
     generation: int
     view: ViewUpdate
@@ -168,7 +172,10 @@ def _results_of_photo(
 
     from iibr_core.generation.light_field import generate
 
-    views = generate(loaded.photo, disparity, plan, should_stop, nearest_to, source.quality, source.inpaint)
+    draft_bytes = plan.draft_bytes if request.takes_drafts else None
+    views = generate(
+        loaded.photo, disparity, plan, should_stop, nearest_to, source.quality, source.inpaint, draft_bytes
+    )
     yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
     if not should_stop():
         prepare_brush()
@@ -202,6 +209,8 @@ def _results_of_folder(request: SceneRequest, should_stop: Callable[[], bool]) -
 
 
 def _count_views(generation: int, views: Iterator[ViewUpdate], total: int) -> Iterator[ViewReady]:
-    start = time.perf_counter()
-    for done, view in enumerate(views, 1):
-        yield ViewReady(generation, view, Progress(done, total, time.perf_counter() - start))
+    start, is_final = time.perf_counter(), {}
+    for view in views:
+        is_final[view.row, view.column] = view.is_final
+        seconds, drafts = time.perf_counter() - start, list(is_final.values()).count(False)
+        yield ViewReady(generation, view, Progress(len(is_final), total, seconds, drafts=drafts))

@@ -44,8 +44,8 @@ INPAINTED_RGB = (255, 184, 60)
 
 @dataclass(frozen=True)
 class _ViewImage:
-    """What images depend on: the field, how many of its views are there, brightness as a factor, how often edited depth
-    was shown in its place.
+    """What images depend on: the field, how many views were uploaded to it, brightness as a factor, how often edited
+    depth was shown in its place.
     """
 
     generation: int
@@ -61,7 +61,7 @@ class InspectionView:
         self._scene_view = scene_view
         self._passes = InspectionPasses(gl.ctx, scene_view.renderer.programs)
         self._drawn: dict[str, tuple[object, int]] = {}
-        self._on_sheet: frozenset[ViewIndex] = frozenset()
+        self._on_sheet: frozenset[tuple[ViewIndex, int]] = frozenset()
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
         self._entropy: EntropyReady | None = None
         self._pair: PairReady | None = None
@@ -85,7 +85,7 @@ class InspectionView:
             return NO_INSPECTION_TEXTURES
         exposure = 2.0**state.optics.exposure_stops
         base = _ViewImage(
-            self._scene_view.generation, self._scene_view.views_present, exposure, self._scene_view.previews
+            self._scene_view.generation, self._scene_view.views_uploaded, exposure, self._scene_view.previews
         )
         if field.grid != scene.grid:  # only the photo's own view is there, or what is being done to its depth
             overlay = self._overlay(state, scene, field, layout.picture_px.size, base)
@@ -105,7 +105,7 @@ class InspectionView:
             hover,
             state.optics,
             self._scene_view.generation,
-            self._scene_view.views_present,
+            self._scene_view.views_uploaded,
             self._scene_view.report,
         )
         if self._probed[0] != asked:
@@ -173,18 +173,19 @@ class InspectionView:
         return names
 
     def _sheet(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int:
-        """All views; those that came since the last time are added."""
+        """All views; those that came since the last time, or came again, are drawn."""
         assert layout.picture is not None
         size_px = layout.in_pixels(layout.picture).size
         record = base.generation, base.exposure, size_px, field.stride
-        there = frozenset((int(row), int(column)) for row, column in np.argwhere(field.present))
+        there = frozenset((view, int(uploads)) for view, uploads in np.ndenumerate(field.uploads) if uploads)
         old = self._drawn.get("sheet")
         is_new = old is None or old[0] != (record, self._on_sheet)
         name = self._passes.start_sheet(size_px) if is_new or old is None else old[1]
         cells = sheet_cells(Rect(0, 0, *size_px), field.grid, layout.ui_scale * layout.pixel_ratio)
         for i, cell in enumerate(cells):
             view = divmod(i, field.grid.columns)
-            if is_new or (view in there and view not in self._on_sheet):
+            upload = view, int(field.uploads[view])
+            if is_new or (upload in there and upload not in self._on_sheet):
                 self._passes.draw_on_sheet(field, *view, _whole(cell), base.exposure)
         self._on_sheet = there
         self._drawn["sheet"] = (record, there), name

@@ -40,8 +40,8 @@ PREVIEW_GRID = GridShape(1, 1)
 class SceneView:
     """Holds the renderer and the views of the scene that is shown.
 
-    generation: whose views these are. previews: of edited depth shown so far. views_present: uploaded so far.
-    pictures_drawn: how often the picture was drawn.
+    generation: whose views these are. previews: of edited depth shown so far. views_uploaded: so far, those that came
+    twice counted twice. pictures_drawn: how often the picture was drawn.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -49,13 +49,14 @@ class SceneView:
         self.renderer = Renderer(gl)
         self.generation = 0
         self.loaded: LoadedPhoto | None = None
-        self.views_present = 0
+        self.views_uploaded = 0
         self.pictures_drawn = 0
         self.previews = 0
         self._scene: Scene | None = None
         self._centre: ViewUpdate | None = None
         self._is_preview = False
         self._waiting: deque[ViewUpdate] = deque()
+        self._is_final: dict[tuple[int, int], bool] = {}
         self._disparities: dict[ViewOffset, FloatImage] = {}
         self._drawn: Picture | None = None
         self._drawn_at = 0.0
@@ -71,7 +72,7 @@ class SceneView:
         self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
         self.generation, self.loaded, self._scene, self._centre = ready.generation, ready.loaded, scene, ready.centre
         self._is_preview = True
-        self.views_present = 1
+        self.views_uploaded, self._is_final = 1, {scene.grid.centre: True}
         self._waiting.clear()
         self._disparities.clear()
         self._keep_for_picking(scene, ready.centre)
@@ -88,7 +89,8 @@ class SceneView:
         far, near = field.range_px
         if not self._is_preview or disparity.min() < far or disparity.max() > near:
             self._open_field(scene, PREVIEW_GRID)
-            self.views_present, self._is_preview = 1, True
+            self.views_uploaded, self._is_final = 1, {scene.grid.centre: True}
+            self._is_preview = True
             self._waiting.clear()
         self.renderer.upload_view(0, 0, centre.colors, disparity)
         self._disparities = {CENTRE: disparity}
@@ -114,6 +116,11 @@ class SceneView:
         return len(self._waiting) < WAITING_VIEWS
 
     @property
+    def views_present(self) -> int:
+        """How many different views were uploaded so far."""
+        return len(self._is_final)
+
+    @property
     def picture_drawn(self) -> Picture | None:
         """The record of the picture drawn last, None before the first."""
         return self._drawn
@@ -124,12 +131,18 @@ class SceneView:
         return self.renderer.image_texture
 
     def upload(self, budget_s: float) -> bool:
-        """Upload waiting views until the time is spent, at least one. True where some still wait."""
+        """Upload waiting views until the time is spent, at least one. True where some still wait.
+
+        A view that is there is not replaced while a picture is drawn a step at a time: that would stop it.
+        """
         end = time.perf_counter() + budget_s
         while self._waiting:
+            if (self._waiting[0].row, self._waiting[0].column) in self._is_final and self.renderer.is_drawing_picture:
+                break
             view = self._waiting.popleft()
             self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
-            self.views_present += 1
+            self.views_uploaded += 1
+            self._is_final[view.row, view.column] = view.is_final
             if time.perf_counter() >= end:
                 break
         return bool(self._waiting)
@@ -145,9 +158,9 @@ class SceneView:
 
     def draw(self, state: AppState, size_px: ScreenSize) -> Picture | None:
         """Draw the picture this state asks for, unless it is there already; return its record, None without views."""
-        if self.views_present == 0:
+        if self.views_uploaded == 0:
             return None
-        wanted = Picture(self.generation, self.views_present, state.optics, size_px, previews=self.previews)
+        wanted = Picture(self.generation, self.views_uploaded, state.optics, size_px, previews=self.previews)
         budget_s = self._gl.frame_budget_s
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)
@@ -189,7 +202,7 @@ class SceneView:
 
     def shows_all_views(self) -> bool:
         """Whether the picture last drawn knows every view uploaded."""
-        return self._drawn is None or self._drawn.views_present == self.views_present
+        return self._drawn is None or self._drawn.views_uploaded == self.views_uploaded
 
     def _open_field(self, scene: Scene, grid: GridShape) -> None:
         self.renderer.open_field(grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity)
@@ -205,7 +218,7 @@ class SceneView:
     def _differs_by_views_only(self, wanted: Picture) -> bool:
         if self._drawn is None:
             return False
-        return replace(wanted, views_present=self._drawn.views_present, samples=self._drawn.samples) == self._drawn
+        return replace(wanted, views_uploaded=self._drawn.views_uploaded, samples=self._drawn.samples) == self._drawn
 
     def _is_same(self, wanted: Picture) -> bool:
         """Whether the picture drawn last is this one, however far it has come."""
@@ -214,7 +227,8 @@ class SceneView:
     def _refines(self) -> bool:
         """While views are being made, the processor has better things to do."""
         scene = self._scene
-        has_all = scene is not None and self.views_present == scene.grid.rows * scene.grid.columns
+        views_final = sum(self._is_final.values())
+        has_all = scene is not None and views_final == scene.grid.rows * scene.grid.columns
         return has_all or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
 
     def release(self) -> None:

@@ -30,6 +30,7 @@ class LightFieldTexture:
 
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
     view step. blocks: RG16F, least and greatest disparity of each BLOCK_PX square. present, has_disparity: (V, U) bool.
+    uploads: (V, U), how often each was stored.
     range_px: (farthest, nearest) disparity, known from the first view that has any.
     """
 
@@ -54,6 +55,7 @@ class LightFieldTexture:
         self.grid, self.width, self.height, self.hdr = grid, width, height, hdr
         self.present = np.zeros(grid, bool)
         self.has_disparity = np.zeros(grid, bool)
+        self.uploads = np.zeros(grid, int)
         self.range_px = (0.0, 0.0)
         self._dtype = np.float16 if hdr else np.uint8
         layers = self._kept.rows * self._kept.columns
@@ -96,6 +98,7 @@ class LightFieldTexture:
         self._fill_texels(colors, disparity if keeps_disparity else None)
         self.colors.write(self._texels, self._viewport(row, column))
         self.present[row, column], self.has_disparity[row, column] = True, keeps_disparity
+        self.uploads[row, column] += 1
 
     def snapshot(self) -> LightFieldTexture:
         """The same arrays, with the views that are there now: those that come later are not seen in it."""

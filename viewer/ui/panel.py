@@ -69,7 +69,7 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
         depth_line(state.scene, layout)
         actions += _progress(state, layout)
         if state.report is not None:
-            quiet(report_text(state.report))
+            quiet(report_text(state.report, state.progress.is_complete))
         actions += _presets(state.scene, layout)
         for section in SECTIONS:
             actions += _section(section, state, state.scene, layout, palette)
@@ -78,25 +78,31 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
 
 
 def progress_text(progress: Progress) -> str:
-    """The progress in one line, "23 of 81 views, 1.2 s, 3 s left"; empty where nothing was asked for."""
+    """The progress in one line, "23 of 81 views, 1.2 s, 3 s left"; empty where nothing was asked for.
+
+    Once all are there: "81 of 81 views, sharpening edges, 2.2 s, 2 s left", as long as some are drafts.
+    """
     if not progress.total:
         return progress.doing
-    words = f"{progress.done} of {view_count_text(progress.total)}, {progress.seconds:.1f} s"
+    sharpening = ", sharpening edges" if progress.drafts and progress.done == progress.total else ""
+    words = f"{progress.done} of {view_count_text(progress.total)}{sharpening}, {progress.seconds:.1f} s"
     left_s = seconds_left(progress)
     return words if left_s < 1 else f"{words}, {time_text(left_s)} left"
 
 
-def report_text(report: DrawReport) -> str:
-    """How long drawing took and how far it is from the final picture: "Drawn in 12 ms, error 0.3 %"."""
+def report_text(report: DrawReport, has_all_views: bool) -> str:
+    """How long drawing took and how far it is from the picture of these views: "Drawn in 12 ms, error 0.3 %"; final
+    only where has_all_views.
+    """
     words = f"Drawn in {report.draw_ms:.0f} ms"
     if report.samples >= report.samples_converged:
-        return f"{words}, final"
+        return f"{words}, final" if has_all_views else words
     return words if report.error is None else f"{words}, error {report.error:.1%}".replace("%", " %")
 
 
 def seconds_left(progress: Progress) -> float:
     """How long the rest will take if it goes on as before; 0 while nothing is known."""
-    return progress.seconds / progress.done * (progress.total - progress.done) if progress.done else 0.0
+    return progress.seconds * (1.0 / progress.share - 1.0) if progress.share > 0 else 0.0
 
 
 def time_text(seconds: float) -> str:
@@ -166,9 +172,8 @@ def _progress(state: AppState, layout: Layout) -> list[Action]:
     if not words:
         return []
     actions: list[Action] = []
-    fraction = progress.done / progress.total if progress.total else 0.0
-    imgui.progress_bar(fraction, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
-    is_working = (progress.total == 0 or progress.done < progress.total) and state.stopped != state.generation
+    imgui.progress_bar(progress.share, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+    is_working = not progress.is_complete and state.stopped != state.generation
     if is_working and _small_button("Cancel", "Make no more views; those that are there stay.", layout):
         actions.append(StopWork())
     if state.stopped == state.generation and state.scene and _small_button("Resume", "Make the views again.", layout):

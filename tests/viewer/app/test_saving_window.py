@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.conftest import Driver, write_scene
+from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from tests.viewer.conftest import HEIGHT, WIDTH, Driver, write_scene
 from viewer.app.image_export import render_pixels
 from viewer.model.actions import Action, DismissNotice, DoTask, OpenPath, SetDepthStrength
 from viewer.model.saved_settings import read_settings
@@ -70,6 +70,23 @@ def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: 
     assert (settings.optics, settings.size_px) == (asked.optics, SIZE), "as it was when it was asked for"
     shade = 0.51 / 255 if name.endswith("png") else 1e-6
     np.testing.assert_allclose(read_photo(out).pixels, expected / (255 if name.endswith("png") else 1), atol=shade)
+
+
+def test_views_that_come_again_wait_until_the_picture_is_drawn(viewer: Driver, tmp_path: Path) -> None:
+    """Else each would make it begin anew."""
+    app, out = viewer.app, tmp_path / "large.png"
+    start(viewer, out)
+    drawing = app.scene_view.renderer._picture
+    uploaded = app.scene_view.views_uploaded
+    again = ViewUpdate(0, 0, np.zeros((HEIGHT, WIDTH, 3), np.uint8), np.zeros((HEIGHT, WIDTH), np.float32))
+    app.scene_view.add(again)
+    app.step()
+    assert app.scene_view.views_uploaded == uploaded
+    assert app.wait_s == 0.0
+    viewer.until(lambda app: bool(texts(viewer)))
+    assert drawing is not None
+    assert drawing.is_done
+    viewer.until(lambda app: app.scene_view.views_uploaded == uploaded + 1)
 
 
 def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_path: Path) -> None:

@@ -219,3 +219,40 @@ def test_views_come_nearest_first_to_where_the_user_looks(open_window: Opener, p
     # The photo and the outer views come first, wherever the user looks.
     first, last = distances[9:45], distances[45:]
     assert sum(first) < 0.7 * sum(last)
+
+
+def test_edges_are_sharpened_nearest_first_to_where_the_user_looks_then(open_window: Opener, photo_path: Path) -> None:
+    """The eye moves to the opposite corner once every view is there as a draft."""
+    driver = open_window(photo_path, grid=GridShape(9, 9))
+    driver.app.do(MoveEye(ViewOffset(-4.0, -4.0)))
+    driver.until(lambda app: len(app.state.views_there) == 81)
+    assert not driver.app.state.progress.is_complete
+    field = driver.app.scene_view.renderer.field
+    assert field is not None
+    driver.app.do(MoveEye(ViewOffset(4.0, 4.0)))
+    sharpened: list[tuple[int, int]] = []
+
+    def is_done(app: App) -> bool:
+        twice = {(int(row), int(column)) for row, column in np.argwhere(field.uploads == 2)}
+        sharpened.extend(sorted(twice.difference(sharpened)))
+        return app.state.progress.is_complete and app.wait_s == 1.0
+
+    driver.until(is_done)
+    assert field.uploads.max() == 2
+    # First what was on its way when the eye moved: some in the worker, some in the queue, some at the window.
+    distances = [16 - row - column for row, column in sharpened[20:]]
+    assert len(distances) > 30
+    assert np.mean(distances[:15]) < 0.7 * np.mean(distances[15:])
+
+
+def test_a_drafted_picture_is_not_called_final_and_changes_when_it_is(open_window: Opener, photo_path: Path) -> None:
+    driver = open_window(photo_path, grid=GridShape(9, 9))
+    driver.app.do(MoveEye(ViewOffset(2.5, -3.0)))
+    driver.until(lambda app: len(app.state.views_there) == 81 and app.scene_view.views_present == 81)
+    uploaded = driver.app.scene_view.views_uploaded
+    driver.until_idle()
+    assert driver.app.scene_view.views_uploaded > uploaded
+    assert driver.app.scene_view.shows_all_views()
+    assert driver.app.scene_view.picture_drawn is not None
+    assert driver.app.scene_view.picture_drawn.views_uploaded == driver.app.scene_view.views_uploaded
+    assert driver.app.scene_view.views_present == 81

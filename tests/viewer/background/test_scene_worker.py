@@ -86,6 +86,20 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
     assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
 
 
+@pytest.mark.parametrize("takes_drafts", [True, False])
+def test_views_come_twice_where_they_may_and_progress_counts_them_once(photo_path: Path, takes_drafts: bool) -> None:
+    source = Source(str(photo_path), grid=GridShape(3, 3))
+    request = SceneRequest(1, source, takes_drafts=takes_drafts)
+    ready, *results = results_of(request, lambda: False, lambda: CENTRE)
+    views = [result for result in results if isinstance(result, ViewReady)]
+    assert isinstance(ready, SceneReady)
+    assert [view.view.is_final for view in views] == [True] + [False] * 8 * takes_drafts + [True] * 8
+    expected = [(done, max(done - 1, 0) if takes_drafts else 0) for done in range(1, 10)]
+    expected += [(9, drafts) for drafts in range(7, -1, -1)] if takes_drafts else []
+    assert [(view.progress.done, view.progress.drafts) for view in views] == expected
+    assert [view.progress.is_complete for view in views] == [False] * (len(views) - 1) + [True]
+
+
 def test_a_lost_worker_says_so_and_the_next_request_starts_another(
     desk_for: Callable[..., Desk], capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -140,9 +154,8 @@ def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
 def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
     from iibr_core.formats.light_fields.hci import HciWriter
 
-    made = list(
-        results_of(SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))), lambda: False, lambda: CENTRE)
-    )
+    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)), takes_drafts=False)
+    made = list(results_of(request, lambda: False, lambda: CENTRE))
     folder = tmp_path / "field"
     with HciWriter(folder, GridShape(3, 3), 100.0, "field", with_disparity) as writer:
         for result in made:

@@ -33,6 +33,24 @@ def test_stores_root_of_linear_light_in_the_views_own_layer(gl: GLContext) -> No
     field.release()
 
 
+def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl: GLContext) -> None:
+    field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
+    once = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
+    draft, final = np.zeros((4, 8, 3), np.uint8), np.full((4, 8, 3), 90, np.uint8)
+    near, far = np.full((4, 8), 2.0, np.float32), np.tile(np.linspace(-1, 2, 8, dtype=np.float32), (4, 1))
+    for texture in (field, once):
+        texture.upload(0, 0, final, far)  # both know the same range
+    field.upload(1, 1, draft, near)
+    for texture in (field, once):
+        texture.upload(1, 1, final, far)
+    for name in ("colors", "disparities", "blocks"):
+        assert getattr(field, name).read() == getattr(once, name).read()
+    assert field.uploads.tolist() == [[1, 0, 0], [0, 2, 0]]
+    assert field.present.sum() == 2
+    field.release()
+    once.release()
+
+
 def test_stray_disparities_do_not_stretch_the_range(gl: GLContext) -> None:
     field = LightFieldTexture(gl.ctx, GRID, 100, 100, hdr=False, with_disparity=True)
     disparity = np.linspace(0, 1, 10_000, dtype=np.float32).reshape(100, 100)

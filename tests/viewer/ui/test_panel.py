@@ -6,8 +6,8 @@ import pytest
 
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import GridShape, Quality
-from viewer.model.state.app_state import Progress, Scene, Source
-from viewer.ui.panel import progress_text, size_text
+from viewer.model.state.app_state import DrawReport, Progress, Scene, Source
+from viewer.ui.panel import progress_text, report_text, size_text
 
 
 @pytest.mark.parametrize(
@@ -21,10 +21,29 @@ from viewer.ui.panel import progress_text, size_text
         (Progress(81, 81, 31.0), "81 of 81 views, 31.0 s"),
         (Progress(0, 81, 31.0), "0 of 81 views, 31.0 s"),
         (Progress(1, 1, 0.0), "1 of 1 view, 0.0 s"),
+        (Progress(41, 81, 4.0, drafts=40), "41 of 81 views, 4.0 s, 11 s left"),
+        (Progress(81, 81, 9.0, drafts=54), "81 of 81 views, sharpening edges, 9.0 s, 4 s left"),
+        (Progress(81, 81, 9.0, drafts=1), "81 of 81 views, sharpening edges, 9.0 s"),
     ],
 )
 def test_progress_in_words(progress: Progress, words: str) -> None:
     assert progress_text(progress) == words
+
+
+def test_progress_grows_to_the_end_of_both_passes() -> None:
+    passes = [Progress(done, 9, drafts=done - 1) for done in range(1, 10)]
+    passes += [Progress(9, 9, drafts=drafts) for drafts in range(7, -1, -1)]
+    shares = [progress.share for progress in passes]
+    assert shares == sorted(set(shares))
+    assert [progress.is_complete for progress in passes] == [False] * 16 + [True]
+    assert (shares[-1], Progress(0, 0).share, Progress(0, 0).is_complete) == (1.0, 0.0, False)
+
+
+def test_a_picture_is_final_only_with_all_views_as_they_stay() -> None:
+    converged = DrawReport(samples=4, samples_converged=4, draw_ms=12.0)
+    assert report_text(converged, has_all_views=True) == "Drawn in 12 ms, final"
+    assert report_text(converged, has_all_views=False) == "Drawn in 12 ms"
+    assert report_text(DrawReport(1, 4, 12.0, 0.003), has_all_views=True) == "Drawn in 12 ms, error 0.3 %"
 
 
 @pytest.mark.parametrize(

@@ -179,6 +179,11 @@ class Renderer:
         return drawing.image
 
     @property
+    def is_drawing_picture(self) -> bool:
+        """Whether the picture of `start_picture` is on its way."""
+        return self._picture is not None and not (self._picture.is_done or self._picture.is_stopped)
+
+    @property
     def is_converged(self) -> bool:
         """Whether more samples would not make the picture better."""
         return self._accumulation is None or self._accumulation.is_complete

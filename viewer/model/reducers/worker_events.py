@@ -38,9 +38,11 @@ def stop_work(state: AppState) -> AppState:
     if is_reading and state.source is not None:
         left = _leave_job(state)
         return left if left.generation != state.generation else replace(left, stopped=state.generation, source=None)
-    if not 0 < progress.total > progress.done:
+    if not progress.total or progress.is_complete:
         return state
     doing = f"stopped at {progress.done} of {progress.total} views"
+    if progress.drafts:
+        doing += f", edges not sharpened in {progress.drafts}"
     return replace(state, stopped=state.generation, progress=Progress(doing=doing))
 
 

@@ -97,12 +97,26 @@ class Scene:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the worker is: views done of total, in seconds; doing says what in words when no views are counted."""
+    """How far the worker is: views done of total, in seconds; doing says what in words when no views are counted.
+
+    drafts: of those done, so many will come again, with sharper edges.
+    """
 
     done: int = 0
     total: int = 0
     seconds: float = 0.0
     doing: str = ""
+    drafts: int = 0
+
+    @property
+    def share(self) -> float:
+        """How much of the work is done, 0..1. A draft is about half of a view's."""
+        return (self.done - 0.5 * self.drafts) / self.total if self.total else 0.0
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every view is there as it will stay."""
+        return 0 < self.total == self.done and not self.drafts
 
 
 @dataclass(frozen=True)
@@ -346,13 +360,14 @@ class AppState:
 
 @dataclass(frozen=True)
 class Picture:
-    """Everything the picture depends on: the scene's generation, the views present, the optics, its size in pixels.
+    """Everything the picture depends on: the scene's generation, how many views were uploaded, the optics, its size in
+    pixels.
 
     samples: how far it has come on its way to the converged picture. previews: of edited depth shown so far.
     """
 
     generation: int
-    views_present: int
+    views_uploaded: int
     optics: Optics
     size_px: ScreenSize
     samples: int = 0
