@@ -21,7 +21,7 @@ from iibr_core.rendering.ambiguity import AMBIGUOUS_AROUND_PX, SOFT
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
-from iibr_core.rendering.resampling import cubic, resample
+from iibr_core.rendering.resampling import cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.types import FloatImage, ViewOffset
 
@@ -45,6 +45,8 @@ OWN_LANDING_PX = 0.75
 """What lands near by and differs from a hypothesis by less parallax than this is of its surface."""
 DISTINCT_PX = 0.5
 """Hypotheses closer than this are one; where all of a ray's are, nothing is to be decided."""
+VISIBLE = 0.08
+"""Where the colours of a ray's hypotheses lie no farther apart than this, sRGB-encoded, nothing is to be decided."""
 LEAST_WEIGHT = 0.02
 LEAST_VOTE = 0.004
 """Weights below this change no colour by a visible step."""
@@ -153,8 +155,8 @@ def find_undecided_rays(
         rays.photo_images, parallax, looks, candidates.first_row, first, last, every, pixel,
     )  # fmt: skip
     count = _collect_hypotheses(
-        selected, candidates.count, candidates.disparity, candidates.source, weights, *shown, rays.size.height,
-        from_sources, rays.photo_images, parallax, looks, candidates.first_row, every,
+        rays.arrays[1], selected, candidates.count, candidates.disparity, candidates.source, weights, *shown,
+        rays.size.height, from_sources, rays.photo_images, parallax, looks, candidates.first_row, every,
         pixel, number, disparity, source, share, nearest,
     )  # fmt: skip
     if decided is None:
@@ -220,7 +222,7 @@ def blend_hypotheses(
     colors = np.zeros((len(weights), 3), np.float32)
     offsets, images, surfaces, *_ = rays.arrays
     _blend(
-        images, surfaces, np.array(ambiguous.offset) - offsets,
+        images, surfaces, np.array(ambiguous.offset) - offsets, rays.photo_images,
         ambiguous.pixel, ambiguous.disparity, ambiguous.source, weights, colors,
     )  # fmt: skip
     heaviest = weights.argmax(axis=1)[:, None]
@@ -232,7 +234,7 @@ def blend_hypotheses(
 
 
 @kernel
-def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors):
+def _blend(images, surfaces, offsets, photo_images, pixel, disparity, source, weights, colors):
     _, height, width = surfaces.shape
     for n in range(len(weights)):
         total = red = green = blue = apart = 0.0
@@ -248,8 +250,10 @@ def _blend(images, surfaces, offsets, pixel, disparity, source, weights, colors)
             y = min(max(pixel[n, 0] + d * t, -0.5), height - 0.5)
             if source[n, a] >= PLAIN:
                 r, g, b = cubic(images, k, x, y)
-            else:
+            elif k < photo_images:
                 r, g, b = resample(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
+            else:
+                r, g, b = resample_inpainted(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
             # How far the votes lie apart; the first is kept as it is.
             if total == 0.0:
                 first_r, first_g, first_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
@@ -283,8 +287,12 @@ def _is_open(count, source, weights, photo_images, y, x):
     """Whether the closed form leaves open what a ray shows: it covers the ray in part, or by several surfaces of which
     none is a fringe: a fringe tells the shares.
     """
+    used = np.int64(count[y, x])
+    # Most rays: one surface.
+    if used == 1:
+        return weights[0, y, x] < 1.0 - LEAST_WEIGHT
     heavy, fringed, covered = 0, False, 0.0
-    for k in range(np.int64(count[y, x])):
+    for k in range(used):
         covered += weights[k, y, x]
         if weights[k, y, x] > LEAST_WEIGHT:
             heavy += 1
@@ -301,6 +309,7 @@ def _select_rays(
     but where soft edges are near.
     """
     rows, width = count.shape
+    least_apart = AMBIGUOUS_AROUND_PX / parallax
     found = 0
     for y in range(first, last):
         # Band rows count from first_row, cells from the picture's first row.
@@ -319,7 +328,7 @@ def _select_rays(
                     if not (0 <= v < rows and 0 <= u < width and count[v, u] > 0):
                         continue
                     other, image = shown_disparity[v, u], np.int64(shown_source[v, u])
-                    if abs(other - d) * parallax > AMBIGUOUS_AROUND_PX and (
+                    if abs(other - d) > least_apart and (
                         is_soft_here
                         or _is_near_soft_edge(soft, is_soft, other, image, u, first_row + v, offsets, photo_images)
                     ):
@@ -332,8 +341,26 @@ def _select_rays(
 
 
 @kernel
+def _contrast(images, offsets, x, y, ray, picked, disparity, source):
+    """How far the colours that a ray's hypotheses look up lie apart at most: those of the four pixels around each."""
+    _, height, width, _ = images.shape
+    low_r = low_g = low_b = np.float32(np.inf)
+    high_r = high_g = high_b = np.float32(-np.inf)
+    for j in range(picked):
+        d, k = disparity[ray, j], np.uint64(source[ray, j])
+        column, row = floor(x + d * offsets[k, 1]), floor(y + d * offsets[k, 0])
+        for i in range(4):
+            u = np.uint64(min(max(column + i % 2, 0), width - 1))
+            v = np.uint64(min(max(row + i // 2, 0), height - 1))
+            r, g, b = images[k, v, u, 0], images[k, v, u, 1], images[k, v, u, 2]
+            low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
+            high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
+    return max(high_r - low_r, high_g - low_g, high_b - low_b)
+
+
+@kernel
 def _collect_hypotheses(
-    selected, count, surface, origin, weights, shown_disparity, shown_source, height, offsets,
+    images, selected, count, surface, origin, weights, shown_disparity, shown_source, height, offsets,
     photo_images, parallax, looks, first_row, every,
     pixel, number, disparity, source, share, nearest,
 ):  # fmt: skip
@@ -344,6 +371,7 @@ def _collect_hypotheses(
     """
     rows, width = count.shape
     near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
+    away = np.empty(len(AROUND))
     found = 0
     for ray in range(selected):
         y, x = pixel[ray]
@@ -371,21 +399,23 @@ def _collect_hypotheses(
             front = np.argmax(near_d[:n])
             disparity[found, 0], source[found, 0], share[found, 0] = near_d[front], near_k[front], 0.0
             picked = 1
-        # Farthest-point sampling of the disparities around it, until slots or distinct ones run out.
-        own_picked = picked
+        # Farthest-point sampling of the disparities around it, until slots or distinct ones run out. away: how far what
+        # is near lies from what is picked.
+        own_picked, compared = picked, 0
+        away[:n] = np.inf
         while 0 < picked < disparity.shape[1] - 1:
             best, best_distance = -1, DISTINCT_PX
             for i in range(n):
-                distance = np.inf
-                for j in range(picked):
+                for j in range(compared, picked):
                     apart = abs(near_d[i] - disparity[found, j]) * parallax
                     if (near_k[i] >= photo_images) != (source[found, j] >= photo_images):
                         apart += INPAINTED_APART_PX
-                    distance = min(distance, apart)
-                if distance > best_distance:
-                    best, best_distance = i, distance
+                    away[i] = min(away[i], apart)
+                if away[i] > best_distance:
+                    best, best_distance = i, away[i]
             if best < 0:
                 break
+            compared = picked
             disparity[found, picked], source[found, picked] = near_d[best], near_k[best]
             share[found, picked] = 0.0
             picked += 1
@@ -393,6 +423,9 @@ def _collect_hypotheses(
         apart = 0.0
         for j in range(picked):
             apart = max(apart, abs(disparity[found, j] - disparity[found, 0]) * parallax)
+        if not every and apart > DISTINCT_PX:
+            contrast = _contrast(images, offsets, x, first_row + y, found, picked, disparity, source)
+            apart = apart if contrast > VISIBLE else 0.0
         if picked > 0 and (every or apart > DISTINCT_PX):
             # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
             mixed = 0

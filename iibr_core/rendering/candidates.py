@@ -31,6 +31,8 @@ MOST_STRETCHED_PX = 8.0
 LEAST_SHRUNK = 0.05
 """A surface compressed to less than this share of its width turns its back to the view."""
 LEAST_OVERLAP = 1e-4
+COVERED = 0.999
+"""A surface that covers this much of a pixel hides what lies behind it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +186,11 @@ def _land_rays(
                         # Its surface's candidate, if any; `disparity` holds sums, so compare times coverage.
                         row, column = np.uint64(target_y - first_row), np.uint64(target_x)  # never counted from the end
                         used = np.int64(count[row, column])
+                        # The photo has landed: nobody sees what lies behind a surface of it that covers the pixel.
+                        if index > 0 and used > 0:
+                            covered = coverage[0, row, column]
+                            if covered >= COVERED and disparity[0, row, column] > (d_here + tolerance) * covered:
+                                continue
                         slot = 0
                         while slot < used:
                             c = coverage[slot, row, column]

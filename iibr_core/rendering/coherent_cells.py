@@ -39,13 +39,15 @@ def find_coherent_cells(
     far, near = np.full(shape, np.inf, np.float32), np.full(shape, -np.inf, np.float32)
     smooth = np.ones(shape, np.bool_)
     parallax = max(*map(abs, offset), 1e-9)
+    incoherent = ~(cells.step <= rays.smooth_step(offset))
     _land_cells(
         cells.low,
         cells.high,
         cells.row_ranges,
-        cells.incoherent,
+        incoherent,
         np.array(offset) - rays.arrays[0],
         first,
+        rays.photo_images,
         parallax,
         far,
         near,
@@ -60,7 +62,7 @@ def land_incoherent(
     cells: Cells, k: int, t: float, s: float, rows: tuple[int, int], smooth: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Which cells (M, N) of source k, t and s away, land on any cell of these rows that is not smooth."""
-    needed = np.zeros(cells.incoherent.shape, np.bool_)
+    needed = np.zeros(cells.step.shape, np.bool_)
     _land_incoherent(cells.low[k], cells.high[k], cells.row_ranges[k], t, s, rows[0] // CELL_PX, smooth, needed)
     return needed
 
@@ -94,7 +96,7 @@ def _touches(least, most, t, row, rows):
 
 
 @kernel
-def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax, far, near, smooth):
+def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, photo_images, parallax, far, near, smooth):
     """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
     rows, columns = smooth.shape
     # The photo comes first: inpainted rays are compared with what it shows.
@@ -117,7 +119,7 @@ def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, parallax
                         if k == 0 and not incoherent[v, u]:
                             far[row, column] = min(far[row, column], least)
                             near[row, column] = max(near[row, column], most)
-                        elif k == 0 or (most - far[row, column]) * parallax > IN_FRONT_PX:
+                        elif k < photo_images or (most - far[row, column]) * parallax > IN_FRONT_PX:
                             smooth[row, column] = False
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 CELL_PX = 4
 """Side of the cells that rays are summarised by."""
+HIGHEST_LEVEL = 255
 SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
 
@@ -27,14 +29,14 @@ SMOOTH_SHARE = 0.8
 @dataclass(frozen=True, eq=False)
 class Cells:
     """Rays of S images, summarised by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
-    disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. incoherent (M, N):
-    whether the photo shows anything but one smooth surface there.
+    disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. step (M, N): the largest
+    step between the photo's pixels there and those beside them, inf where one is unknown or at the border.
     """
 
     low: FloatImage
     high: FloatImage
     row_ranges: FloatImage
-    incoherent: NDArray[np.bool_]
+    step: FloatImage
 
 
 class RaySet:
@@ -42,7 +44,8 @@ class RaySet:
 
     All arrays are (S, ...) for the S images added so far. offsets (S, 2): the view (t, s) each is seen from. colors
     (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN where there is no surface. coverage (S, H, W): how much of
-    its pixel a ray fills, 0 = no ray. near_edge (S, H, W) bool: True where a 4x4 look-up may meet another surface.
+    its pixel a ray fills, 0 = no ray. edge_level (S, H, W) uint8: the largest step that a 4x4 look-up may meet, in
+    steps between surfaces, rounded up, 0 below one; see `edge_limits`.
     """
 
     def __init__(self, capacity: int, size: ImageSize, surface_step: float, farthest_views: float = 1.0) -> None:
@@ -60,11 +63,11 @@ class RaySet:
         self._colors = np.empty((capacity, *size, 3), np.float32)
         self._disparity = np.empty((capacity, *size), np.float32)
         self._coverage = np.empty((capacity, *size), np.float32)
-        self._near_edge = np.empty((capacity, *size), np.bool_)
+        self._edge_level = np.empty((capacity, *size), np.uint8)
         in_cells = -(-size.height // CELL_PX), -(-size.width // CELL_PX)
         self._low, self._high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
         self._row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
-        self._incoherent = np.ones(in_cells, np.bool_)
+        self._step = np.full(in_cells, np.inf, np.float32)
         self._joined = np.zeros(size, np.uint8)
         self._steep, self._nowhere = np.zeros(in_cells, np.bool_), np.zeros(in_cells, np.bool_)
 
@@ -87,10 +90,10 @@ class RaySet:
             rows = slice(first, last)
             self._colors[k, rows], self._disparity[k, rows] = colors[rows], disparity[rows]
             self._coverage[k, rows] = coverage[rows]
-            _near_edge(disparity, joined, self._surface_step, first, last, self._near_edge[k])
+            _edge_level(disparity, joined, self._surface_step, first, last, self._edge_level[k])
             _sum_up(disparity, coverage, first, last, self._low[k], self._high[k])
             if k == 0:
-                _find_incoherent(disparity, SMOOTH_SHARE * self._surface_step, first, last, self._incoherent)
+                _largest_steps(disparity, first, last, self._step)
 
         in_bands(band, self.size, should_stop)
         self._row_ranges[k, :, 0], self._row_ranges[k, :, 1] = self._low[k].min(axis=1), self._high[k].max(axis=1)
@@ -120,9 +123,23 @@ class RaySet:
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """(offsets, colors, disparity, coverage, near_edge) of the images added so far."""
-        everything = (self._offsets, self._colors, self._disparity, self._coverage, self._near_edge)
+        """(offsets, colors, disparity, coverage, edge_level) of the images added so far."""
+        everything = (self._offsets, self._colors, self._disparity, self._coverage, self._edge_level)
         return tuple(array[: self._count] for array in everything)
+
+    def edge_limits(self, offset: ViewOffset) -> NDArray[np.uint8]:
+        """(S): look-ups for the view at `offset` may meet another surface where a source's edge_level is above this.
+
+        Steps between surfaces are those of the farthest view; in a nearer one they are so much larger.
+        """
+        from_sources = np.abs(np.array(offset) - self._offsets[: self._count]).max(axis=1)
+        larger = self._farthest_views / np.maximum(from_sources, 1e-9)
+        return np.asarray(np.clip(larger, 1, HIGHEST_LEVEL - 1), np.uint8)
+
+    def smooth_step(self, offset: ViewOffset) -> float:
+        """In the view at `offset`, steps of the photo up to this are those of one smooth surface."""
+        larger = self._farthest_views / max(*map(abs, offset), 1e-9)
+        return SMOOTH_SHARE * self._surface_step * max(larger, 1.0)
 
     @property
     def joined(self) -> NDArray[np.uint8]:
@@ -137,7 +154,7 @@ class RaySet:
     def cells(self) -> Cells:
         """The rays added so far, summarised."""
         low, high, row_ranges = (part[: self._count] for part in (self._low, self._high, self._row_ranges))
-        return Cells(low, high, row_ranges, self._incoherent)
+        return Cells(low, high, row_ranges, self._step)
 
     @property
     def statistics(self) -> DisparityStatistics:
@@ -185,42 +202,46 @@ def _sum_up(disparity, coverage, first, last, low, high):
 
 
 @kernel
-def _find_incoherent(disparity, smooth_step, first, last, incoherent):
-    """Of the cells that begin in rows [first, last): True on either side of a step larger than smooth_step, of a pixel
-    without surface, of the border.
-    """
+def _largest_steps(disparity, first, last, step):
+    """`Cells.step` of the cells that begin in rows [first, last)."""
     height, width = disparity.shape
     for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
-        incoherent[v] = False
+        step[v] = 0.0
         for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
             for x in range(width):
                 # The border counts as a step: nobody knows what lies beyond.
-                is_smooth = 0 < y < height - 1 and 0 < x < width - 1
-                if is_smooth:
-                    # Steps to the four neighbours. NaN, no surface, fails every comparison: it is not smooth.
+                largest = np.float32(np.inf)
+                if 0 < y < height - 1 and 0 < x < width - 1:
                     here = disparity[y, x]
-                    is_smooth &= abs(disparity[y, x - 1] - here) <= smooth_step
-                    is_smooth &= abs(disparity[y, x + 1] - here) <= smooth_step
-                    is_smooth &= abs(disparity[y - 1, x] - here) <= smooth_step
-                    is_smooth &= abs(disparity[y + 1, x] - here) <= smooth_step
-                if not is_smooth:
-                    incoherent[v, x // CELL_PX] = True
+                    across = max(abs(disparity[y, x - 1] - here), abs(disparity[y, x + 1] - here))
+                    down = max(abs(disparity[y - 1, x] - here), abs(disparity[y + 1, x] - here))
+                    # NaN, no surface, makes one of both sums NaN.
+                    around = disparity[y, x - 1] + disparity[y, x + 1] + disparity[y - 1, x] + disparity[y + 1, x]
+                    largest = max(across, down) if here + around == here + around else np.float32(np.inf)
+                u = x // CELL_PX
+                step[v, u] = max(step[v, u], largest)
 
 
 @kernel
-def _near_edge(disparity, joined, surface_step, first, last, near_edge):
-    """Of rows [first, last): True where the 4x4 pixels from (x - 1, y - 1) to (x + 2, y + 2) hold a larger step between
-    rays that no surface joins, or no surface.
+def _edge_level(disparity, joined, surface_step, first, last, level):
+    """Of rows [first, last): the largest step between rays that no surface joins among the 4x4 pixels from
+    (x - 1, y - 1) to (x + 2, y + 2), in surface_steps rounded up; HIGHEST_LEVEL where one is unknown, 0 up to one.
     """
     height, width = disparity.shape
-    near_edge[first:last] = False
+    level[first:last] = 0
     # Steps in the rows around the band reach into it.
     for y in range(max(first - 2, 0), min(last + 2, height)):
         for x in range(width):
             here = disparity[y, x]
-            right = disparity[y, min(x + 1, width - 1)]
-            below = disparity[min(y + 1, height - 1), x]
-            # Mark whoever has this step, or NaN, among its 4x4 taps: it lies two pixels away at most.
-            is_smooth = abs(right - here) <= surface_step or joined[y, x] & RIGHT
-            if not (is_smooth and (abs(below - here) <= surface_step or joined[y, x] & BELOW)):
-                near_edge[max(y - 2, first) : min(y + 3, last), max(x - 2, 0) : x + 3] = True
+            right = abs(disparity[y, min(x + 1, width - 1)] - here)
+            below = abs(disparity[min(y + 1, height - 1), x] - here)
+            steps = 0.0 if joined[y, x] & RIGHT else right / surface_step
+            steps = steps if joined[y, x] & BELOW or below / surface_step <= steps else below / surface_step
+            # NaN, no surface, fails the comparison.
+            is_known = right + below <= np.inf
+            found = np.uint8(ceil(steps)) if is_known and steps < HIGHEST_LEVEL else np.uint8(HIGHEST_LEVEL)
+            # What stays below the first limit counts as nothing: no surface is quite flat.
+            if found > 1:
+                for v in range(max(y - 2, first), min(y + 3, last)):
+                    for u in range(max(x - 2, 0), min(x + 3, width)):
+                        level[v, u] = max(level[v, u], found)

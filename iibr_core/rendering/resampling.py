@@ -42,14 +42,15 @@ def resample_colors(
     colors, disparity = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
     source = np.zeros(shape, np.uint8)
     remaining = np.ones(shape, np.bool_) if wanted is None else wanted.copy()
-    offsets, images, surfaces, _, near_edge = rays.arrays
+    offsets, images, surfaces, _, edge_level = rays.arrays
+    limits = rays.edge_limits(candidates.offset)
     from_sources = np.array(candidates.offset) - offsets
     _gather_plain(
-        images, near_edge, from_sources, candidates.first_row,
+        images, edge_level, limits, from_sources, candidates.first_row,
         candidates.count, candidates.disparity[0], candidates.source[0], remaining, colors, disparity, source,
     )  # fmt: skip
     _gather(
-        images, surfaces, near_edge, from_sources, candidates.first_row,
+        images, surfaces, edge_level, limits, from_sources, rays.photo_images, candidates.first_row,
         candidates.count, candidates.disparity, candidates.source, weights, remaining, colors, disparity, source,
     )  # fmt: skip
     return colors, disparity, source
@@ -168,8 +169,34 @@ def resample(images, surfaces, index, x, y, d, parallax):
 
 
 @kernel
+def resample_inpainted(images, surfaces, index, x, y, d, parallax):
+    """The same for what was inpainted, by linear interpolation: a guess is not worth sixteen pixels."""
+    _, height, width = surfaces.shape
+    k, own, tolerance = np.uint64(index), np.float32(d), np.float32(OWN_SURFACE_PX / parallax)
+    column, row = floor(x), floor(y)
+    fx, fy = np.float32(x - column), np.float32(y - row)
+    total = red = green = blue = np.float32(0.0)
+    for j in range(2):
+        v = np.uint64(min(max(row + j, 0), height - 1))
+        weight_y = fy if j else np.float32(1.0) - fy
+        for i in range(2):
+            u = np.uint64(min(max(column + i, 0), width - 1))
+            # Another surface, or none: NaN fails the comparison.
+            if abs(surfaces[k, v, u] - own) <= tolerance:
+                w = weight_y * (fx if i else np.float32(1.0) - fx)
+                total += w
+                red += w * images[k, v, u, 0]
+                green += w * images[k, v, u, 1]
+                blue += w * images[k, v, u, 2]
+    # The surface is hardly there: the larger kernel meets more of it.
+    if total < LEAST_TAP_WEIGHT:
+        return resample(images, surfaces, index, x, y, d, parallax)
+    return np.float64(red / total), np.float64(green / total), np.float64(blue / total)
+
+
+@kernel
 def _gather_plain(
-    images, near_edge, offsets, first_row, count, candidate_disparity, candidate_source, remaining,
+    images, edge_level, limits, offsets, first_row, count, candidate_disparity, candidate_source, remaining,
     colors, disparity, source,
 ):  # fmt: skip
     """What `_gather` does, for the rays that are easiest, and most: one candidate, no edge and no border near it.
@@ -188,7 +215,7 @@ def _gather_plain(
             if not (1 <= source_x < width - 2 and 1 <= source_y < height - 2):
                 continue
             u, v = np.uint64(source_x), np.uint64(source_y)
-            if near_edge[k, v, u]:
+            if edge_level[k, v, u] > limits[k]:
                 continue
             remaining[row, x] = False
             disparity[row, x], source[row, x] = d, k
@@ -211,7 +238,7 @@ def _gather_plain(
 
 @kernel
 def _gather(
-    images, surfaces, near_edge, offsets, first_row,
+    images, surfaces, edge_level, limits, offsets, photo_images, first_row,
     count, candidate_disparity, candidate_source, weights, wanted, colors, disparity, source,
 ):  # fmt: skip
     """What `resample_colors` returns. offsets (S, 2): from each source to the target view."""
@@ -243,11 +270,13 @@ def _gather(
                 source_x = min(max(x + d * s, -0.5), width - 0.5)
                 source_y = min(max(first_row + row + d * t, -0.5), height - 0.5)
                 # Where an edge is near, only pixels of its own surface; else the plain kernel, which needs no tests.
-                if near_edge[index, max(floor(source_y), 0), max(floor(source_x), 0)]:
-                    parallax = max(abs(s), abs(t), 1e-9)
+                parallax = max(abs(s), abs(t), 1e-9)
+                if edge_level[index, max(floor(source_y), 0), max(floor(source_x), 0)] <= limits[index]:
+                    r, g, b = cubic(images, index, source_x, source_y)
+                elif index < photo_images:
                     r, g, b = resample(images, surfaces, index, source_x, source_y, d, parallax)
                 else:
-                    r, g, b = cubic(images, index, source_x, source_y)
+                    r, g, b = resample_inpainted(images, surfaces, index, source_x, source_y, d, parallax)
                 # A sole surface stays encoded; several are averaged in linear light, as their light adds up.
                 if sole:
                     sum_r, sum_g, sum_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)

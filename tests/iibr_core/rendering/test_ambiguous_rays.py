@@ -19,6 +19,7 @@ from iibr_core.rendering.ambiguous_rays import (
     SHARE,
     SOFTNESS,
     UNCOVERED,
+    VISIBLE,
     AmbiguousRays,
     blend_hypotheses,
     bound_weights,
@@ -49,6 +50,11 @@ def ambiguous_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
     weights = visibility_weights(candidates)
     shown = resample_colors(rays, candidates, weights)[1:]
     return find_ambiguous_rays(rays, candidates, weights, shown, (0, height), every), weights, rays
+
+
+def motley(size, seed=0):
+    """A photo of which no two pixels look alike: all that could be decided is seen."""
+    return photo_of(np.random.default_rng(seed).random((*size, 3)).astype(np.float32))
 
 
 def test_only_rays_near_depth_edges_are_ambiguous():
@@ -104,12 +110,24 @@ def test_only_near_soft_edges_covered_rays_are_ambiguous():
     photo, disparity = square_before_wall()
     values = disparity.values.copy()
     values[:, :35] = blur(values, 2)[:, :35]
-    ambiguous, weights, rays = ambiguous_of(photo, values, offset=ViewOffset(1.0, 0.0))
+    ambiguous, weights, rays = ambiguous_of(motley(photo.size), values, offset=ViewOffset(1.0, 0.0))
     assert 0 < rays.statistics.soft.mean() < 0.6
     heavy = (weights > LEAST_WEIGHT).sum(axis=0)
     certain = ((weights.sum(axis=0) >= 1 - LEAST_WEIGHT) & (heavy == 1))[tuple(ambiguous.pixel.T)]
     assert certain.sum() > 30
     assert ambiguous.pixel[certain, 1].max() < 35 + SOFT_AROUND_PX
+
+
+def test_where_hypotheses_look_alike_nothing_is_ambiguous():
+    """A square that looks like the wall behind it, but for its lower half."""
+    photo, disparity = square_before_wall()
+    pixels, is_lower = np.full_like(photo.pixels, 0.5), np.arange(photo.size.height) > 30
+    pixels[(disparity.values > 0) & is_lower[:, None]] = 0.5 + 1.5 * VISIBLE
+    ambiguous, _, _ = ambiguous_of(photo_of(pixels), disparity.values)
+    assert len(ambiguous.pixel) > 20
+    assert ambiguous.pixel[:, 0].min() > 25
+    everything, _, _ = ambiguous_of(photo_of(pixels), disparity.values, every=True)
+    assert len(everything.pixel) == disparity.values.size
 
 
 def test_hypotheses_are_the_surfaces_around_and_differ():
@@ -125,8 +143,8 @@ def test_hypotheses_are_the_surfaces_around_and_differ():
 
 def test_features_know_no_colour_and_no_place():
     """The same geometry in other colours, or elsewhere in the photo: the same features."""
-    photo, disparity = square_before_wall()
-    other = photo_of(np.roll(smooth_texture(*photo.size, seed=9), 3, axis=0))
+    _, disparity = square_before_wall()
+    photo, other = motley(disparity.values.shape), motley(disparity.values.shape, seed=9)
     here, _, _ = ambiguous_of(photo, disparity.values, fringe=False)
     recoloured, _, _ = ambiguous_of(other, disparity.values, fringe=False)
     assert (here.features == recoloured.features).all()

@@ -116,8 +116,8 @@ def test_unknown_disparity_is_never_smooth():
     disparity = SLOPE.copy()
     disparity[10, 12] = np.nan
     rays = ray_set(disparity)
-    assert rays.cells.incoherent[2, 3]
-    assert not rays.cells.incoherent[4, 8]
+    assert rays.cells.step[2, 3] == np.inf
+    assert rays.cells.step[4, 8] < np.inf
     smooth, _ = find_coherent_cells(rays, ViewOffset(0, 0.01), (0, SIZE[0]))
     assert not smooth[2, 3]
     assert smooth[4, 8]

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from iibr_core.rendering.ray_set import CELL_PX, SMOOTH_SHARE, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, HIGHEST_LEVEL, SMOOTH_SHARE, RaySet
 from iibr_core.types import ImageSize, ViewOffset
 
 SURFACE_STEP = 0.6
 
 
-def slow_near_edge(disparity):
+def slow_near_edge(disparity, surface_step):
     """Near where a pixel differs from the one to its right or below, or is unknown: two pixels each way."""
     padded = np.pad(disparity, ((0, 1), (0, 1)), mode="edge")
     with np.errstate(invalid="ignore"):
         right, below = np.abs(padded[:-1, 1:] - disparity), np.abs(padded[1:, :-1] - disparity)
-    is_step = ~((right <= SURFACE_STEP) & (below <= SURFACE_STEP))
+    is_step = ~((right <= surface_step) & (below <= surface_step))
     near = np.zeros_like(is_step)
     for y, x in np.argwhere(is_step):
         near[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3] = True
@@ -31,11 +31,11 @@ def slow_cells(values, of_cell):
     )
 
 
-def slow_incoherent(disparity):
-    """Pixels that differ from one beside them, are unknown, or at the border; cells that hold one."""
+def slow_steps(disparity):
+    """How much pixels differ from those beside them, inf where one is unknown or at the border; the most of cells."""
     around = np.pad(disparity, 1, constant_values=np.nan)
     steps = [np.abs(np.roll(around, shift, axis)[1:-1, 1:-1] - disparity) for shift in (1, -1) for axis in (0, 1)]
-    return slow_cells(~(np.stack(steps) <= SMOOTH_SHARE * SURFACE_STEP).all(axis=0), np.any)
+    return slow_cells(np.nan_to_num(np.stack(steps).max(axis=0), nan=np.inf), np.max)
 
 
 @pytest.mark.parametrize("size", [(19, 31), (1, 8), (8, 1), (1, 1)])
@@ -47,8 +47,21 @@ def test_edges_and_cells(size, unknown):
     coverage = np.where(np.isnan(disparity), 0, random.random(size) > 0.8).astype(np.float32)
     rays = RaySet(1, ImageSize(*size), SURFACE_STEP)
     rays.add(ViewOffset(0.0, 0.0), np.zeros((*size, 3), np.float32), disparity, coverage)
-    _, _, _, _, near_edge = rays.arrays
-    assert (near_edge[0] == slow_near_edge(disparity)).all()
+    _, _, _, _, edge_level = rays.arrays
+    for level in (1, 2):
+        assert ((edge_level[0] > level) == slow_near_edge(disparity, level * SURFACE_STEP)).all()
     assert (rays.cells.low[0] == slow_cells(np.where(coverage > 0, disparity, np.inf), np.min)).all()
     assert (rays.cells.high[0] == slow_cells(np.where(coverage > 0, disparity, -np.inf), np.max)).all()
-    assert (rays.cells.incoherent == slow_incoherent(disparity)).all()
+    assert rays.cells.step == pytest.approx(slow_steps(disparity))
+
+
+def test_in_nearer_views_larger_steps_are_those_of_one_surface():
+    rays = RaySet(2, ImageSize(8, 8), SURFACE_STEP, farthest_views=4.0)
+    for offset in (ViewOffset(0.0, 0.0), ViewOffset(-4.0, 4.0)):
+        rays.add(offset, np.zeros((8, 8, 3), np.float32), np.zeros((8, 8), np.float32), np.ones((8, 8), np.float32))
+    assert list(rays.edge_limits(ViewOffset(4.0, -4.0))) == [1, 1]
+    assert list(rays.edge_limits(ViewOffset(1.0, -2.0))) == [2, 1]
+    assert list(rays.edge_limits(ViewOffset(-3.0, 4.0))) == [1, 4]
+    assert rays.edge_limits(ViewOffset(0.0, 0.0))[0] == HIGHEST_LEVEL - 1
+    assert rays.smooth_step(ViewOffset(-4.0, 1.0)) == pytest.approx(SMOOTH_SHARE * SURFACE_STEP)
+    assert rays.smooth_step(ViewOffset(1.0, 0.0)) == pytest.approx(4 * SMOOTH_SHARE * SURFACE_STEP)
