@@ -26,7 +26,7 @@ GAP_PX = 1.0
 """A depth edge disoccludes something if it opens a gap wider than this in the outermost view."""
 OPEN_SHARE = 0.42
 """Of the rays where surfaces meet, so many are left open by the closed form."""
-SOFT_GROWTH = 0.75
+SOFT_GROWTH = 1.1
 """The power of the parallax by which rays near soft edges become ambiguous."""
 MOST_PARALLAX_PX = 1e6
 

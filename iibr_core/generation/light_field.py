@@ -24,7 +24,6 @@ from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import (
-    DEFAULT_QUALITY,
     Disparity,
     FloatImage,
     InputError,
@@ -42,7 +41,7 @@ def generate(
     plan: ScenePlan,
     should_stop: ShouldStop = never,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
-    quality: Quality = DEFAULT_QUALITY,
+    quality: Quality | None = None,
     inpaint: str = DEFAULT_INPAINTER,
     draft_bytes: int | None = None,
 ) -> Generator[ViewUpdate, None, None]:
@@ -50,9 +49,9 @@ def generate(
     `nearest_to()`.
 
     disparity is the field's (`plan.field_disparity(given)`). should_stop is asked every few milliseconds; once it
-    is true the generator returns. Pixels do not depend on the order of the views. quality: "fast" weighs by the
-    closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for every ray.
-    inpaint: a name among `INPAINTERS`.
+    is true the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
+    weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for
+    every ray. inpaint: a name among `INPAINTERS`.
 
     draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
     views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
@@ -65,6 +64,7 @@ def generate(
     if disparity.values.shape != photo.size:
         raise ValueError(f"disparity is {image_size(disparity.values)}, the photo {photo.size}")
     with suppress(Cancelled):
+        quality = quality or plan.quality
         yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, quality, inpaint, draft_bytes)
 
 

@@ -8,6 +8,7 @@ from math import ceil
 import numpy as np
 
 from iibr_core.generation.cost_model import (
+    CORES,
     NO_COST,
     STILL_PX,
     CostEstimates,
@@ -38,8 +39,14 @@ from iibr_core.types import (
     Quality,
 )
 
-STEP_PX = 4.0
-"""For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity."""
+STEP_PX = 8.0
+"""For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity. A
+quarter of the views costs a third of a decibel (docs/speed.md).
+"""
+MOST_HIDDEN, MOST_LONGER_S = 0.75, 1.0
+"""Where views show up to this share of what the photo hides, most of what the transformer decides lies between guesses,
+and gains 0.00 to 0.02 dB. It is not asked if that takes this much longer, in processor time.
+"""
 MOST_VIEWS_A_SIDE = 9
 MOST_NOISE_PX = 1.0
 """So much may a map's noise move from the first view to the last: relief that is hardly more than noise moves less."""
@@ -52,14 +59,14 @@ class PlanOverrides:
     """What the user decided; None leaves the choice to the plan.
 
     depth_strength multiplies the parallax the plan chose; focus_disparity (px per view step, as given) is the plane
-    that stays still. memory_bytes: what the whole process may take. quality: that memory is counted for.
+    that stays still. memory_bytes: what the whole process may take. quality: that views will be made in.
     """
 
     grid: GridShape | None = None
     depth_strength: float = 1.0
     focus_disparity: float | None = None
     memory_bytes: int | None = None
-    quality: Quality = DEFAULT_QUALITY
+    quality: Quality | None = None
 
 
 @dataclass(frozen=True)
@@ -70,9 +77,9 @@ class ScenePlan:
     farther and nearer ones count as its ends; None where all count as they are.
     disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3
     px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
-    of the light field, and at most while generating in the default quality, the field not counted. reasons: the same
-    in sentences. costs: time and memory of making all views, in each quality. draft_bytes: beside those, what drafts of
-    views may take.
+    of the light field, and at most while generating it, the field not counted. reasons: the same in sentences. costs:
+    time and memory of making all views, in each quality. quality: the one to make them in. draft_bytes: what drafts of
+    views may take, beside peak_bytes.
     """
 
     grid: GridShape
@@ -86,6 +93,7 @@ class ScenePlan:
     reasons: tuple[str, ...]
     costs: CostEstimates = NO_COST
     given_range: tuple[float, float] | None = None
+    quality: Quality = DEFAULT_QUALITY
     draft_bytes: int = 0
 
     def field_disparity(self, given: Disparity) -> Disparity:
@@ -120,7 +128,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
     else:
         most_moved = 0.5 * parallax_px / relief.range if parallax_px else 0.0
         statistics = measure_parallax(disparity.values - np.float32(zero), most_moved)
-        grid = _grid_for(parallax_px, statistics, photo, budget, wanted.quality)
+        grid = _grid_for(parallax_px, statistics, photo, budget, wanted.quality or DEFAULT_QUALITY)
         reasons.append(_grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
     scale = parallax_px / steps / relief.range * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
@@ -129,8 +137,8 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
     reasons += _wild_reasons(given, relief)
-    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, budget, wanted.quality)
-    _require_room(plan, photo, budget, wanted.quality, keeps_views=True)
+    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, budget)
+    _require_room(plan, photo, budget, keeps_views=True)
     return replace(plan, given_range=(relief.low, relief.high))
 
 
@@ -139,23 +147,23 @@ def plan_literal(
     disparity: Disparity,
     grid: GridShape,
     memory_bytes: int | None = None,
-    quality: Quality = DEFAULT_QUALITY,
+    quality: Quality | None = None,
 ) -> ScenePlan:
     """Plan for `iibr generate --grid`: the given disparity is taken as it is, views at integer steps.
 
-    Raises InputError if the grid has no view or generating it in this quality, each view written and forgotten, does
-    not fit into memory.
+    quality: None leaves it to the plan. Raises InputError if the grid has no view or generating it, each view written
+    and forgotten, does not fit into memory.
     """
     reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
     budget = budget_of(memory_bytes)
-    plan = _complete_plan(photo, disparity, grid, 1.0, 0.0, reasons)
-    _require_room(plan, photo, budget, quality, keeps_views=False)
+    plan = _complete_plan(photo, disparity, grid, 1.0, 0.0, reasons, quality)
+    _require_room(plan, photo, budget, keeps_views=False)
     return plan
 
 
-def _require_room(plan: ScenePlan, photo: Photo, budget: Budget, quality: Quality, keeps_views: bool) -> None:
+def _require_room(plan: ScenePlan, photo: Photo, budget: Budget, keeps_views: bool) -> None:
     """Raise InputError where the whole does not fit, telling what would."""
-    pixels, making = photo.size.height * photo.size.width, plan.costs.of(quality).peak_bytes
+    pixels, making = photo.size.height * photo.size.width, plan.peak_bytes
     needed = whole_bytes(pixels, plan.field_bytes, making, keeps_views)
     what = f"{plan.grid.columns} x {plan.grid.rows} views of {photo.name} ({photo.size})"
     side = largest_side(budget, needed - plan.field_bytes, view_bytes(pixels, photo.is_hdr)) if keeps_views else 0
@@ -173,7 +181,7 @@ def _grid_for(
     """The smallest odd grid whose neighbouring views differ by at most STEP_PX, as far as memory allows."""
     if parallax_px < STILL_PX:
         return GridShape(1, 1)
-    side = min(max(ceil(parallax_px / STEP_PX) // 2 * 2 + 1, 3), MOST_VIEWS_A_SIDE)
+    side = min(2 * ceil(parallax_px / STEP_PX / 2) + 1, MOST_VIEWS_A_SIDE)
     making = estimate_costs(statistics, GridShape(side, side)).of(quality).peak_bytes
     pixels = photo.size.height * photo.size.width
     each_view = view_bytes(pixels, photo.is_hdr)
@@ -196,22 +204,24 @@ def _complete_plan(
     scale: float,
     zero: float,
     reasons: list[str],
+    wanted: Quality | None,
     draft_budget: Budget | None = None,
-    quality: Quality = DEFAULT_QUALITY,
 ) -> ScenePlan:
-    """The plan with what follows from grid and scale. draft_budget: what it leaves may go to drafts in this quality."""
+    """The plan with what follows from grid and scale. wanted: the quality the user asked for. draft_budget: what it
+    leaves may go to drafts.
+    """
     if grid.rows < 1 or grid.columns < 1:
         raise InputError(f"--grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
     field = (disparity.values - np.float32(zero)) * np.float32(scale)
     statistics = measure_parallax(field, largest_offset(grid))
     costs = estimate_costs(statistics, grid)
-    pixels, peak_bytes = photo.size.height * photo.size.width, costs.of(DEFAULT_QUALITY).peak_bytes
+    quality = wanted or _choose_quality(statistics, costs)
+    pixels, peak_bytes = photo.size.height * photo.size.width, costs.of(quality).peak_bytes
     field_bytes = grid.rows * grid.columns * view_bytes(pixels, photo.is_hdr)
     draft_bytes = 0
     if draft_budget is not None:
-        cost = costs.of(quality)
-        left = draft_budget.bytes - whole_bytes(pixels, field_bytes, cost.peak_bytes, keeps_views=True)
-        draft_bytes = max(min(cost.draft_bytes, left), 0)
+        left = draft_budget.bytes - whole_bytes(pixels, field_bytes, peak_bytes, keeps_views=True)
+        draft_bytes = max(min(costs.of(quality).draft_bytes, left), 0)
     in_all = whole_bytes(pixels, field_bytes, peak_bytes + draft_bytes, keeps_views=True)
     return ScenePlan(
         grid,
@@ -222,10 +232,24 @@ def _complete_plan(
         statistics.has_disocclusion,
         field_bytes,
         peak_bytes,
-        (*reasons, *_cost_reasons(statistics, costs, field_bytes, draft_bytes, in_all)),
+        (
+            *reasons,
+            *_edge_reasons(statistics),
+            *_quality_reasons(costs, quality, wanted is not None),
+            f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(peak_bytes + draft_bytes)} to make them,"
+            f" {mebibytes(in_all)} in all.",
+        ),
         costs,
+        quality=quality,
         draft_bytes=draft_bytes,
     )
+
+
+def _choose_quality(statistics: ParallaxStatistics, costs: CostEstimates) -> Quality:
+    """Fast where the transformer has nothing to decide, or mostly guesses (MOST_HIDDEN); else balanced."""
+    longer_s = CORES * (costs.balanced.seconds - costs.fast.seconds)
+    is_guessing = statistics.hole_share > MOST_HIDDEN and longer_s > MOST_LONGER_S
+    return "fast" if is_guessing or longer_s <= 0 else "balanced"
 
 
 def _wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
@@ -237,21 +261,28 @@ def _wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
     return [f"{count} pixels lie far beyond that range, as mistakes do: they count as the nearest or the farthest."]
 
 
-def _cost_reasons(
-    statistics: ParallaxStatistics, costs: CostEstimates, field_bytes: int, draft_bytes: int, in_all: int
-) -> list[str]:
+def _edge_reasons(statistics: ParallaxStatistics) -> list[str]:
     inpainted = (
         "holes behind them are inpainted."
         if statistics.has_disocclusion
         else "nothing is disoccluded, so nothing is inpainted."
     )
-    making = costs.of(DEFAULT_QUALITY).peak_bytes + draft_bytes
+    return [f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}"]
+
+
+def _quality_reasons(costs: CostEstimates, quality: Quality, is_asked: bool) -> list[str]:
+    fast, balanced, exact = (each.seconds for each in costs)
+    why = ": no ray is ambiguous."
+    if is_asked:
+        why = ", as asked."
+    elif quality == "balanced":
+        why = ": the transformer decides the rays that are ambiguous."
+    elif balanced > fast:
+        why = ": the photo hides so much of what views show that the transformer would mostly choose between guesses."
     return [
-        f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}",
-        f"Making all views takes about {_seconds(costs.fast.seconds)} in fast, {_seconds(costs.balanced.seconds)} in"
-        f" balanced and {_seconds(costs.exact.seconds)} in exact quality.",
-        f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(making)} to make them,"
-        f" {mebibytes(in_all)} in all.",
+        f"{quality.capitalize()} quality{why}",
+        f"Making all views takes about {_seconds(fast)} in fast, {_seconds(balanced)} in balanced and {_seconds(exact)}"
+        " in exact quality.",
     ]
 
 

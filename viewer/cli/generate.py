@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import DEFAULT_QUALITY, GridShape
+from iibr_core.types import GridShape
 from viewer.cli.options import (
     DepthFrom,
     DepthModel,
@@ -47,7 +47,7 @@ def generate(
     with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
-    quality: QualityChoice = DEFAULT_QUALITY,
+    quality: QualityChoice = None,
     inpaint: Inpaint = DEFAULT_INPAINTER,
     force: Force = False,
 ) -> None:
@@ -74,7 +74,7 @@ def generate(
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
     plan = plan_literal(loaded.photo, loaded.disparity, grid, memory, quality)
     total = grid.rows * grid.columns
-    views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=quality, inpaint=inpaint)
+    views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, inpaint=inpaint)
     with (
         new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         show_progress("making views") as show,

@@ -275,12 +275,13 @@ LightFieldFormat = Annotated[
 ]
 
 QualityChoice = Annotated[
-    Quality,
+    Quality | None,
     typer.Option(
         "--quality",
         parser=quality_from_text,
         metavar="fast|balanced|exact",
-        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere.",
+        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere. By default"
+        " the plan chooses fast or balanced.",
     ),
 ]
 

@@ -12,7 +12,7 @@ import typer
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import DEFAULT_QUALITY, InputError, ViewOffset
+from iibr_core.types import InputError, ViewOffset
 from viewer.cli.options import (
     SCREEN_SIZE,
     DepthFrom,
@@ -158,7 +158,7 @@ def screenshot(
     grid: Grid = None,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
-    quality: QualityChoice = DEFAULT_QUALITY,
+    quality: QualityChoice = None,
     inpaint: Inpaint = DEFAULT_INPAINTER,
     force: Force = False,
 ) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from iibr_core.formats.files import is_folder
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import DEFAULT_QUALITY, InputError
+from iibr_core.types import InputError
 from viewer.cli.demo import demo_photo
 from viewer.cli.options import (
     DepthFrom,
@@ -46,7 +46,7 @@ def view(
     grid: Grid = None,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
-    quality: QualityChoice = DEFAULT_QUALITY,
+    quality: QualityChoice = None,
     inpaint: Inpaint = DEFAULT_INPAINTER,
     ground_truth: Annotated[
         Path | None,

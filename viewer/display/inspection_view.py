@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import ViewUpdate
+from iibr_core.types import DEFAULT_QUALITY, ViewUpdate
 from viewer.background.comparison_worker import (
     ComparisonInputs,
     ComparisonResult,
@@ -123,11 +123,11 @@ class InspectionView:
         ):
             return None
         if scene_view.loaded is not None and scene.plan is not None:
-            return ComparisonInputs(scene.source.quality, scene_view.loaded, scene.plan, inpaint=scene.source.inpaint)
+            return ComparisonInputs(scene.plan.quality, scene_view.loaded, scene.plan, inpaint=scene.source.inpaint)
         if scene_view.renderer.field.grid != scene.grid:
             return None
         stored = self._passes.read_view(scene_view.renderer.field, *request.view)
-        return None if stored is None else ComparisonInputs(scene.source.quality, stored=stored)
+        return None if stored is None else ComparisonInputs(DEFAULT_QUALITY, stored=stored)
 
     def take(self, result: ComparisonResult) -> list[Action]:
         """Show what was found; what is to be known of it comes back as actions."""

@@ -43,7 +43,7 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
     focus_disparity: float | None = None
     max_pixels: Amount | None = None
     memory_bytes: Amount | None = None
-    quality: Quality
+    quality: Quality | None
     refine: float = 1.0
 
 

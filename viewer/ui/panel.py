@@ -118,8 +118,8 @@ def view_count_text(number: int) -> str:
 def size_text(scene: Scene) -> str:
     """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, exact"."""
     words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
-    is_made_here = scene.plan is not None
-    return words if scene.source.quality == DEFAULT_QUALITY or not is_made_here else f"{words}, {scene.source.quality}"
+    plan = scene.plan
+    return words if plan is None or plan.quality == DEFAULT_QUALITY else f"{words}, {plan.quality}"
 
 
 def _tools(state: AppState, layout: Layout) -> list[Action]:

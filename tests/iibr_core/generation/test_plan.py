@@ -1,13 +1,20 @@
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from iibr_core.generation.cost_model import estimate_workload, largest_offset, measure_parallax
-from iibr_core.generation.light_field import ray_set
+from iibr_core.generation.light_field import generate, ray_set
 from iibr_core.generation.memory_model import whole_bytes
-from iibr_core.generation.plan import MOST_VIEWS_A_SIDE, STEP_PX, PlanOverrides, plan_for_viewing, plan_literal
+from iibr_core.generation.plan import (
+    MOST_VIEWS_A_SIDE,
+    STEP_PX,
+    PlanOverrides,
+    plan_for_viewing,
+    plan_literal,
+)
 from iibr_core.training.batches import ambiguous_rays_of_view
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
@@ -34,10 +41,10 @@ def test_parallax_is_a_share_of_the_width_whatever_the_units():
 
 
 def test_grid_follows_the_parallax():
-    photo, disparity = square_before_wall(60, 500)
+    photo, disparity = square_before_wall(60, 1000)
     small = plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=0.3))
     assert small.grid.columns < plan_for_viewing(photo, disparity).grid.columns
-    assert 0.3 * TOTAL_PARALLAX * 500 / (small.grid.columns - 1) <= STEP_PX
+    assert 0.3 * TOTAL_PARALLAX * 1000 / (small.grid.columns - 1) <= STEP_PX
     huge = plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=50))
     assert huge.grid.columns == MOST_VIEWS_A_SIDE
 
@@ -145,3 +152,43 @@ def test_what_cannot_be_is_refused_in_one_line(grid, memory, words):
 def test_depth_strength_must_be_finite(strength):
     with pytest.raises(InputError, match="depth-strength"):
         plan_for_viewing(*square_before_wall(), PlanOverrides(depth_strength=strength))
+
+
+def quality_planned(parallax_px, wanted=None, squares=200):
+    """Of a wall with many small squares before it that move so far to either side."""
+    random = np.random.default_rng(0)
+    values = np.zeros((300, 400), np.float32)
+    for y, x in random.integers(0, 290, (squares, 2)):
+        values[y : y + 9, x : x + 9] = parallax_px / 4
+    photo = photo_of(random.random((300, 400, 3)))
+    return plan_literal(photo, disparity_of(values), GridShape(9, 9), quality=wanted)
+
+
+def test_the_transformer_is_asked_where_it_is_worth_its_time():
+    assert quality_planned(8.0, squares=5).quality == "balanced"
+    assert quality_planned(8.0).quality == "balanced"
+    rough = quality_planned(150.0)
+    assert rough.quality == "fast"
+    assert rough.peak_bytes == rough.costs.fast.peak_bytes
+    assert any("Fast quality: the photo hides" in reason for reason in rough.reasons)
+    assert quality_planned(0.0).quality == "fast", "nothing to decide"
+
+
+@pytest.mark.parametrize("wanted", ["fast", "balanced", "exact"])
+def test_the_quality_asked_for_wins(wanted):
+    plan = quality_planned(150.0, wanted)
+    assert plan.quality == wanted
+    assert any("as asked" in reason for reason in plan.reasons)
+    assert plan.peak_bytes == plan.costs.of(wanted).peak_bytes
+
+
+def test_generation_follows_the_plan():
+    """Where the plan says fast, no weights are read: views are those of the closed form."""
+    photo, disparity = square_before_wall(front=3.0)
+    plan = plan_literal(photo, disparity, GridShape(1, 3))
+    made = {
+        q: [view.colors for view in generate(photo, disparity, replace(plan, quality=q))] for q in ("fast", "exact")
+    }
+    asked = [view.colors for view in generate(photo, disparity, plan, quality="fast")]
+    assert all((one == other).all() for one, other in zip(made["fast"], asked))
+    assert any((one != other).any() for one, other in zip(made["exact"], asked))

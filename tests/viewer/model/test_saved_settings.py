@@ -164,7 +164,9 @@ SAVED = SavedSettings(
         exposure_stops=-1.0,
     ),
     1.5,
-    Source("", DepthChoice(file_scale=2.0, memory_bytes=2**30), GridShape(3, 5), max_pixels=400_000),
+    Source(
+        "", DepthChoice(file_scale=2.0, memory_bytes=2**30), GridShape(3, 5), max_pixels=400_000, quality="balanced"
+    ),
     (741, 500),
 )
 STROKE = Stroke("nearer", ((0.5, 0.25), (0.75, 0.25)), 0.03, 0.25)
@@ -177,6 +179,11 @@ def test_texts_written_before_are_read() -> None:
     later = replace(SAVED, source=replace(SAVED.source, depth=depth), depth_edits=edits)
     assert settings_from_text(LATER_TEXT, "a.png") == later
     assert settings_text(later) == LATER_TEXT
+
+
+def test_a_quality_left_to_the_plan_stays_so() -> None:
+    saved = replace(SAVED, source=replace(SAVED.source, quality=None))
+    assert settings_from_text(settings_text(saved), "a.png") == saved
 
 
 def test_numbers_of_numpy_are_written_like_any() -> None:

@@ -12,7 +12,7 @@ from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import DEFAULT_QUALITY, GridShape, Quality, ViewOffset
+from iibr_core.types import GridShape, Quality, ViewOffset
 from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.inspection import Inspection
@@ -36,7 +36,7 @@ class Source:
     grid: GridShape | None = None
     focus_disparity: float | None = None
     max_pixels: int | None = None
-    quality: Quality = DEFAULT_QUALITY
+    quality: Quality | None = None
     inpaint: str = DEFAULT_INPAINTER
 
 
