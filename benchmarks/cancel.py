@@ -14,7 +14,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from itertools import islice
 
 import numpy as np
 
@@ -28,8 +27,9 @@ from iibr_core.types import Disparity, GridShape, Photo, Quality, ViewUpdate
 GRID = GridShape(9, 9)
 LAST_S = 4.0
 """The word comes within so many seconds."""
-WATCHED_VIEWS = 16
-"""The photo's own, the farthest, and some of the others."""
+WATCHED_GRID = GridShape(5, 4)
+"""Made to the end, drafts finished: the photo's own view, the farthest, and some of the others."""
+DRAFT_BYTES = 1 << 40
 BLUR_PX = 9
 
 
@@ -72,7 +72,7 @@ def main() -> None:
             flush=True,
         )
         watch = Watch()
-        for _ in islice(field(photo, disparity, watch, quality), WATCHED_VIEWS):
+        for _ in field(photo, disparity, watch, quality, WATCHED_GRID):
             watch()
         print(f"{'':9} longest pieces, processor time: {watch.in_words()}", flush=True)
     for name, work in depth_work(photo, disparity).items():
@@ -93,9 +93,12 @@ def scene(pixels: int) -> tuple[Photo, Disparity]:
     return Photo(colors, 1000.0, "blocks"), Disparity(blocks[:height, :width].astype(np.float32), "blocks")
 
 
-def field(photo: Photo, disparity: Disparity, should_stop: ShouldStop, quality: Quality) -> Iterator[ViewUpdate]:
-    """The views of the whole field, so far as they are taken."""
-    return generate(photo, disparity, plan_literal(photo, disparity, GRID), should_stop, quality=quality)
+def field(
+    photo: Photo, disparity: Disparity, should_stop: ShouldStop, quality: Quality, grid: GridShape = GRID
+) -> Iterator[ViewUpdate]:
+    """The views of the whole field, so far as they are taken, as the window has them made."""
+    plan = plan_literal(photo, disparity, grid)
+    return generate(photo, disparity, plan, should_stop, quality=quality, draft_bytes=DRAFT_BYTES)
 
 
 def depth_work(photo: Photo, disparity: Disparity) -> dict[str, Callable[[ShouldStop], object]]:
@@ -112,7 +115,7 @@ def depth_work(photo: Photo, disparity: Disparity) -> dict[str, Callable[[Should
 def compile_all(quality: Quality) -> None:
     """Everything that is needed, on a small photo."""
     photo, disparity = scene(5_000)
-    list(generate(photo, disparity, plan_literal(photo, disparity, GridShape(3, 3)), quality=quality))
+    list(field(photo, disparity, lambda: False, quality, GridShape(4, 3)))
 
 
 def wait_ms(photo: Photo, disparity: Disparity, quality: Quality, share: float) -> float:
