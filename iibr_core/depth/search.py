@@ -5,6 +5,7 @@ order, and says so. What fails is followed by the next; only a file or a model t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,12 +18,12 @@ from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, Relat
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import refine
 from iibr_core.depth.scaling import disparity_from
-from iibr_core.depth.sidecar import find_sidecar, flat_disparity
+from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo, upright
 from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.inpainting.disparity_holes import fill_disparity_holes
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes, say_filled
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import (
     Disparity,
@@ -129,7 +130,16 @@ class _DepthSearch:
 
     def of_file(self, path: Path) -> _FoundDepth:
         disparity = read_disparity(path, self.photo.size, self.choice.file_scale)
+        disparity = replace(disparity, notes=disparity.notes + self._unused_maps(path))
         return _FoundDepth(self.photo, DepthOrigin("file", disparity.source, file=str(path)), disparity)
+
+    def _unused_maps(self, used: Path) -> tuple[str, ...]:
+        """A note where the photo has other maps, too: they may say something else."""
+        unused = [other.name for other in sidecars_of(self.path) if other.resolve() != used.resolve()]
+        with suppress(InputError):  # a damaged one would not be used either
+            embedded = read_embedded(self.path)
+            unused += [f"the photo's own ({embedded.format})"] if embedded is not None else []
+        return (f"Only {used.name} counts; not used: {', '.join(unused)}.",) if unused else ()
 
     def sidecar(self) -> _FoundDepth | None:
         path = find_sidecar(self.path)
@@ -173,8 +183,11 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, sho
         values, notes = found.depth.values, found.depth.notes + notes
     else:
         values = disparity_from(resize_estimate(found.depth, photo.size), grid or USUAL_GRID)
-        if np.isnan(values).all():
+        unknown = np.isnan(values).mean()
+        if unknown == 1:
             raise InputError("it knows no depth anywhere")
+        if unknown > 0:
+            notes += (say_filled("its depth", float(unknown)),)
         values = fill_disparity_holes(values, should_stop)
     if choice.refine > 0:
         values = refine(photo.pixels, values, choice.refine, should_stop)

@@ -19,15 +19,18 @@ SIDECAR_EXTENSIONS = (".pfm", ".exr", ".npy", ".png")
 
 def find_sidecar(photo_path: Path) -> Path | None:
     """The map beside a photo `name.*`: `name_disparity` before `name_depth`; each as .pfm, .exr, .npy, .png in turn."""
+    found = sidecars_of(photo_path)
+    return found[0] if found else None
+
+
+def sidecars_of(photo_path: Path) -> list[Path]:
+    """All maps beside a photo, in the order of `find_sidecar`."""
     photo_path = Path(photo_path)
     if not photo_path.name:
-        return None
-    for kind in SIDECAR_KINDS:
-        for extension in SIDECAR_EXTENSIONS:
-            candidate = photo_path.with_name(photo_path.stem + kind + extension)
-            if is_file(candidate) and candidate != photo_path:
-                return candidate
-    return None
+        return []
+    names = [photo_path.stem + kind + extension for kind in SIDECAR_KINDS for extension in SIDECAR_EXTENSIONS]
+    candidates = [photo_path.with_name(name) for name in names]
+    return [candidate for candidate in candidates if candidate != photo_path and is_file(candidate)]
 
 
 def map_to_read(photo_path: Path, choice: DepthChoice) -> Path | None:

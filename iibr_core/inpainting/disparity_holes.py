@@ -45,6 +45,15 @@ def fill_disparity_holes(values: FloatImage, should_stop: ShouldStop = never) ->
     return filled
 
 
+def say_filled(name: str, unknown: float) -> str:
+    """A sentence on a map of which this share, above 0, was filled."""
+    if unknown > 0.9:
+        return (
+            f"Only {100 * (1 - unknown):.2g} % of {name} is known; what is unknown was filled from the background side."
+        )
+    return f"{100 * unknown:.2g} % of {name} is unknown and was filled from the background side."
+
+
 @kernel
 def _nearest_before(values, near, steps):
     """For the n-th NaN of values (H, W) in reading order: near[n, k], the nearest known value that precedes it on line

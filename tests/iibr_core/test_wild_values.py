@@ -187,6 +187,7 @@ FINITE = {
         np.ones(SIZE, np.float32), {"d_min": v, "d_max": 2.0}
     ),
     "inpainting.disparity_holes.fill_disparity_holes": lambda v, _: disparity_holes.fill_disparity_holes(known(v)),
+    "inpainting.disparity_holes.say_filled": lambda v, _: disparity_holes.say_filled("map", v) and None,
     "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
     "depth.pictorial_cues.estimate_from_cues": lambda v, _: pictorial_cues.estimate_from_cues(
         Photo(image(v), 20.0, "wild")
@@ -312,7 +313,7 @@ READS_OR_TELLS = {
     "depth.models.package_models": "run_package",
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
-    "depth.sidecar": "find_sidecar map_to_read flat_disparity",
+    "depth.sidecar": "find_sidecar sidecars_of map_to_read flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
     "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.inpainting.disparity_holes import fill_disparity_holes
+from iibr_core.inpainting.disparity_holes import fill_disparity_holes, say_filled
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
 
 DoubleImage = NDArray[np.float64]  # scaling must not overflow before the limit is looked at
@@ -24,6 +24,8 @@ MAX_DISPARITY_WIDTHS = 4.0
 DEPTH_SPAN_WIDTHS = 0.01
 """Depth has no baseline; its disparity is given this span from the far to the near end, in photo widths per step."""
 FLAT_DEPTH_SHARE = 1e-4
+MOSTLY_UNKNOWN = 0.9
+"""A map of which more is unknown is filled before it is resampled."""
 SCALED_ROWS = 64
 
 
@@ -47,12 +49,16 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0) -> Disparity
         scaled, notes = stored, ()
     factor = 1.0 if is_depth else scale * size.width / stored.shape[1]
     values, limit_notes = _without_absurd(path, scaled, factor, MAX_DISPARITY_WIDTHS * size.width)
+    unknown = np.isnan(values).mean()
+    if unknown > MOSTLY_UNKNOWN:
+        # Scattered values would get lost among what is unknown.
+        values = _fill_unknown(path, values)
     if values.shape != size:
         notes += (f"{path.name} was resampled from {stored.shape[1]}x{stored.shape[0]} to {size}.",)
         values = resample_surfaces(values, size)
-    unknown = np.isnan(values).mean()
+        unknown = max(unknown, np.isnan(values).mean())
     if unknown > 0:
-        notes += (f"{100 * unknown:.2g} % of {path.name} is unknown and was filled from the background side.",)
+        notes += (say_filled(path.name, float(unknown)),)
     return Disparity(_fill_unknown(path, values), path.name, notes + limit_notes)
 
 

@@ -256,3 +256,46 @@ def test_lengths_in_pixels_scale_with_the_picture() -> None:
     relative = resize_estimate(RelativeInverseDepth(halves), ImageSize(4, 4))
     assert isinstance(relative, RelativeInverseDepth)
     np.testing.assert_array_equal(relative.values[0], [1, 1, 4, 4])
+
+
+def test_other_maps_of_the_photo_are_named_once(tmp_path: Path) -> None:
+    """Whatever they say: here the contrary."""
+    path = photo_file(tmp_path)
+    near_wall = np.where(np.load(_square(tmp_path)) > 0, 0, 3).astype(np.float32)
+    np.save(tmp_path / "scene_disparity.npy", near_wall)
+    np.save(tmp_path / "scene_depth.npy", np.full(SIZE, 2.0, np.float32))
+    for choice, used, unused in (
+        (DepthChoice(refine=0.0), "scene_disparity.npy", "scene_depth.npy"),
+        (DepthChoice(file=str(tmp_path / "square.npy"), refine=0.0), "square.npy", "scene_disparity.npy"),
+    ):
+        found = open_with_depth(path, choice)
+        (note,) = [note for note in found.disparity.notes if "not used" in note]
+        assert used in note.split(";")[0]
+        assert unused in note
+        assert "Google GDepth" in note
+        assert np.isfinite(found.disparity.values).all()
+        assert is_nearer_inside(found) == (used == "square.npy")
+
+
+def _square(folder: Path) -> Path:
+    values = np.zeros(SIZE, np.float32)
+    values[NEAR] = 3
+    np.save(folder / "square.npy", values)
+    return folder / "square.npy"
+
+
+def test_one_map_alone_is_not_spoken_of(tmp_path: Path) -> None:
+    path = photo_file(tmp_path, None)
+    np.save(tmp_path / "scene_disparity.npy", np.load(_square(tmp_path)))
+    assert not open_with_depth(path).disparity.notes
+
+
+def test_what_is_unknown_of_the_photos_own_depth_is_said(tmp_path: Path) -> None:
+    sure = np.zeros(SIZE, np.uint8)
+    sure[::5, ::5] = 255
+    found = open_with_depth(photo_file(tmp_path, confidence=files.picture(sure, "PNG")), start_from("auto"))
+    assert np.isfinite(found.disparity.values).all()
+    assert found.disparity.values[20:28, 32:40].min() > found.disparity.values[:6].max()
+    (note,) = found.disparity.notes
+    assert "Only 4.3 % of its depth is known" in note
+    assert "filled" in note

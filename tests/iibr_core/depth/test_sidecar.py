@@ -284,10 +284,14 @@ def test_nothing_known(tmp_path):
         read_disparity(save(tmp_path / "zero.png", np.zeros((3, 4), np.uint16)), ImageSize(3, 4))
     with pytest.raises(InputError, match="--disparity-scale"):
         read_disparity(save(tmp_path / "large.png", np.full((3, 4), 60000, np.uint16)), ImageSize(3, 4))
+
+
+def test_one_value_known_makes_a_flat_map(tmp_path):
     lonely = np.full((40, 60), NAN)
     lonely[3, 3] = 1
-    with pytest.raises(InputError, match="denser"):
-        read_disparity(pfm(tmp_path / "lonely.pfm", lonely), ImageSize(4, 6))
+    found = read_disparity(pfm(tmp_path / "lonely.pfm", lonely), ImageSize(4, 6))
+    assert found.values == pytest.approx(0.1)
+    assert any("Only 0.042 % of lonely.pfm is known" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("scale", [0.0, math.nan, math.inf])
@@ -348,3 +352,19 @@ def test_colour_picture_is_no_map(tmp_path):
     assert np.allclose(
         read_disparity(save(tmp_path / "b.png", grey), ImageSize(4, 4), 1 / 64).values * 64, grey[..., 0]
     )
+
+
+@pytest.mark.parametrize("size", [(40, 60), (20, 30), (33, 50), (80, 120)])
+def test_of_a_map_that_is_mostly_unknown_every_known_value_counts(tmp_path, size):
+    """Scattered points, one of them wild: finite, between the good ones, and said."""
+    values = np.full((40, 60), np.nan, np.float32)
+    values[::6, ::6] = 2.0
+    values[12:30:6, 18:42:6] = 5.0
+    values[0, 0] = 1e9
+    found = read_disparity(pfm(tmp_path / "a.pfm", values), ImageSize(*size))
+    ratio = size[1] / 60
+    assert np.isfinite(found.values).all()
+    assert found.values.min() == pytest.approx(2 * ratio)
+    assert found.values.max() == pytest.approx(5 * ratio)
+    assert sum("was filled" in note for note in found.notes) == 1
+    assert sum("beyond" in note for note in found.notes) == 1
