@@ -78,7 +78,8 @@ def compare(
     warp(photo.pixels, disparity.values, offsets[0])
     ways = {"warp": lambda: cost_of(lambda: [warp(photo.pixels, disparity.values, at) and None for at in offsets])}
     costs = in_turns(ways | {quality: make_all(quality) for quality in qualities}, repeats, lambda *progress: None)
-    words = [f"{quality} {median_ratio(costs[quality], costs['warp']):.2f}" for quality in qualities]
+    chosen = {plan.quality: " (the plan's)"}
+    words = [f"{q}{chosen.get(q, '')} {median_ratio(costs[q], costs['warp']):.2f}" for q in qualities]
     plain = median_cost(costs["warp"]).cpu_s
     print(f"{name:26} {grid.columns}x{grid.rows} {photo.size}  warp 1 = {plain:.2f} s  {'  '.join(words)}", flush=True)
 

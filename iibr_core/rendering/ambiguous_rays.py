@@ -371,10 +371,10 @@ def _collect_hypotheses(
     """
     rows, width = count.shape
     near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
-    away = np.empty(len(AROUND))
+    away, near_guess = np.empty(len(AROUND)), np.empty(len(AROUND), np.bool_)
     found = 0
     for ray in range(selected):
-        y, x = pixel[ray]
+        y, x = pixel[ray, 0], pixel[ray, 1]
         # First the surfaces on the ray itself. One slot stays free for the plain hypothesis.
         picked = 0
         for k in range(np.int64(count[y, x])):
@@ -392,7 +392,7 @@ def _collect_hypotheses(
             source_x, source_y = x + d * offsets[image, 1], first_row + y + d * offsets[image, 0]
             is_inside = -0.5 <= source_x <= width - 0.5 and -0.5 <= source_y <= height - 0.5
             if is_inside or image >= photo_images:  # the photo shows nothing beyond its frame
-                near_d[n], near_k[n], near_px[n] = d, image, AROUND_DISTANCE[i]
+                near_d[n], near_k[n], near_px[n], near_guess[n] = d, image, AROUND_DISTANCE[i], image >= photo_images
                 n += 1
         # In a hole: begin with the front-most surface around it.
         if picked == 0 and n > 0:
@@ -402,15 +402,16 @@ def _collect_hypotheses(
         # Farthest-point sampling of the disparities around it, until slots or distinct ones run out. away: how far what
         # is near lies from what is picked.
         own_picked, compared = picked, 0
-        away[:n] = np.inf
+        for i in range(n):
+            away[i] = np.inf
         while 0 < picked < disparity.shape[1] - 1:
+            for j in range(compared, picked):
+                d, is_guess = np.float64(disparity[found, j]), source[found, j] >= photo_images
+                for i in range(n):
+                    apart = abs(near_d[i] - d) * parallax + (INPAINTED_APART_PX if near_guess[i] != is_guess else 0.0)
+                    away[i] = min(away[i], apart)
             best, best_distance = -1, DISTINCT_PX
             for i in range(n):
-                for j in range(compared, picked):
-                    apart = abs(near_d[i] - disparity[found, j]) * parallax
-                    if (near_k[i] >= photo_images) != (source[found, j] >= photo_images):
-                        apart += INPAINTED_APART_PX
-                    away[i] = min(away[i], apart)
                 if away[i] > best_distance:
                     best, best_distance = i, away[i]
             if best < 0:

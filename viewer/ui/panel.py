@@ -118,8 +118,8 @@ def view_count_text(number: int) -> str:
 def size_text(scene: Scene) -> str:
     """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, exact"."""
     words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
-    plan = scene.plan
-    return words if plan is None or plan.quality == DEFAULT_QUALITY else f"{words}, {plan.quality}"
+    is_plain = scene.plan is None or scene.source.quality in (None, DEFAULT_QUALITY)
+    return words if is_plain else f"{words}, {scene.source.quality}"
 
 
 def _tools(state: AppState, layout: Layout) -> list[Action]:
