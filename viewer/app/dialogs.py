@@ -13,7 +13,7 @@ UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first it finds."""
 
 FILE_KINDS: dict[ChoiceOf, str] = {
-    "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif",
+    "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif avif",
     "mask": "png jpg jpeg tif tiff bmp exr",
     "map": "pfm exr npy png tif tiff",
 }

@@ -77,6 +77,7 @@ def load_photo(
     """
     require_process(budget_of(source.depth.memory_bytes), keeps_views)
     from iibr_core.depth.search import open_with_depth
+    from iibr_core.formats.images.avif import is_avif
     from iibr_core.formats.images.heic import is_heic
     from viewer.model.saved_settings import settings_text_in
 
@@ -100,8 +101,8 @@ def load_photo(
     )
     found = replace(found, photo=replace(found.photo, notes=found.photo.notes + notes))
     give_back_memory()
-    # This program saves no HEIC.
-    settings = "" if is_heic(path) else settings_text_in(path)
+    # This program saves neither.
+    settings = "" if is_heic(path) or is_avif(path) else settings_text_in(path)
     return _prepare(found, settings, _models_here(), depth_settings or DepthSettings(source.depth.refine), should_stop)
 
 

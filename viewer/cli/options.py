@@ -218,7 +218,9 @@ def number_option(help_text: str) -> Any:
     return typer.Option(parser=finite_from_text, metavar="X", help=help_text)
 
 
-PhotoPath = Annotated[Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP, HEIC).", show_default=False)]
+PhotoPath = Annotated[
+    Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP, HEIC, AVIF).", show_default=False)
+]
 ScenePath = Annotated[Path, typer.Argument(help="A photo or a light-field folder.", show_default=False)]
 DisparityFile = Annotated[
     Path | None,

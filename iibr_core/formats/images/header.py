@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from iibr_core.formats.files import open_binary
+from iibr_core.formats.images.avif import avif_size, is_avif
 from iibr_core.formats.images.heic import heic_size, is_heic
 from iibr_core.formats.images.oiio_reader import PictureRows
 from iibr_core.types import ImageSize
@@ -14,7 +15,7 @@ from iibr_core.types import ImageSize
 BY_ROWS = frozenset({"jpeg", "png", "tiff", "openexr", "hdr", "pnm", "bmp", "targa"})
 """Formats, by OpenImageIO's names, that are decoded some rows at a time; of the others all is held at once."""
 HEIC_BYTES = 8
-"""Of a pixel: libheif's planes, and what it makes of them."""
+"""Of a pixel: libheif's planes, and what it makes of them; libavif's are no more."""
 COEFFICIENT_BYTES = 2
 JPEG_START, START_OF_SCAN = b"\xff\xd8", 0xDA
 PROGRESSIVE_FRAMES = (0xC2, 0xC6, 0xCA, 0xCE)
@@ -30,8 +31,8 @@ class PhotoHeader(NamedTuple):
 
 def read_photo_header(path: Path) -> PhotoHeader:
     """Of a photo that `read_photo` reads. Raises InputError as that does for its header."""
-    if is_heic(path):
-        size = heic_size(path)
+    if is_avif(path) or is_heic(path):
+        size = avif_size(path) if is_avif(path) else heic_size(path)
         return PhotoHeader(size, size.height * size.width * HEIC_BYTES)
     rows = PictureRows(path)
     size, kind, pixels = rows.size, rows.format_name, rows.size.height * rows.size.width

@@ -46,7 +46,7 @@ def read_heic(path: Path) -> Raster:
     """Decode a HEIC's photo, turned upright as the file asks. Raises InputError as `read_raster` does."""
     file = _open(path)
     spec = oiio.ImageSpec(file.size[0], file.size[1], 3, "uint8")
-    _describe(spec, file.info)
+    describe(spec, file.info)
     pixels = _pixels(path, file)
     alpha = np.ascontiguousarray(pixels[..., 3]) if pixels.shape[2] == 4 else None
     if alpha is not None and (alpha == np.iinfo(alpha.dtype).max).all():
@@ -98,8 +98,8 @@ def _pixels(path: Path, picture: Any) -> NDArray[Any]:
     return pixels.reshape(*pixels.shape[:2], -1)
 
 
-def _describe(spec: Any, info: dict[str, Any]) -> None:
-    """Put what `read_photo` asks for into a header: focal length and colour profile. Orientation is applied already."""
+def describe(spec: Any, info: dict[str, Any]) -> None:
+    """Put what `read_photo` asks for into a header: focal length and colour profile, of what Pillow calls info."""
     from PIL import Image
 
     exif = Image.Exif()

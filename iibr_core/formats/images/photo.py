@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file, shown_name
+from iibr_core.formats.images.avif import is_avif, read_avif
 from iibr_core.formats.images.color_profile import color_profile_of
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
 from iibr_core.formats.images.heic import is_heic, read_heic
@@ -33,8 +34,8 @@ ENCODED_ROWS = 64
 
 
 def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float = DEFAULT_FOV_DEG) -> Photo:
-    """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads) or HEIC as a photo, upright, max_pixels
-    large at most.
+    """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads), HEIC or AVIF as a photo, upright,
+    max_pixels large at most.
 
     fov_deg: horizontal field of view where the file gives no focal length. Raises InputError, naming the file, if it
     is missing, no picture, cut off, or absurdly large.
@@ -105,6 +106,8 @@ def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
 
 
 def _open_rows(path: Path) -> PictureRows | Raster:
+    if is_avif(path):
+        return read_avif(path)
     return read_heic(path) if is_heic(path) else PictureRows(path)
 
 

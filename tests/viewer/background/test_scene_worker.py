@@ -374,3 +374,14 @@ def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> 
     desk.worker.submit(request(1))
     desk.next()
     assert seen == [ViewOffset(1, 2)]
+
+
+def test_an_avif_photo_opens(tmp_path: Path) -> None:
+    """It is read by another library than the settings in saved pictures."""
+    from PIL import Image
+
+    from viewer.background.loaded_photo import load_photo
+
+    Image.new("RGB", (48, 32), (200, 80, 60)).save(tmp_path / "a.avif")
+    loaded = load_photo(Source(str(tmp_path / "a.avif")))
+    assert (loaded.photo.size, loaded.settings) == ((32, 48), "")
