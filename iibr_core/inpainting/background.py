@@ -8,6 +8,7 @@ frame's border it picks the surface that really leaves the frame, without any th
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,12 @@ DIRECTIONS = np.array(
         (2, 1), (-2, 1), (2, -1), (-2, -1), (1, 2), (-1, 2), (1, -2), (-1, -2),
     ]
 )  # fmt: skip
-SMOOTH_PX = 2
+SMOOTH_STEPS_PX = (1, 2, 4, 8)
+"""Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
+AGREE_PX = 2
+"""Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
+SURFACE_PX = 2.0
+"""Surfaces that part by less than this are one."""
 MOST_PIECE_PIXELS = 1 << 15
 """Hole pixels that are filled between two questions whether to stop."""
 HIDDEN_PX = 0.5
@@ -41,21 +47,32 @@ def fill_background(
 ) -> None:
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
-    photo_disparity: the centre view's. Every hole pixel is a mean of the nearest known pixels in sixteen directions
-    that are possible there, weighted by 1 / distance, then smoothed within its surface. A view that is all hole stays
-    as it is. Raises Cancelled once should_stop is true.
+    photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
+    there, weighted by 1 / distance. The colour is their mean, smoother the farther away they are: who can tell which of
+    them goes on. The disparity is that of one surface, the one with the most weight: a mean of several would lie on
+    none. A view that is all hole stays as it is. Raises Cancelled once should_stop is true.
     """
     pixels = _hole_pixels(hole, should_stop, threads)
     known = _nearest_known(hole, pixels, should_stop, threads)
-    smoothed = np.empty((len(pixels), 3), np.float32)
-    tolerance = HIDDEN_PX / max(abs(offset.s), abs(offset.t))
-    steps: tuple[Callable[[slice], None], ...] = (
-        lambda part: _fill(colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t),
-        lambda part: _smooth(colors, disparity, hole, pixels[part], tolerance, smoothed[part]),
-        # Written back only now: a pixel's neighbours are smoothed from what was filled, not from what was smoothed.
-        lambda part: _write_colors(smoothed[part], pixels[part], colors),
-    )
+    reach = np.empty(len(pixels), np.float32)
+    changed = np.empty((len(pixels), 3), np.float32)
     parts = [slice(first, first + MOST_PIECE_PIXELS) for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
+
+    def smooth(step_px: int) -> Callable[[slice], None]:
+        return lambda part: _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part])
+
+    def write_colors(part: slice) -> None:
+        # Only when all is computed: neighbours are taken as they were before a step, not after it.
+        _write_colors(changed[part], pixels[part], colors)
+
+    steps: list[Callable[[slice], None]] = [
+        lambda part: _fill(
+            colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, reach[part]
+        ),
+        lambda part: _agree(disparity, hole, pixels[part], changed[part]),
+        lambda part: _write_disparity(changed[part], pixels[part], disparity),
+        *chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX),
+    ]
     for step in steps:
         in_pieces(step, parts, should_stop, threads)
 
@@ -78,10 +95,7 @@ def _hole_pixels(hole: NDArray[np.bool_], should_stop: ShouldStop, threads: int)
 def _nearest_known(
     hole: NDArray[np.bool_], pixels: NDArray[np.int64], should_stop: ShouldStop, threads: int
 ) -> NDArray[np.int64]:
-    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none.
-
-    The second known pixel where there are two (the first may be mixed with what hides the hole).
-    """
+    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none."""
     raise_if_stopped(should_stop)
     number = np.empty(hole.shape, np.int32)
     _number(pixels, number)
@@ -123,72 +137,112 @@ def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):
         if hole[y, x]:
             known[i] = known[number[y, x]]
             continue
-        # One farther if that is known too: the first may be mixed with what hides the hole.
-        beyond_x, beyond_y = x + step_x, y + step_y
-        if 0 <= beyond_x < width and 0 <= beyond_y < height and not hole[beyond_y, beyond_x]:
-            x, y = beyond_x, beyond_y
         known[i] = y * width + x
 
 
 @kernel
-def _fill(colors, disparity, pixels, known, photo_disparity, s, t):
+def _fill(colors, disparity, pixels, known, photo_disparity, s, t, reach):
+    """What `fill_background` says; and how far away the nearest known pixel is, reach (N,)."""
     height, width = disparity.shape
     directions = known.shape[1]
-    possible = np.empty(directions, np.bool_)
+    surface, weight = np.zeros(directions), np.zeros(directions)
     parallax = max(abs(s), abs(t))
+    one_surface = SURFACE_PX / parallax
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        farthest = np.inf
+        nearest, farthest = np.inf, np.inf
         any_possible = False
         # Which of the surfaces around may continue to here: where each would lie in the photo (backward warp), ...
         for k in range(directions):
-            possible[k] = False
+            weight[k] = 0.0
             if known[i, k] < 0:
                 continue
-            d = disparity[known[i, k] // width, known[i, k] % width]
+            known_y, known_x = known[i, k] // width, known[i, k] % width
+            distance = np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
+            nearest = min(nearest, distance)
+            d = disparity[known_y, known_x]
+            surface[k] = d
             farthest = min(farthest, d)
             # ... something nearer must hide it by HIDDEN_PX, or it must be off the frame.
             column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
             inside = 0 <= column < width and 0 <= row < height
-            possible[k] = not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX
-            any_possible = any_possible or possible[k]
-        # Their mean, weighted by 1 / distance.
+            if not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX:
+                weight[k] = 1.0 / distance
+                any_possible = True
+            else:
+                weight[k] = -1.0 / distance
+        reach[i] = nearest
+        # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
+        for k in range(directions):
+            is_farthest = not any_possible and surface[k] <= farthest
+            weight[k] = abs(weight[k]) if is_farthest else max(weight[k], 0.0)
+        # The surface with the most weight, the farther of equals.
+        chosen, most = -1, 0.0
+        for k in range(directions):
+            votes = 0.0
+            if weight[k] > 0:
+                for j in range(directions):
+                    if abs(surface[j] - surface[k]) <= one_surface:
+                        votes += weight[j]
+            if votes > most or (votes > 0 and votes == most and surface[k] < surface[chosen]):
+                chosen, most = k, votes
+        if chosen < 0:
+            continue
         total = r = g = b = sum_d = 0.0
         for k in range(directions):
-            if known[i, k] < 0:
+            w = weight[k]
+            if not w > 0:
                 continue
             known_y, known_x = known[i, k] // width, known[i, k] % width
-            d = disparity[known_y, known_x]
-            # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
-            if not (possible[k] or (not any_possible and d <= farthest)):
-                continue
-            w = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
             total += w
             r += w * colors[known_y, known_x, 0]
             g += w * colors[known_y, known_x, 1]
             b += w * colors[known_y, known_x, 2]
-            sum_d += w * d
-        if total > 0:
-            colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
-            disparity[y, x] = sum_d / total
+            if abs(surface[k] - surface[chosen]) <= one_surface:
+                sum_d += w * surface[k]
+        colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
+        disparity[y, x] = sum_d / most
 
 
 @kernel
-def _smooth(colors, disparity, hole, pixels, tolerance, smoothed):
-    """Average what was filled over SMOOTH_PX each way on the same surface: neighbours took their colours from afar."""
+def _agree(disparity, hole, pixels, agreed):
+    """The median of what was filled within AGREE_PX each way, as agreed[:, 0]."""
     height, width = disparity.shape
+    around = np.empty((2 * AGREE_PX + 1) ** 2, np.float32)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        count = r = g = b = 0.0
-        # A box mean over the hole's pixels of one surface: known pixels stay sharp, and do not bleed in.
-        for v in range(max(y - SMOOTH_PX, 0), min(y + SMOOTH_PX + 1, height)):
-            for u in range(max(x - SMOOTH_PX, 0), min(x + SMOOTH_PX + 1, width)):
-                if hole[v, u] and abs(disparity[v, u] - disparity[y, x]) <= tolerance:
-                    count += 1.0
-                    r += colors[v, u, 0]
-                    g += colors[v, u, 1]
-                    b += colors[v, u, 2]
-        smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = r / count, g / count, b / count
+        count = 0
+        for v in range(max(y - AGREE_PX, 0), min(y + AGREE_PX + 1, height)):
+            for u in range(max(x - AGREE_PX, 0), min(x + AGREE_PX + 1, width)):
+                if hole[v, u]:
+                    around[count] = disparity[v, u]
+                    count += 1
+        agreed[i, 0] = np.sort(around[:count])[(count - 1) // 2]
+
+
+@kernel
+def _smooth(colors, hole, pixels, reach, step, smoothed):
+    """A mean over hole pixels `step` apart, where what is known lies at least as far away: so known pixels stay sharp,
+    and no streaks lead from them into wide holes.
+    """
+    height, width = hole.shape
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = colors[y, x, 0], colors[y, x, 1], colors[y, x, 2]
+        if reach[i] < step:
+            continue
+        # Weights 1 2 1 along each axis (the a-trous scheme: the next step doubles the distances).
+        total = r = g = b = 0.0
+        for j in range(-1, 2):
+            for k in range(-1, 2):
+                v, u = y + j * step, x + k * step
+                if 0 <= v < height and 0 <= u < width and hole[v, u]:
+                    w = (2.0 - abs(j)) * (2.0 - abs(k))
+                    total += w
+                    r += w * colors[v, u, 0]
+                    g += w * colors[v, u, 1]
+                    b += w * colors[v, u, 2]
+        smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = r / total, g / total, b / total
 
 
 @kernel
@@ -197,3 +251,10 @@ def _write_colors(smoothed, pixels, colors):
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = smoothed[i, 0], smoothed[i, 1], smoothed[i, 2]
+
+
+@kernel
+def _write_disparity(agreed, pixels, disparity):
+    width = disparity.shape[1]
+    for i in range(len(pixels)):
+        disparity[pixels[i] // width, pixels[i] % width] = agreed[i, 0]

@@ -1,46 +1,67 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.background import DIRECTIONS, HIDDEN_PX, SMOOTH_PX, fill_background
+from iibr_core.inpainting.background import (
+    AGREE_PX,
+    DIRECTIONS,
+    HIDDEN_PX,
+    SMOOTH_STEPS_PX,
+    SURFACE_PX,
+    fill_background,
+)
 from iibr_core.types import ViewOffset
 
 
-def smooth_slowly(colors, disparity, hole, tolerance):
+def agree_slowly(disparity, hole):
+    agreed = disparity.copy()
+    for y, x in np.argwhere(hole):
+        block = np.s_[max(y - AGREE_PX, 0) : y + AGREE_PX + 1, max(x - AGREE_PX, 0) : x + AGREE_PX + 1]
+        around = np.sort(disparity[block][hole[block]])
+        agreed[y, x] = around[(len(around) - 1) // 2]
+    return agreed
+
+
+def smooth_slowly(colors, hole, reach, step):
     smoothed = colors.copy()
     for y, x in np.argwhere(hole):
-        block = np.s_[max(y - SMOOTH_PX, 0) : y + SMOOTH_PX + 1, max(x - SMOOTH_PX, 0) : x + SMOOTH_PX + 1]
-        same = hole[block] & (np.abs(disparity[block] - disparity[y, x]) <= tolerance)
-        smoothed[y, x] = colors[block][same].mean(axis=0)
+        if reach[y, x] >= step:
+            at = [(y + j * step, x + k * step, (2 - abs(j)) * (2 - abs(k))) for j in (-1, 0, 1) for k in (-1, 0, 1)]
+            inside = [a for a in at if 0 <= a[0] < hole.shape[0] and 0 <= a[1] < hole.shape[1] and hole[a[:2]]]
+            smoothed[y, x] = np.average([colors[a[:2]] for a in inside], axis=0, weights=[a[2] for a in inside])
     return smoothed
 
 
 def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     height, width = hole.shape
     t, s = offset
-    filled_colors, filled_disparity = colors.copy(), disparity.copy()
+    parallax = max(abs(s), abs(t))
+    filled_colors, filled_disparity, reach = colors.copy(), disparity.copy(), np.full(hole.shape, np.inf)
     for y, x in np.argwhere(hole):
         seen = []
         for i, j in DIRECTIONS:
             path = [(x + n * i, y + n * j) for n in range(1, max(height, width) + 1)]
-            path = [(u, v) for u, v in path if 0 <= u < width and 0 <= v < height]
-            known = [n for n, (u, v) in enumerate(path) if not hole[v, u]]
-            if known:
-                n = known[0] + 1 if known[0] + 1 < len(path) and not hole[path[known[0] + 1][::-1]] else known[0]
-                seen.append(path[n])
+            path = [(u, v) for u, v in path if 0 <= u < width and 0 <= v < height and not hole[v, u]]
+            seen += path[:1]
 
         def possible(u, v, x=x, y=y):
             d = float(disparity[v, u])
             column, row = int(np.floor(x + d * s + 0.5)), int(np.floor(y + d * t + 0.5))
             inside = 0 <= column < width and 0 <= row < height
-            return not inside or (photo_disparity[row, column] - d) * max(abs(s), abs(t)) > HIDDEN_PX
+            return not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX
 
         farthest = min((disparity[v, u] for u, v in seen), default=0)
         chosen = [p for p in seen if possible(*p)] or [(u, v) for u, v in seen if disparity[v, u] <= farthest]
         if chosen:
+            reach[y, x] = min(np.hypot(u - x, v - y) for u, v in seen)
             w = np.array([1 / np.hypot(u - x, v - y) for u, v in chosen])
+            d = np.array([disparity[v, u] for u, v in chosen])
             filled_colors[y, x] = sum(k * colors[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
-            filled_disparity[y, x] = sum(k * disparity[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
-    return smooth_slowly(filled_colors, filled_disparity, hole, HIDDEN_PX / max(abs(s), abs(t))), filled_disparity
+            alike = np.abs(d[:, None] - d) <= SURFACE_PX / parallax
+            mine = alike[max(range(len(d)), key=lambda k: (round((alike[k] * w).sum(), 9), -d[k]))]
+            filled_disparity[y, x] = (w * d)[mine].sum() / w[mine].sum()
+    for step in SMOOTH_STEPS_PX:
+        filled_colors = smooth_slowly(filled_colors, hole, reach, step)
+    return filled_colors, agree_slowly(filled_disparity, hole)
 
 
 def test_agrees_with_a_slow_twin():
@@ -71,6 +92,17 @@ def test_a_disocclusion_takes_the_background_not_what_hid_it():
     fill_background(colors, disparity, hole, photo_disparity, offset)
     assert colors[hole] == pytest.approx(np.tile(np.float32([0, 0, 1]), (hole.sum(), 1)))
     assert disparity[hole].max() == 0
+
+
+def test_what_lies_between_two_surfaces_has_the_disparity_of_one():
+    disparity = np.zeros((20, 40), np.float32)
+    disparity[10:] = 3.0
+    hole = np.zeros((20, 40), bool)
+    hole[:, 34:] = True
+    colors = np.zeros((20, 40, 3), np.float32)
+    disparity[hole] = 9.0
+    fill_background(colors, disparity, hole, np.full((20, 40), 8.0, np.float32), ViewOffset(0, 1))
+    assert set(disparity[hole]) == {0.0, 3.0}
 
 
 def test_the_frame_border_continues_the_surface_that_leaves_it():
