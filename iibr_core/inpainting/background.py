@@ -24,7 +24,7 @@ DIRECTIONS = np.array(
         (2, 1), (-2, 1), (2, -1), (-2, -1), (1, 2), (-1, 2), (1, -2), (-1, -2),
     ]
 )  # fmt: skip
-SMOOTH_STEPS_PX = (1, 2, 4, 8)
+SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
 AGREE_PX = 2
 """Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""

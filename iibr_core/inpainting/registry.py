@@ -10,6 +10,7 @@ from iibr_core.types import InputError
 
 INPAINTERS = {
     "background": "iibr_core.inpainting.background:background_inpainter",
+    "patch": "iibr_core.inpainting.patch:patch_inpainter",
 }
 """Name -> "module:function" of a factory without arguments, which raises InputError where it lacks what it needs.
 
