@@ -5,7 +5,6 @@ They are data, checked against sources, Python, Numba and processor where they a
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -24,10 +23,9 @@ class KernelsHook(BuildHookInterface[Any]):
             return
         self._scratch = tempfile.TemporaryDirectory()
         kernels = Path(self._scratch.name) / "kernels"
-        # What isolates the build is on the path too.
-        path = os.pathsep.join((self.root, *filter(None, (os.environ.get("PYTHONPATH"),))))
-        command = [sys.executable, "-P", "-m", "viewer.precompile", str(kernels)]
-        done = subprocess.run(command, env=os.environ | {"PYTHONPATH": path}, check=False)
+        # From the sources' folder, not by PYTHONPATH: what isolates the build may take that off again.
+        command = [sys.executable, "-m", "viewer.precompile", str(kernels)]
+        done = subprocess.run(command, cwd=self.root, check=False)
         if done.returncode == 0:
             build_data["force_include"][str(kernels)] = "iibr_core/_kernels"
         else:
