@@ -93,7 +93,7 @@ def _generate_views(
         for offset, view in outer_views:
             inner.remove(offset)
             if transformer is not None:
-                known = len(rays) - 1 if view.occluded.any() else None
+                known = len(rays) - 1 if view.has_filled_rays else None
                 unfinished[offset] = partial(views.make, offset, known)
             if transformer is None or draft_bytes is not None:
                 yield views.update(offset, view, is_final=transformer is None)

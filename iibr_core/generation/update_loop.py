@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-import numpy as np
-
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ray_set import RaySet
@@ -33,8 +31,8 @@ def render_outer_views(
     with ViewSynthesis(should_stop, slots=slots, inpainter=inpainter) as synthesis:
         for offset in outer:
             view = synthesis.render(rays, offset)
-            if view.occluded.any():
-                rays.add(offset, view.colors, view.disparity, view.occluded.astype(np.float32), should_stop)
+            if view.has_filled_rays:
+                rays.add(offset, *view.filled_rays(), should_stop)
             yield offset, view
 
 

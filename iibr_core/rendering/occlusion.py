@@ -17,6 +17,8 @@ LEAST_COVERED = 0.2
 """A ray that its one candidate covers less than this counts as occluded: slivers of surface would look torn."""
 MOSTLY_COVERED = 0.5
 """A ray covered more than this is not occluded, however many surfaces share it."""
+WHOLE = 0.8
+"""Where less of a ray is covered, what lies behind shows, too. Above, it is a seam rather than a rim."""
 
 
 def entropy(weights: FloatImage) -> FloatImage:
@@ -33,6 +35,21 @@ def occlusion_mask(weights: FloatImage) -> NDArray[np.bool_]:
     limit = np.zeros((slots, 1, 1), np.float32)
     limit[0] = LEAST_COVERED
     return np.asarray(_mask(weights, _entropy(limit)[0, 0]))
+
+
+def covered_share(weights: FloatImage) -> FloatImage:
+    """(N, W) in [0, 1]: how much of each ray its candidates cover, by weights (K, N, W)."""
+    return np.asarray(_covered(weights))
+
+
+@kernel
+def _covered(weights):
+    _, rows, width = weights.shape
+    result = np.empty((rows, width), np.float32)
+    for row in range(rows):
+        for x in range(width):
+            result[row, x] = _coverage(weights, row, x)
+    return result
 
 
 @kernel

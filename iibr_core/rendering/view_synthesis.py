@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from types import TracebackType
 from typing import TypeVar
@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ambiguity import EVERY_COST
@@ -29,7 +30,7 @@ from iibr_core.rendering.ambiguous_rays import (
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
-from iibr_core.rendering.occlusion import entropy, occlusion_mask
+from iibr_core.rendering.occlusion import MOSTLY_COVERED, WHOLE, covered_share, entropy, occlusion_mask
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, heaviest_candidate, resample_colors
 from iibr_core.rendering.visibility_weights import visibility_weights
@@ -45,12 +46,24 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, eq=False)
+class RaysBehind:
+    """What was filled behind N rays that surfaces cover in part: their pixels (N), counted row by row, its colors
+    (N, 3), sRGB-encoded, and disparity (N).
+    """
+
+    pixel: NDArray[np.int64]
+    colors: FloatImage
+    disparity: FloatImage
+
+
+@dataclass(frozen=True, eq=False)
 class RenderedView:
     """A view without holes.
 
     colors: (H, W, 3) sRGB-encoded. disparity: (H, W). occluded: (H, W), True where no source showed anything, so that
     it was filled here. inpainted: (H, W), True where the photo showed nothing: filled here or in an earlier view.
-    entropy: (H, W) in [0, 1], of the closed form's weights, or None where it was not asked for.
+    entropy: (H, W) in [0, 1], of the closed form's weights, or None where it was not asked for. behind: what was filled
+    here and shows beside something in front of it, None without any.
     """
 
     colors: FloatImage
@@ -58,6 +71,22 @@ class RenderedView:
     occluded: NDArray[np.bool_]
     inpainted: NDArray[np.bool_]
     entropy: FloatImage | None = None
+    behind: RaysBehind | None = None
+
+    @property
+    def has_filled_rays(self) -> bool:
+        """Whether anything was filled here."""
+        return self.behind is not None or bool(self.occluded.any())
+
+    def filled_rays(self) -> tuple[FloatImage, FloatImage, FloatImage]:
+        """What was filled here, as an image for the ray set: colours (H, W, 3), disparity and coverage (H, W)."""
+        if self.behind is None:
+            return self.colors, self.disparity, self.occluded.astype(np.float32)
+        colors, disparity, filled = self.colors.copy(), self.disparity.copy(), self.occluded.copy()
+        colors.reshape(-1, 3)[self.behind.pixel] = self.behind.colors
+        disparity.reshape(-1)[self.behind.pixel] = self.behind.disparity
+        filled.reshape(-1)[self.behind.pixel] = True
+        return colors, disparity, filled.astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,12 +171,12 @@ class ViewSynthesis:
         """The view in closed form, alone; and the rays that are the transformer's, none where there is nothing to
         decide. Written over with what `decide` says of them, it is the view of `render`.
         """
-        view = self._begin_view(rays, offset)
+        view, covered = self._begin_view(rays, offset)
         undecided = in_bands(
-            lambda first, last: self._render_rows(rays, offset, (first, last), view),
+            lambda first, last: self._render_rows(rays, offset, (first, last), view, covered),
             rays.size, self._should_stop, 1, self._most_band_pixels,
         )  # fmt: skip
-        self._fill(rays, offset, view, 1)
+        view = self._fill(rays, offset, view, covered, 1)
         return view, [part for part in undecided if part is not None and len(part.pixel)]
 
     def decide(self, rays: RaySet, undecided: UndecidedRays) -> DecidedRays:
@@ -178,39 +207,62 @@ class ViewSynthesis:
 
     def _view(self, rays: RaySet, offset: ViewOffset, threads: int, known: int | None) -> RenderedView:
         def band(first: int, last: int) -> DecidedRays | None:
-            undecided = self._render_rows(rays, offset, (first, last), view, known)
+            undecided = self._render_rows(rays, offset, (first, last), view, covered, known)
             return self.decide(rays, undecided) if undecided is not None else None
 
-        view = self._begin_view(rays, offset)
+        view, covered = self._begin_view(rays, offset)
         decided = in_bands(band, rays.size, self._should_stop, threads, self._most_band_pixels)
-        self._fill(rays, offset, view, threads)
+        view = self._fill(rays, offset, view, covered, threads)
         for part in filter(None, decided):
             at = np.unravel_index(part.pixel, rays.size)
             view.colors[at], view.disparity[at], view.inpainted[at] = part.colors, part.disparity, part.inpainted
         return view
 
-    def _begin_view(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
+    def _begin_view(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, FloatImage]:
+        """A view to be written to, and as large an image for how much of each ray is covered."""
         if not np.isfinite(offset).all():
             raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
         if self._transformer:
             rays.survey(self._should_stop)
-        return _blank_view(rays.size, self._keeps_entropy)
+        return _blank_view(rays.size, self._keeps_entropy), np.empty(rays.size, np.float32)
 
-    def _fill(self, rays: RaySet, offset: ViewOffset, view: RenderedView, threads: int) -> None:
-        if view.occluded.any():
-            self._inpainter(
-                view.colors, view.disparity, view.occluded, rays.photo_disparity, offset, self._should_stop, threads
-            )
+    def _fill(
+        self, rays: RaySet, offset: ViewOffset, view: RenderedView, covered: FloatImage, threads: int
+    ) -> RenderedView:
+        """The view with its holes filled. covered (H, W): how much of each ray is covered: what covers a ray in part
+        comes over what was filled there. So no rim that two surfaces share is a seed for what is filled, either.
+        """
+        colors, disparity = view.colors.reshape(-1, 3), view.disparity.reshape(-1)
+        part = np.flatnonzero((covered < WHOLE) & (covered > 0))
+        part = part[_is_within_frame(rays.size, part, disparity[part], offset) | view.occluded.reshape(-1)[part]]
+        hole = view.occluded.copy()
+        hole.reshape(-1)[part] = True
+        if not hole.any():
+            return view
+        front, front_disparity = colors[part], disparity[part]
+        self._inpainter(view.colors, view.disparity, hole, rays.photo_disparity, offset, self._should_stop, threads)
+        if not len(part):
+            return view
+        behind, share = RaysBehind(part, colors[part], disparity[part]), covered.reshape(-1)[part]
+        colors[part] = _composite(front, behind.colors, share)
+        disparity[part] = np.where(share > MOSTLY_COVERED, front_disparity, behind.disparity)
+        return replace(view, behind=behind)
 
     @property
     def _most_band_pixels(self) -> int:
         return tiling.MOST_BAND_PIXELS // (EVERY_COST if self._every else 1)
 
     def _render_rows(
-        self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: RenderedView, known: int | None = None
+        self,
+        rays: RaySet,
+        offset: ViewOffset,
+        rows: tuple[int, int],
+        view: RenderedView,
+        covered: FloatImage,
+        known: int | None = None,
     ) -> UndecidedRays | None:
-        """Write rows [first, last) of the view in closed form, holes not filled yet; the rays that are the
-        transformer's to decide, if there is one.
+        """Write rows [first, last) of the view in closed form, holes not filled yet, and of how much of each ray is
+        covered; the rays that are the transformer's to decide, if there is one.
         """
         around = REACH_PX if self._transformer else 0
         above = min(rows[0], around)
@@ -219,7 +271,7 @@ class ViewSynthesis:
         )
         raise_if_stopped(self._should_stop)
         weights = visibility_weights(candidates)
-        occluded = occlusion_mask(weights)
+        occluded, share = occlusion_mask(weights), covered_share(weights)
         inner = slice(above, above + rows[1] - rows[0])
         raise_if_stopped(self._should_stop)
         wanted = np.zeros(occluded.shape, np.bool_)
@@ -231,14 +283,14 @@ class ViewSynthesis:
             disparity, source = heaviest_candidate(candidates, weights)
             undecided = find_undecided_rays(
                 rays, candidates, weights, (disparity, source), (inner.start, inner.stop), self._every,
-                self._hypotheses, occluded,
+                self._hypotheses, occluded | (share < WHOLE),
             )  # fmt: skip
         shown = slice(*rows)
         view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
         if known is not None:
             before = rays.arrays[1][known, shown]
             np.copyto(view.colors[shown], before, where=~wanted[inner][..., None])
-        view.occluded[shown] = occluded[inner]
+        view.occluded[shown], covered[shown] = occluded[inner], share[inner]
         view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
@@ -254,6 +306,21 @@ def _changed_pixels(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], kno
     pixels = landed.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
     above = rows[0] % CELL_PX
     return np.asarray(pixels[above : above + rows[1] - rows[0], : rays.size.width])
+
+
+def _is_within_frame(
+    size: ImageSize, pixel: NDArray[np.int64], disparity: FloatImage, offset: ViewOffset
+) -> NDArray[np.bool_]:
+    """Which of these pixels (N) of a view look between the centres of the photo's outermost ones."""
+    y, x = np.divmod(pixel, size.width)
+    y, x = y + disparity * offset.t, x + disparity * offset.s
+    return np.asarray((y >= 0) & (y <= size.height - 1) & (x >= 0) & (x <= size.width - 1))
+
+
+def _composite(front: FloatImage, back: FloatImage, share: FloatImage) -> FloatImage:
+    """Colours (N, 3) of a front that covers these shares (N) of its pixels, over a back; summed in linear light."""
+    light = linear_from_srgb(back) + share[:, None] * (linear_from_srgb(front) - linear_from_srgb(back))
+    return np.asarray(srgb_from_linear(light), np.float32)
 
 
 def _blank_view(size: ImageSize, with_entropy: bool) -> RenderedView:

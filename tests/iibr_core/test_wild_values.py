@@ -228,6 +228,7 @@ FINITE = {
     "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
         image(0.5), known(v), 0.5
     )[:2],
+    "rendering.occlusion.covered_share": lambda v, _: occlusion.covered_share(np.nan_to_num(shares(v))),
     "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),
     "rendering.occlusion.occlusion_mask": lambda v, _: occlusion.occlusion_mask(shares(v)),
     "generation.plan.plan_for_viewing": lambda v, _: [

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.occlusion import LEAST_COVERED, entropy, occlusion_mask
+from iibr_core.rendering.occlusion import LEAST_COVERED, covered_share, entropy, occlusion_mask
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import ViewOffset
 
@@ -51,6 +51,12 @@ def test_weights_agree_with_a_slow_twin(pairs):
 def test_the_front_surface_wins_and_coverage_blends():
     assert visibility_weights(one_ray([(1.0, 0.0), (1.0, 5.0)]))[:2, 0, 0] == pytest.approx([0, 1])
     assert visibility_weights(one_ray([(1.0, 0.0), (0.3, 5.0)]))[:2, 0, 0] == pytest.approx([0.7, 0.3])
+
+
+@given(pairs_of_floats)
+def test_the_covered_share_is_what_the_weights_sum_to(pairs):
+    weights = visibility_weights(one_ray(pairs))
+    assert covered_share(weights)[0, 0] == pytest.approx(min(weights.sum(), 1), abs=1e-5)
 
 
 def test_no_candidates_have_no_weight():
