@@ -13,7 +13,8 @@ import numpy as np
 from iibr_core.depth.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
 from iibr_core.depth.edge_profiles import gradient, height_at, walk
 from iibr_core.depth.ridges import SHARES, structure_at
-from iibr_core.inpainting.disparity_holes import fill_disparity_holes
+from iibr_core.depth.rims import settle_rims
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, InputError, image_size
@@ -53,9 +54,10 @@ def refine(
     """The disparity with its soft edges snapped to the photo's edges; no values between foreground and background.
 
     photo: (H, W, 3), sRGB-encoded. disparity: (H, W), any unit in which larger is closer; what is not finite is filled
-    from its background side. strength: 0 changes nothing, 1 makes steps, between them the slopes are shortened.
+    by what looks like it beside it. strength: 0 changes nothing, 1 makes steps, between them the slopes are shortened.
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
-    gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given.
+    gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
+    in the rims of depth edges (`settle_rims`).
     Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known, Cancelled
     once should_stop is true.
     """
@@ -63,15 +65,23 @@ def refine(
         raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
     if not 0 <= strength <= 1:
         raise InputError(f"refinement strength {strength}: give a number from 0 (off) to 1")
-    values = _fill_unknown(disparity, should_stop)
+    colors = np.ascontiguousarray(photo, np.float32)
+    values = _fill_unknown(colors, disparity, should_stop)
     if strength == 0:
         return values
-    colors = np.ascontiguousarray(photo, np.float32)
+    least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
+    values = _sharpen(colors, values, least_edge, softness, should_stop)
+    return settle_rims(colors, values, least_edge, should_stop) if least_edge > 0 else values
+
+
+def _sharpen(
+    colors: FloatImage, values: FloatImage, least_edge: float, softness: float, should_stop: ShouldStop
+) -> FloatImage:
+    """The map with its soft edges snapped to the photo's; its bits where nothing says that it is blurred."""
     blur = measure_edge_blur(colors, values, should_stop)
     if not blur.sigma_px.any():
         return values
     refined = np.empty_like(values)
-    least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
 
     def band(first: int, last: int) -> None:
         _refine(values, colors, least_edge, blur.sigma_px, blur.cell_px, softness, first, last, refined)
@@ -80,11 +90,11 @@ def refine(
     return refined
 
 
-def _fill_unknown(disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
+def _fill_unknown(colors: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
     known = np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32)
     if known.size and np.isnan(known).all():
         raise InputError("refining depth edges: no disparity is known; give another map")
-    return fill_disparity_holes(known, should_stop) if np.isnan(known).any() else known
+    return fill_disparity_by_color(colors, known, should_stop) if np.isnan(known).any() else known
 
 
 @kernel

@@ -23,7 +23,8 @@ from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo, upright
 from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.inpainting.disparity_holes import fill_disparity_holes, say_filled
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
+from iibr_core.inpainting.disparity_holes import say_filled
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import (
     Disparity,
@@ -129,7 +130,7 @@ class _DepthSearch:
         raise_if_stopped(self.should_stop)
 
     def of_file(self, path: Path) -> _FoundDepth:
-        disparity = read_disparity(path, self.photo.size, self.choice.file_scale)
+        disparity = read_disparity(path, self.photo.size, self.choice.file_scale, self.photo.pixels)
         disparity = replace(disparity, notes=disparity.notes + self._unused_maps(path))
         return _FoundDepth(self.photo, DepthOrigin("file", disparity.source, file=str(path)), disparity)
 
@@ -188,7 +189,7 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, sho
             raise InputError("it knows no depth anywhere")
         if unknown > 0:
             notes += (say_filled("its depth", float(unknown)),)
-        values = fill_disparity_holes(values, should_stop)
+        values = fill_disparity_by_color(photo.pixels, values, should_stop)
     if choice.refine > 0:
         values = refine(photo.pixels, values, choice.refine, should_stop)
     return PhotoWithDepth(photo, Disparity(values, origin.words, notes), origin)

@@ -48,10 +48,8 @@ def fill_disparity_holes(values: FloatImage, should_stop: ShouldStop = never) ->
 def say_filled(name: str, unknown: float) -> str:
     """A sentence on a map of which this share, above 0, was filled."""
     if unknown > 0.9:
-        return (
-            f"Only {100 * (1 - unknown):.2g} % of {name} is known; what is unknown was filled from the background side."
-        )
-    return f"{100 * unknown:.2g} % of {name} is unknown and was filled from the background side."
+        return f"Only {100 * (1 - unknown):.2g} % of {name} is known; what is unknown was filled from around it."
+    return f"{100 * unknown:.2g} % of {name} is unknown and was filled from around it."
 
 
 @kernel

@@ -317,15 +317,6 @@ def _is_within_frame(
     return np.asarray((y >= 0) & (y <= size.height - 1) & (x >= 0) & (x <= size.width - 1))
 
 
-def _is_within_frame(
-    size: ImageSize, pixel: NDArray[np.int64], disparity: FloatImage, offset: ViewOffset
-) -> NDArray[np.bool_]:
-    """Which of these pixels (N) of a view look between the centres of the photo's outermost ones."""
-    y, x = np.divmod(pixel, size.width)
-    y, x = y + disparity * offset.t, x + disparity * offset.s
-    return np.asarray((y >= 0) & (y <= size.height - 1) & (x >= 0) & (x <= size.width - 1))
-
-
 def _composite(front: FloatImage, back: FloatImage, share: FloatImage) -> FloatImage:
     """Colours (N, 3) of a front that covers these shares (N) of its pixels, over a back; summed in linear light."""
     light = linear_from_srgb(back) + share[:, None] * (linear_from_srgb(front) - linear_from_srgb(back))

@@ -16,7 +16,7 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import edge_blur, pictorial_cues, refine, scaling, search
+from iibr_core.depth import edge_blur, pictorial_cues, refine, rims, scaling, search
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp, parse_packet
@@ -26,7 +26,7 @@ from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
 from iibr_core.generation import cost_model, plan, relief
 from iibr_core.generation import light_field as generating
-from iibr_core.inpainting import disparity_holes
+from iibr_core.inpainting import disparity_by_color, disparity_holes
 from iibr_core.rendering import (
     ambiguous_rays,
     candidates,
@@ -65,6 +65,12 @@ def depths(value):
 def known(value):
     """The same for those who take NaN as "nothing here" and no infinity."""
     return np.where(np.isfinite(depths(value)), depths(value), np.float32(np.nan))
+
+
+def mixed_between_surfaces():
+    """Two surfaces, and a column between them that is of neither."""
+    column = np.repeat(np.float32([0.0, 0.9, 2.0]), [6, 1, SIZE[1] - 7])
+    return np.tile(column, (SIZE[0], 1))
 
 
 @cache
@@ -186,6 +192,10 @@ FINITE = {
     "depth.embedded.apple.heic_estimate": lambda v, _: apple.heic_estimate(
         np.ones(SIZE, np.float32), {"d_min": v, "d_max": 2.0}
     ),
+    "inpainting.disparity_by_color.fill_disparity_by_color": lambda v, _: [
+        disparity_by_color.fill_disparity_by_color(scene()[0].pixels, known(v)),
+        disparity_by_color.fill_disparity_by_color(image(v), known(np.nan)),
+    ],
     "inpainting.disparity_holes.fill_disparity_holes": lambda v, _: disparity_holes.fill_disparity_holes(known(v)),
     "inpainting.disparity_holes.say_filled": lambda v, _: disparity_holes.say_filled("map", v) and None,
     "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
@@ -194,6 +204,10 @@ FINITE = {
     ),
     "depth.edge_blur.extent": lambda v, _: edge_blur.extent(np.nan_to_num(depths(v))),
     "depth.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(image(0.5), np.nan_to_num(depths(v))),
+    "depth.rims.settle_rims": lambda v, _: [
+        rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5),
+        rims.settle_rims(image(v), mixed_between_surfaces(), 0.5),
+    ],
     "depth.refine.refine": lambda v, _: [
         refine.refine(image(0.5), depths(v)),
         refine.refine(image(0.5), depths(1.0), strength=v),

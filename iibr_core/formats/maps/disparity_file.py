@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes, say_filled
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
 
@@ -29,11 +30,12 @@ MOSTLY_UNKNOWN = 0.9
 SCALED_ROWS = 64
 
 
-def read_disparity(path: Path, size: ImageSize, scale: float = 1.0) -> Disparity:
+def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: FloatImage | None = None) -> Disparity:
     """Read a PFM, EXR, NPY or PNG map for a photo of (height, width); `scale` multiplies its values.
 
-    Unknown values (NaN, infinite, 0 in 8- and 16-bit pictures, alpha 0, absurdly large) are filled from their
-    background side. A map of another size is resampled surface by surface, its values scaled by the ratio of widths.
+    Unknown values (NaN, infinite, 0 in 8- and 16-bit pictures, alpha 0, absurdly large) are filled by what looks like
+    them in the photo (height, width, 3), sRGB-encoded, or from their background side where that is not given. A map of
+    another size is resampled surface by surface, its values scaled by the ratio of widths.
     Raises InputError if the file is bad, has another aspect ratio than the photo, or knows no value at all.
     """
     path = Path(path)
@@ -59,7 +61,7 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0) -> Disparity
         unknown = max(unknown, np.isnan(values).mean())
     if unknown > 0:
         notes += (say_filled(path.name, float(unknown)),)
-    return Disparity(_fill_unknown(path, values), path.name, notes + limit_notes)
+    return Disparity(_fill_unknown(path, values, photo), path.name, notes + limit_notes)
 
 
 def _require_aspect(path: Path, map_size: ImageSize, size: ImageSize) -> None:
@@ -117,8 +119,8 @@ def _without_absurd(
     return np.asarray(known, np.float32), notes
 
 
-def _fill_unknown(path: Path, values: FloatImage) -> FloatImage:
+def _fill_unknown(path: Path, values: FloatImage, photo: FloatImage | None) -> FloatImage:
     try:
-        return fill_disparity_holes(values)
+        return fill_disparity_holes(values) if photo is None else fill_disparity_by_color(photo, values)
     except ValueError as error:
         raise InputError(f"{path}: too few known values survive at the photo's size; give a denser map") from error

@@ -1,0 +1,176 @@
+"""Rims: in the few pixels beside a depth edge maps err, and the photo's colours tell which side a pixel belongs to.
+
+What is left of the front on the back's disparity stays behind as a ghost when the view moves, and disparities between
+both fly about as crumbs. Where colours do not tell the sides apart nothing changes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color, vote_weight
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import FloatImage, image_size
+
+RIM_PX = 2
+"""Pixels so close to a depth edge may belong to its other side."""
+SIDES_PX = 3
+"""What lies within so many pixels of a rim is one of its two sides."""
+REACH_PX = 4
+"""Pixels within so many, each way, say to which."""
+SPREAD_PX = 2.0
+"""Standard deviation of their weights by distance."""
+ALIKE = 0.05
+"""Standard deviation of their weights by colour (sRGB-encoded, all channels together)."""
+UNLIKE_WEIGHT = 1e-3
+RIM_WEIGHT = 0.1
+"""Of pixels that are of a rim themselves."""
+MAJORITY = 3.0
+"""A pixel changes sides where the other side has so many times the votes of its own."""
+PLATEAU_SHARE = 0.15
+"""A pixel lies between two surfaces if each changes by at most this share of their distance ..."""
+PLATEAU_PX = 2
+"""... over so many pixels."""
+MIXED_NEAR_PX = 8
+"""Rims are unsure within so many pixels of what lies between two surfaces."""
+MIXED = (0.1, 0.8)
+"""How far up from the lower to the higher of both it lies; above that, a round thing turns away from the view."""
+MIXED_EDGES = 5.0
+"""Times the least edge: what lies between nearer surfaces may be a slope."""
+LEAST_MIXED = 0.025
+"""A map of whose rims a smaller share is mixed is exact: nothing is changed."""
+MOST_FELLOWS = 4
+"""A pixel with more neighbours on its own disparity than this lies on a surface."""
+
+
+def settle_rims(
+    photo: FloatImage, values: FloatImage, least_edge: float, should_stop: ShouldStop = never
+) -> FloatImage:
+    """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
+
+    least_edge: the step that counts as a depth edge, more than 0. Lone disparities between two surfaces, which maps
+    have that were measured or resampled, are taken for unknown and filled anew; then pixels of rims change sides where
+    the colours say so. A map without them is exact, and comes back as it is. Raises Cancelled once should_stop is true.
+    """
+    colors, size = np.ascontiguousarray(photo, np.float32), image_size(values)
+    between, rim = np.zeros(values.shape, np.bool_), np.zeros(values.shape, np.bool_)
+    in_bands(lambda first, last: _find_between(values, least_edge, first, last, between), size, should_stop)
+    in_bands(lambda first, last: _find_rims(values, least_edge, first, last, rim), size, should_stop)
+    if np.count_nonzero(between) <= LEAST_MIXED * np.count_nonzero(rim):
+        return values
+    whole = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
+    settled, unsure = whole.copy(), np.zeros(values.shape, np.bool_)
+
+    def band(first: int, last: int) -> None:
+        _mark_around(between, MIXED_NEAR_PX, first, last, unsure)
+        _choose_sides(colors, whole, rim, unsure, least_edge, first, last, settled)
+
+    in_bands(band, size, should_stop)
+    return settled
+
+
+@kernel
+def _is_between(values, y, x, right, down, least_edge):
+    """Whether, along this direction, a lower plateau ends just before a pixel and a higher one begins just after it."""
+    here = values[y, x]
+    # One of the sides may begin a pixel later: rims are up to two pixels wide.
+    for after in range(1, 3):
+        for before in range(1, 4 - after):
+            a, b = values[y + after * down, x + after * right], values[y - before * down, x - before * right]
+            high, low = max(a, b), min(a, b)
+            if (
+                high - low > MIXED_EDGES * least_edge
+                and high - here > least_edge
+                and here - low > least_edge
+                and MIXED[0] * (high - low) <= here - low <= MIXED[1] * (high - low)
+            ):
+                flat, is_flat = PLATEAU_SHARE * (high - low), True
+                for beyond in range(1, PLATEAU_PX + 1):
+                    far_a = values[y + (after + beyond) * down, x + (after + beyond) * right]
+                    far_b = values[y - (before + beyond) * down, x - (before + beyond) * right]
+                    is_flat &= abs(far_a - a) <= flat and abs(far_b - b) <= flat
+                if is_flat:
+                    return True
+    return False
+
+
+@kernel
+def _find_between(values, least_edge, first, last, between):
+    """Rows [first, last): pixels of no surface, between two."""
+    height, width = values.shape
+    margin = 2 + PLATEAU_PX
+    for y in range(max(first, margin), min(last, height - margin)):
+        for x in range(margin, width - margin):
+            # Neighbours above and below it, and few on its own disparity: most pixels end here.
+            fellows, higher, lower = -1, False, False
+            for v in range(y - 1, y + 2):
+                for u in range(x - 1, x + 2):
+                    step = values[v, u] - values[y, x]
+                    higher, lower = higher or step > least_edge, lower or step < -least_edge
+                    fellows += abs(step) <= least_edge
+            if higher and lower and fellows <= MOST_FELLOWS:
+                between[y, x] = (
+                    _is_between(values, y, x, 1, 0, least_edge)
+                    or _is_between(values, y, x, 0, 1, least_edge)
+                    or _is_between(values, y, x, 1, 1, least_edge)
+                    or _is_between(values, y, x, 1, -1, least_edge)
+                )
+
+
+@kernel
+def _find_rims(values, least_edge, first, last, rim):
+    """Rows [first, last): pixels within RIM_PX of either side of a step."""
+    height, width = values.shape
+    for y in range(max(first - RIM_PX, 0), min(last + RIM_PX, height)):
+        for x in range(width):
+            right, below = min(x + 1, width - 1), min(y + 1, height - 1)
+            for v, u in ((y, right), (below, x)):
+                if abs(values[v, u] - values[y, x]) > least_edge:
+                    rim[max(y - RIM_PX + 1, first) : min(v + RIM_PX, last), max(x - RIM_PX + 1, 0) : u + RIM_PX] = True
+
+
+@kernel
+def _mark_around(marked, around_px, first, last, found):
+    """Rows [first, last): pixels within around_px of a marked one, each way."""
+    height, width = marked.shape
+    for y in range(max(first - around_px, 0), min(last + around_px, height)):
+        for x in range(width):
+            if marked[y, x]:
+                rows = slice(max(y - around_px, first), min(y + around_px + 1, last))
+                found[rows, max(x - around_px, 0) : x + around_px + 1] = True
+
+
+@kernel
+def _choose_sides(colors, values, rim, unsure, least_edge, first, last, settled):
+    """Rows [first, last): pixels of unsure rims that look like the other side get its disparity."""
+    height, width = values.shape
+    for y in range(first, last):
+        for x in range(width):
+            if not (rim[y, x] and unsure[y, x]):
+                continue
+            low, high = np.inf, -np.inf
+            for v in range(max(y - SIDES_PX, 0), min(y + SIDES_PX + 1, height)):
+                for u in range(max(x - SIDES_PX, 0), min(x + SIDES_PX + 1, width)):
+                    low, high = min(low, np.float64(values[v, u])), max(high, np.float64(values[v, u]))
+            if not high - low > least_edge:
+                continue
+            # Two sides, told apart at the middle; each gets the votes of those of its pixels that look like this one.
+            middle = low + 0.5 * (high - low)
+            front = front_sum = back = back_sum = 0.0
+            for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)):
+                for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
+                    if v == y and u == x:
+                        continue
+                    w = vote_weight(colors, y, x, v, u, ALIKE, SPREAD_PX, UNLIKE_WEIGHT)
+                    w *= RIM_WEIGHT if rim[v, u] else 1.0
+                    d = np.float64(values[v, u])
+                    if d > middle:
+                        front, front_sum = front + w, front_sum + w * (d - low)
+                    else:
+                        back, back_sum = back + w, back_sum + w * (d - low)
+            if values[y, x] > middle:
+                if back > MAJORITY * front:
+                    settled[y, x] = low + back_sum / back
+            elif front > MAJORITY * back:
+                settled[y, x] = low + front_sum / front

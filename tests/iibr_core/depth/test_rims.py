@@ -1,0 +1,83 @@
+"""Rims of depth edges: every pixel on one of the two sides, by its colour."""
+
+import numpy as np
+import pytest
+
+from iibr_core.depth.rims import settle_rims
+from iibr_core.runtime import tiling
+from iibr_core.runtime.tiling import Cancelled
+from tests.iibr_core.scenes import smooth_texture, square_before_wall
+
+RED, BLUE = np.float32([0.8, 0.1, 0.1]), np.float32([0.1, 0.2, 0.8])
+NEAR, FAR, EDGE = 9.0, 2.0, 0.3
+
+
+def disc(size=64):
+    """A red disc before a blue wall, slightly noisy, and its disparity."""
+    y, x = np.mgrid[:size, :size]
+    inside = (x - size / 2) ** 2 + (y - size / 2) ** 2 < (size / 4) ** 2
+    photo = np.where(inside[..., None], RED, BLUE) + np.random.default_rng(5).normal(0, 0.01, (size, size, 3))
+    return photo.astype(np.float32), np.where(inside, NEAR, FAR).astype(np.float32)
+
+
+def resampled(truth):
+    """The map, half a pixel beside the photo: in between at its edges, as resampled maps are."""
+    return 0.5 * (truth + np.roll(truth, 1, axis=1))
+
+
+def test_what_lies_between_two_surfaces_goes_to_the_one_it_looks_like():
+    photo, truth = disc()
+    given = resampled(truth)
+    settled = settle_rims(photo, given, EDGE)
+    assert (np.abs(given - truth) > 1).sum() > 50
+    assert (np.abs(settled - truth) > 1).sum() == 0
+
+
+def test_rims_that_look_like_the_other_side_change_it():
+    photo, truth = disc()
+    given = resampled(np.roll(truth, 1, axis=0))
+    wrong, left = (np.abs(values - truth) > 1 for values in (given, settle_rims(photo, given, EDGE)))
+    assert left.sum() < 0.1 * wrong.sum()
+
+
+def test_where_colours_do_not_tell_the_sides_apart_nothing_changes_sides():
+    _, truth = disc()
+    given = resampled(truth)
+    settled = settle_rims(np.full((*truth.shape, 3), 0.5, np.float32), given, EDGE)
+    is_surface = np.isin(given, [NEAR, FAR])
+    np.testing.assert_array_equal(settled[is_surface], given[is_surface])
+
+
+def test_exact_maps_stay_as_they_are():
+    photo, truth = disc()
+    moved = np.roll(truth, 1, axis=1)
+    np.testing.assert_array_equal(settle_rims(photo, moved, EDGE), moved)
+    scene, disparity = square_before_wall()
+    np.testing.assert_array_equal(settle_rims(scene.pixels, disparity.values, EDGE), disparity.values)
+
+
+def test_a_turned_scene_is_settled_alike():
+    photo, truth = disc()
+    given = resampled(truth)
+    upright = settle_rims(photo, given, EDGE)
+    turned = settle_rims(photo.swapaxes(0, 1), np.ascontiguousarray(given.T), EDGE).T
+    np.testing.assert_allclose(turned, upright, atol=1e-4)
+
+
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
+    photo, truth = disc()
+    expected = settle_rims(photo, resampled(truth), EDGE)
+    monkeypatch.setattr(tiling, "THREADS", 7)
+    np.testing.assert_array_equal(settle_rims(photo, resampled(truth), EDGE), expected)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (3, 2), (8, 8)])
+def test_tiny_maps(size):
+    values = np.arange(size[0] * size[1], dtype=np.float32).reshape(size)
+    assert np.isfinite(settle_rims(smooth_texture(*size), values, EDGE)).all()
+
+
+def test_a_stop_is_heard():
+    photo, truth = disc()
+    with pytest.raises(Cancelled):
+        settle_rims(photo, resampled(truth), EDGE, lambda: True)
