@@ -54,7 +54,7 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: Float
     unknown = np.isnan(values).mean()
     if unknown > MOSTLY_UNKNOWN:
         # Scattered values would get lost among what is unknown.
-        values = _fill_unknown(path, values)
+        values = _fill_unknown(path, values, None)
     if values.shape != size:
         notes += (f"{path.name} was resampled from {stored.shape[1]}x{stored.shape[0]} to {size}.",)
         values = resample_surfaces(values, size)
