@@ -20,7 +20,7 @@ from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.rendering.ambiguous_rays import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import RenderedView, ShownBefore, ViewSynthesis, rays_of_photo
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import (
@@ -90,11 +90,14 @@ def _generate_views(
         inner = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
         # What is left to be done for views that are there, or in the ray set.
         unfinished: dict[ViewOffset, Callable[[], ViewUpdate]] = {}
+        images = len(rays)
         for offset, view in outer_views:
             inner.remove(offset)
             if transformer is not None:
-                known = len(rays) - 1 if view.has_filled_rays else None
-                unfinished[offset] = partial(views.make, offset, known)
+                # What joined the set is kept there.
+                before = view.colors if len(rays) == images else rays.arrays[1][images]
+                unfinished[offset] = partial(views.make, offset, ShownBefore(before, images))
+            images = len(rays)
             if transformer is None or draft_bytes is not None:
                 yield views.update(offset, view, is_final=transformer is None)
         room = draft_bytes or 0 if quality == "balanced" else 0

@@ -13,7 +13,7 @@ import numpy as np
 from iibr_core.color import stored_from_encoded
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis
+from iibr_core.rendering.view_synthesis import RenderedView, ShownBefore, ViewSynthesis
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
 
@@ -42,7 +42,7 @@ class StoredViews:
         self._synthesis, self._rays, self._grid = synthesis, rays, grid
         self._is_hdr, self._should_stop = is_hdr, should_stop
 
-    def make(self, offset: ViewOffset, known: int | None = None) -> ViewUpdate:
+    def make(self, offset: ViewOffset, known: ShownBefore | None = None) -> ViewUpdate:
         """A final view. known: see `ViewSynthesis.render_alone`."""
         return self.update(offset, self._synthesis.render_alone(self._rays, offset, known))
 

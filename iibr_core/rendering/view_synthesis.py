@@ -101,6 +101,17 @@ class DecidedRays:
     inpainted: NDArray[np.bool_]
 
 
+@dataclass(frozen=True, eq=False)
+class ShownBefore:
+    """A view as it was when the ray set was smaller.
+
+    colors: (H, W, 3), wrong only where later images show. images: how many there were, its own not counted.
+    """
+
+    colors: FloatImage
+    images: int
+
+
 def rays_of_photo(
     colors: FloatImage, disparity: FloatImage, farthest_views: float, more: int, should_stop: ShouldStop = never
 ) -> RaySet:
@@ -159,11 +170,11 @@ class ViewSynthesis:
         """
         return self._view(rays, offset, tiling.THREADS, None)
 
-    def render_alone(self, rays: RaySet, offset: ViewOffset, known: int | None = None) -> RenderedView:
+    def render_alone(self, rays: RaySet, offset: ViewOffset, known: ShownBefore | None = None) -> RenderedView:
         """The same view, its row bands one after the other in the calling thread: the way for many views.
 
-        known: the image of the ray set that was this view before it and the images after it joined. Only what those
-        change is looked up anew; the view is the same.
+        known: what this view showed before others joined the ray set. Only what those change is looked up anew; the
+        view is the same.
         """
         return self._view(rays, offset, 1, known)
 
@@ -205,7 +216,7 @@ class ViewSynthesis:
     def _should_stop(self) -> bool:
         return self._is_over or self._asked_to_stop()
 
-    def _view(self, rays: RaySet, offset: ViewOffset, threads: int, known: int | None) -> RenderedView:
+    def _view(self, rays: RaySet, offset: ViewOffset, threads: int, known: ShownBefore | None) -> RenderedView:
         def band(first: int, last: int) -> DecidedRays | None:
             undecided = self._render_rows(rays, offset, (first, last), view, covered, known)
             return self.decide(rays, undecided) if undecided is not None else None
@@ -259,7 +270,7 @@ class ViewSynthesis:
         rows: tuple[int, int],
         view: RenderedView,
         covered: FloatImage,
-        known: int | None = None,
+        known: ShownBefore | None = None,
     ) -> UndecidedRays | None:
         """Write rows [first, last) of the view in closed form, holes not filled yet, and of how much of each ray is
         covered; the rays that are the transformer's to decide, if there is one.
@@ -275,7 +286,7 @@ class ViewSynthesis:
         inner = slice(above, above + rows[1] - rows[0])
         raise_if_stopped(self._should_stop)
         wanted = np.zeros(occluded.shape, np.bool_)
-        wanted[inner] = True if known is None else _changed_pixels(rays, offset, rows, known)
+        wanted[inner] = True if known is None else _changed_pixels(rays, offset, rows, known.images)
         colors, disparity, source = resample_colors(rays, candidates, weights, wanted)
         raise_if_stopped(self._should_stop)
         undecided = None
@@ -288,8 +299,7 @@ class ViewSynthesis:
         shown = slice(*rows)
         view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
         if known is not None:
-            before = rays.arrays[1][known, shown]
-            np.copyto(view.colors[shown], before, where=~wanted[inner][..., None])
+            np.copyto(view.colors[shown], known.colors[shown], where=~wanted[inner][..., None])
         view.occluded[shown], covered[shown] = occluded[inner], share[inner]
         view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
         if view.entropy is not None:

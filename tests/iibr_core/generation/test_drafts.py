@@ -1,12 +1,10 @@
 """Views that come twice: as drafts in closed form, then with the transformer's say on their undecided rays."""
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from iibr_core.generation import light_field
 from iibr_core.generation.cost_model import DRAFT_BYTES, UNDECIDED_BYTES
 from iibr_core.generation.light_field import generate, ray_set, transformer_for
 from iibr_core.generation.stored_views import StoredViews
@@ -207,20 +205,17 @@ def test_what_leaves_nothing_to_decide_comes_once(quality):
         assert all(update.is_final for update in updates)
 
 
-def test_an_outer_view_that_discloses_nothing_is_finished_too():
-    """It joins no ray set, so it is rendered whole."""
-    photo, disparity = square_before_wall(30, 40, 3.0)
-    plan = literal_plan(photo, disparity, 3)
-    at_once = by_index(list(generate(photo, disparity, plan)))
-    render_outer_views = light_field.render_outer_views
-
-    def as_if_nothing_were(*given):
-        return ((at, replace(view, occluded=np.zeros_like(view.occluded))) for at, view in render_outer_views(*given))
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(light_field, "render_outer_views", as_if_nothing_were)
-        final = by_index(list(generate(photo, disparity, plan, draft_bytes=PLENTY)))
-    assert all(same(view, at_once[index]) for index, view in final.items())
+def test_outer_views_that_disclose_nothing_are_finished_too():
+    """They join no ray set; what they showed is kept for them all the same."""
+    photo, disparity = blurred_square()
+    plan = literal_plan(photo, disparity, 5)
+    rays, outer = ray_set(photo, disparity, plan)
+    without = {plan.grid.centre} ^ {(2 + int(at.t), 2 + int(at.s)) for at, view in outer if not view.occluded.any()}
+    assert len(without) > 1
+    final = by_index(made(photo, disparity, draft_bytes=PLENTY))
+    with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
+        views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr, tiling.never)
+        assert all(same(final[index], views.make(plan.grid.offset(*index))) for index in without - {plan.grid.centre})
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.9, 0.99])
