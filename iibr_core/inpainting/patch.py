@@ -20,6 +20,8 @@ from iibr_core.types import FloatImage, ViewOffset, image_size
 
 RADIUS_PX = 3
 """Patches are 7 x 7 pixels."""
+SHIFTS = (1, 2, 3)
+"""The greatest of 2, then of 4, then of 7 pixels in a row."""
 SEARCHES = 3
 """So often every pixel asks its neighbours for a better patch."""
 SEARCH_PX = 32
@@ -86,9 +88,9 @@ def _targets(
     disparity: FloatImage, hole: NDArray[np.bool_], in_front: np.float32, should_stop: ShouldStop
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Pixels whose patches are looked for, holes and what is known of their surfaces beside them: flat indices (N,),
-    ascending, and their numbers (H, W), -1 for others.
+    ascending, and their numbers (H, W), -1 for others. Cracks too thin to show texture are left out.
     """
-    wanted, pixels = hole.copy(), np.flatnonzero(hole)
+    wanted, pixels = np.zeros_like(hole), np.flatnonzero(hole)
     parts = [pixels[first : first + MOST_PIECE_PIXELS] for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
     in_pieces(lambda part: _add_surroundings(disparity, hole, in_front, part, wanted), parts, should_stop)
     targets = np.flatnonzero(wanted)
@@ -99,41 +101,34 @@ def _targets(
 
 @kernel
 def _add_surroundings(disparity, hole, in_front, pixels, wanted):
+    """Of hole pixels whose neighbours are holes, or off the frame."""
     height, width = hole.shape
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        # Within a hole there is nothing to add.
-        is_inside = 0 < y < height - 1 and 0 < x < width - 1
-        if is_inside and hole[y - 1, x] and hole[y + 1, x] and hole[y, x - 1] and hole[y, x + 1]:
+        is_wide = hole[max(y - 1, 0), x] and hole[min(y + 1, height - 1), x]
+        if not (is_wide and hole[y, max(x - 1, 0)] and hole[y, min(x + 1, width - 1)]):
             continue
         for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
             for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
-                wanted[v, u] |= abs(disparity[v, u] - disparity[y, x]) <= in_front
+                wanted[v, u] |= hole[v, u] or abs(disparity[v, u] - disparity[y, x]) <= in_front
 
 
-@kernel
-def _nearest_of_patches(disparity, hole, first, last, nearest):
+def _nearest_of_patches(
+    disparity: FloatImage, hole: NDArray[np.bool_], first: int, last: int, nearest: FloatImage
+) -> None:
     """Of rows [first, last): the nearest disparity in the patch around each pixel, inf where it is not known whole."""
     height, width = hole.shape
-    side = 2 * RADIUS_PX + 1
-    # Row by row first; the last `side` rows are kept.
-    in_rows = np.full((side, width), np.inf, np.float32)
-    for v in range(max(first - RADIUS_PX, 0), min(last + RADIUS_PX, height)):
-        for x in range(RADIUS_PX, width - RADIUS_PX):
-            most = np.float32(-np.inf)
-            for u in range(x - RADIUS_PX, x + RADIUS_PX + 1):
-                most = max(most, np.float32(np.inf) if hole[v, u] else disparity[v, u])
-            in_rows[v % side, x] = most
-        y = v - RADIUS_PX
-        if first <= y and y >= RADIUS_PX:
-            for x in range(width):
-                most = in_rows[0, x]
-                for k in range(1, side):
-                    most = max(most, in_rows[k, x])
-                nearest[y, x] = most
-    for y in range(first, last):
-        if not RADIUS_PX <= y < height - RADIUS_PX:
-            nearest[y] = np.inf
+    nearest[first:last] = np.inf
+    top, bottom = max(first, RADIUS_PX), min(last, height - RADIUS_PX)
+    if top >= bottom or width <= 2 * RADIUS_PX:
+        return
+    rows = slice(top - RADIUS_PX, bottom + RADIUS_PX)
+    most = np.where(hole[rows], np.float32(np.inf), disparity[rows])
+    for shift in SHIFTS:
+        most = np.maximum(most[:, :-shift], most[:, shift:])
+    for shift in SHIFTS:
+        most = np.maximum(most[:-shift], most[shift:])
+    nearest[top:bottom, RADIUS_PX : width - RADIUS_PX] = most
 
 
 @kernel
@@ -255,7 +250,7 @@ def _temper(hole, number, targets, change, first, last, tempered):
         count = 0
         for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
             for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
-                if hole[v, u]:
+                if hole[v, u] and number[v, u] >= 0:
                     count += 1
                     for c in range(3):
                         coarse[c] += change[number[v, u], c]
