@@ -17,7 +17,8 @@ from viewer.ui.style import Look, apply_style, load_fonts
 
 VERTEX_BYTES = 20
 INDEX_BYTES = 2
-DOUBLE_CLICK_S = 0.3
+DOUBLE_CLICK_S, SINGLE_CLICK_AFTER_S = 0.3, 0.2
+"""ImGui wants a single click to count as one only after a double click can come no more."""
 
 
 class UiHost:
@@ -43,14 +44,15 @@ class UiHost:
             apply_style(look)
             self._look = look
         imgui.backends.opengl3_new_frame()
+        io = imgui.get_io()
         if self._has_window:
             imgui.backends.glfw_new_frame()
         else:
-            io = imgui.get_io()
             io.display_size = imgui.ImVec2(layout.window.width, layout.window.height)
             io.display_framebuffer_scale = imgui.ImVec2(layout.pixel_ratio, layout.pixel_ratio)
             io.delta_time = 1 / 60
-        imgui.get_io().mouse_double_click_time = DOUBLE_CLICK_S + behind_s
+        io.mouse_double_click_time = DOUBLE_CLICK_S + behind_s
+        io.mouse_single_click_delay = io.mouse_double_click_time + SINGLE_CLICK_AFTER_S
         imgui.new_frame()
 
     def end(self) -> bytes:

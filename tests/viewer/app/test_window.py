@@ -10,6 +10,7 @@ from pathlib import Path
 import glfw
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
@@ -81,6 +82,13 @@ def test_a_double_click_resets(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.optics.eye == ViewOffset(0, 0.5))
     viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", "--repeat", 2, "--delay", 40, 1)
     viewer.until(lambda app: app.state.optics == Optics())
+
+
+def test_a_double_click_counts_where_frames_are_slow(viewer: Driver) -> None:
+    """Of two clicks the second is heard of only after the frame that the first one asked for."""
+    viewer.app._took_s.extend(3 * [1.5])
+    viewer.app.step()
+    assert imgui.get_io().mouse_double_click_time > 4.5
 
 
 def test_the_wheel_changes_the_focus_and_keys_the_viewpoint(viewer: Driver) -> None:
