@@ -28,8 +28,6 @@ OPEN_SHARE = 0.42
 """Of the rays where surfaces meet, so many are left open by the closed form."""
 SOFT_GROWTH = 1.1
 """The power of the parallax by which rays near soft edges become ambiguous."""
-FOUND_AGAIN = 0.5
-"""Of the work of making a view, so much is finding its candidates again."""
 MOST_PARALLAX_PX = 1e6
 
 RAY_BYTES, STATISTICS_BYTES = 21, 12
@@ -181,10 +179,10 @@ def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstim
 def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> Workload:
     """What there is to do for all views of a grid in one quality."""
     pixels, views = statistics.step.size, grid.rows * grid.columns - 1
-    # The farthest views complete the ray set in closed form; the transformer's rays of them are looked for anew.
-    again = FOUND_AGAIN * _inpainted_views(statistics, grid) if quality != "fast" else 0
-    made = pixels * (views + again)
-    meeting = pixels * (_sum_over_views(statistics.meeting_share, grid) + again * statistics.meeting_share(1.0))
+    # The farthest views are made twice: to inpaint the ray set in closed form, then with the transformer.
+    twice = _inpainted_views(statistics, grid) if quality != "fast" else 0
+    made = pixels * (views + twice)
+    meeting = pixels * (_sum_over_views(statistics.meeting_share, grid) + twice * statistics.meeting_share(1.0))
     framed = made if statistics.frame_px > STILL_PX else 0
     asked = pixels * _sum_over_views(statistics.ambiguous_share, grid) if quality != "fast" else 0
     sharp, soft = (0, asked) if statistics.is_soft else (asked, 0)

@@ -17,7 +17,7 @@ LEAST_COVERED = 0.2
 """A ray that its one candidate covers less than this counts as occluded: slivers of surface would look torn."""
 MOSTLY_COVERED = 0.5
 """A ray covered more than this is not occluded, however many surfaces share it."""
-WHOLE = 0.8
+WHOLE = 0.6
 """Where less of a ray is covered, what lies behind shows, too. Above, it is a seam rather than a rim."""
 
 

@@ -31,9 +31,9 @@ MAPS = {
     "degraded": lambda d, rng: degrade(d, rng, RADIUS),
 }
 LEAST_GAIN = {
-    ("exact", "all"): 0.4,
+    ("exact", "all"): 0.3,
     ("exact", "covered in part"): 0.1,
-    ("exact", "beside what is inpainted"): 0.35,
+    ("exact", "beside what is inpainted"): 0.25,
     ("exact", "between surfaces"): 0.5,
     ("blurred", "all"): 1.5,
     ("blurred", "covered in part"): 1.1,
