@@ -21,7 +21,7 @@ from viewer.app.image_export import (
     settings_of,
 )
 from viewer.app.picture_saver import PictureSaver
-from viewer.model.actions import Notify
+from viewer.model.actions import EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import Notice, SaveTask, Source
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
@@ -120,7 +120,8 @@ def test_a_picture_starts_over_when_more_of_the_same_scene_is_there(tmp_path: Pa
         while saver.is_drawing:
             saver.advance(0.0)
         assert woken.wait(60)
-        assert saver.advance(0.0) == [Notify(Notice(f"Saved {out}")), SavingChanged(None)]
+        saved = Notify(Notice(f"Saved {out}")), EditsSaved(viewer.state.depth.edits)
+        assert saver.advance(0.0) == [*saved, SavingChanged(None)]
         saver.close()
     np.testing.assert_array_equal(oiio.ImageBuf(str(out)).get_pixels(oiio.UINT8), expected)
 
