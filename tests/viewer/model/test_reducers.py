@@ -228,6 +228,9 @@ def test_quitting_asks_where_depth_edits_would_be_lost() -> None:
     assert reduce(reduce(edited, EditsSaved(edits)), Quit()).should_quit
     assert not reduce(reduce(edited, EditsSaved(replace(edits, gamma=2.0))), Quit()).should_quit
     assert reduce(state_with(scene_of()), Quit()).should_quit
+    other = reduce(reduce(edited, EditsSaved(edits)), OpenPath(Source("other.png")))
+    other = reduce(other, SceneOpened(other.generation, scene_of(source=other.source)))
+    assert not reduce(replace(other, depth=DepthSettings(edits=edits)), Quit()).should_quit, "those of another photo"
 
 
 def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerEvent
 from viewer.model.reducers.history import map_optics
@@ -74,6 +75,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         recent=recent,
         depth=depth,
         stroke=None,
+        saved_edits=UNEDITED,
         has_chosen_focus=False,
         has_chosen_aperture=False,
     )
