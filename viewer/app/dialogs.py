@@ -7,7 +7,7 @@ import shutil
 import sys
 from typing import Any
 
-from viewer.model.state.app_state import ChoiceOf
+from viewer.model.state.app_state import ChoiceOf, SavePrompt
 
 UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first it finds."""
@@ -62,3 +62,18 @@ class Dialog:
             return None
         result = self._dialog.result()
         return result if isinstance(result, str) else (result[0] if result else "")
+
+
+class SaveDialog:
+    """An open dialog that asks where a file goes, and before one is replaced. prompt: what asked for it."""
+
+    def __init__(self, prompt: SavePrompt) -> None:
+        from imgui_bundle import portable_file_dialogs as dialogs
+
+        self.prompt = prompt
+        title = "Save the picture" if prompt.what == "picture" else "Save the depth map"
+        self._dialog: Any = dialogs.save_file(title, os.path.abspath(prompt.path), ["All files", "*"])
+
+    def answer(self) -> str | None:
+        """The path chosen, "" where the user chose none; None while it is open."""
+        return str(self._dialog.result()) if self._dialog.ready(0) else None

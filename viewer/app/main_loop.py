@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from iibr_core.types import InputError
+from viewer.app.dialogs import has_dialogs
 from viewer.app.input import (
     Pointer,
     actions_from_drop,
@@ -23,6 +24,7 @@ from viewer.app.input import (
 from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
+from viewer.app.window_slot import WindowSlot
 from viewer.background.comparison_worker import ComparisonWorker
 from viewer.background.jobs import Failed, ProgressReport
 from viewer.background.scene_worker import SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
@@ -102,13 +104,17 @@ class App:
 
         Raises InputError where no window can be opened.
         """
-        self.state = load_preferences(state, kept_in) if kept_in else state
+        self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
-        self.window = Window("iibr", self.state.preferences.window)
+        self._window_slot = WindowSlot(kept_in)
+        preferences = self.state.preferences
+        place = self._window_slot.shift(preferences.window)
+        self.window = Window("iibr", place, preferences.is_maximized)
         try:
             self._gl = create_for_window(self.window.handle)
         except InputError:
             self.window.close()
+            self._window_slot.close()
             raise
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
@@ -195,6 +201,7 @@ class App:
         self.scene_view.release()
         self._gl.release()
         self.window.close()
+        self._window_slot.close()
 
     def do(self, *actions: Action) -> None:
         """Change the state. What follows from it may take a few frames to be seen, see SETTLING_FRAMES."""
@@ -212,12 +219,17 @@ class App:
             actions += self.inspection_view.take(result)
         if self.state.motion.is_running:
             actions.append(Tick(self._stepped_at))
-        place = self.window.place
-        if place is not None and place != self.state.preferences.window:
-            actions.append(PlaceWindow(place))
+        actions += self._place_window()
         if self._worker.is_lost and self.state.stopped != self.state.generation == self._submitted:
             actions.append(WorkerLost())
         return actions
+
+    def _place_window(self) -> list[Action]:
+        """Where the window is, where that is news."""
+        preferences, place = self.state.preferences, self.window.place
+        if self.window.is_hidden or (place is None and preferences.is_maximized):
+            return []
+        return [] if place == preferences.window and not preferences.is_maximized else [PlaceWindow(place)]
 
     def _drain(self) -> list[Action]:
         """The worker's results, as actions; the one place where they arrive."""
@@ -277,6 +289,9 @@ class App:
         if self.state.stopped == self.state.generation != self._stopped:
             self._worker.cancel()
             self._stopped = self.state.stopped
+        if self.scene_view.generation == self.state.generation < self._submitted:
+            self._worker.cancel()  # another file was being read, and will not be opened: what is here is whole
+            self._submitted, self._depth_settings = self.state.generation, depth_settings_for_worker(self.state)
         if self.state.generation == self._submitted or self.state.source is None:
             return
         scene = self.state.scene

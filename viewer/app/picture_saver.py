@@ -62,10 +62,10 @@ class PictureSaver:
         except AlreadyThereError:
             return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True))]
         except InputError as error:
-            return [Notify(Notice(str(error), is_error=True))]
+            return [refusal(task, state, error)]
         settings = settings_of(state, task.size_px)
         self._requests.append(PictureRequest(path, settings, _views_of(self._scene_view)))
-        return []
+        return [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
 
     def cancel(self) -> None:
         """Give up the picture that is being drawn. One that is being written is finished."""
@@ -142,6 +142,13 @@ class PictureSaver:
         if self._drawing is not None:
             drawn = min(int(100 * self._drawing.progress), 99) / 100
         return Saving(self._requests[0].path.name, drawn, len(self._requests) - 1)
+
+
+def refusal(task: SaveTask, state: AppState, error: InputError) -> Action:
+    """Why nothing is saved: where it was asked for, whatever was typed there stays; else in a notice."""
+    if isinstance(state.prompt, SavePrompt):
+        return ShowPrompt(SavePrompt(task.path, task.size_px, what=task.what, problem=str(error)))
+    return Notify(Notice(str(error), is_error=True))
 
 
 def _views_of(scene_view: SceneView) -> tuple[int, int]:

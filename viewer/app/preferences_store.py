@@ -124,11 +124,18 @@ def _place(kept: Any) -> tuple[int, int, int, int] | None:
     return (x, y, width, height) if is_possible else None
 
 
+def _yes_or_no(kept: Any) -> bool:
+    if not isinstance(kept, bool):
+        raise ValueError
+    return kept
+
+
 _READERS: dict[str, Callable[[Any], Any]] = {
     "theme": _theme,
     "font_scale": _font_scale,
     "open_sections": _sections,
     "window": _place,
+    "is_maximized": _yes_or_no,
 }
 
 

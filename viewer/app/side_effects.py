@@ -13,9 +13,9 @@ from typing import Any
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import FloatImage, InputError
-from viewer.app.dialogs import Dialog, has_dialogs
+from viewer.app.dialogs import Dialog, SaveDialog, has_dialogs
 from viewer.app.image_export import export_map
-from viewer.app.picture_saver import PictureSaver
+from viewer.app.picture_saver import PictureSaver, refusal
 from viewer.app.save_places import inputs_of_scene, map_path
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
@@ -24,6 +24,7 @@ from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, ShowPro
 from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import (
     AppState,
+    ChoosePlaceTask,
     ChooseTask,
     Notice,
     ReadMaskTask,
@@ -48,7 +49,7 @@ class SideEffects:
         self._ids = count(1)
         self._under_way: set[int] = set()
         self._masks: list[Path] = []
-        self._dialog: Dialog | None = None
+        self._dialog: Dialog | SaveDialog | None = None
 
     @property
     def is_waiting(self) -> bool:
@@ -84,6 +85,8 @@ class SideEffects:
                 if not has_dialogs():
                     return [AskForPath(what)]
                 self._dialog = self._dialog or Dialog(what, state.source.path if state.source else "")
+            case ChoosePlaceTask(prompt):
+                self._dialog = self._dialog or SaveDialog(prompt)
             case ReadMaskTask(path):
                 self._masks.append(Path(os.path.expanduser(path)))
                 self._submit(partial(_read_mask, self._masks[-1]))
@@ -118,9 +121,9 @@ class SideEffects:
         except AlreadyThereError:
             return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, what="map"))]
         except InputError as error:
-            return [Notify(Notice(str(error), is_error=True))]
+            return [refusal(task, state, error)]
         self._submit(partial(_save_map, path, self._scene_view.loaded.disparity.values, state.depth.edits))
-        return []
+        return [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
 
     def _take_results(self, state: AppState) -> list[Action]:
         actions: list[Action] = []
@@ -136,10 +139,13 @@ class SideEffects:
         answer = self._dialog.answer() if self._dialog is not None else None
         if self._dialog is None or answer is None:
             return []
-        what, self._dialog = self._dialog.what, None
+        dialog, self._dialog = self._dialog, None
         if not answer:
             return []
-        return [action_for_path(what, answer, state)]
+        if isinstance(dialog, SaveDialog):
+            there = os.path.lexists(answer)
+            return [ShowPrompt(replace(dialog.prompt, path=answer, already_there=there, problem=""))]
+        return [action_for_path(dialog.what, answer, state)]
 
 
 def is_scene_open(state: AppState) -> bool:

@@ -30,18 +30,19 @@ class Window:
     handle: GLFW's window. damages: how often the system asked for a redraw.
     """
 
-    def __init__(self, title: str, place: tuple[int, int, int, int] | None = None) -> None:
-        """Open it, at (x, y, width, height) if that is still on a screen. Raises InputError without a display or
-        without OpenGL 3.3.
+    def __init__(self, title: str, place: tuple[int, int, int, int] | None = None, is_maximized: bool = False) -> None:
+        """Open it, at (x, y, width, height) if that is still on a screen; is_maximized: filling the screen.
+
+        Raises InputError without a display or without OpenGL 3.3.
         """
         with warnings.catch_warnings(record=True) as reasons:
             warnings.simplefilter("always")
-            self.handle: Any = _open(title, place)
+            self.handle: Any = _open(title, place, is_maximized)
         if not self.handle:
             reason = "; ".join(_words_of(warning.message) for warning in reasons) or "GLFW gives no reason"
             glfw.terminate()
             raise InputError(f"no window can be opened ({reason}): `iibr screenshot` works without a display")
-        if place is not None and _is_on_a_screen(place):
+        if place is not None and not is_maximized and _is_on_a_screen(place):
             glfw.set_window_pos(self.handle, place[0], place[1])
         self.damages = 0
         self._dropped: list[str] = []
@@ -58,12 +59,16 @@ class Window:
 
     @property
     def place(self) -> tuple[int, int, int, int] | None:
-        """(x, y, width, height) in screen units; None while it is minimised or fills the screen."""
-        is_hidden = glfw.get_window_attrib(self.handle, glfw.ICONIFIED)
-        if is_hidden or glfw.get_window_attrib(self.handle, glfw.MAXIMIZED):
+        """(x, y, width, height) in screen units; None while it fills the screen."""
+        if glfw.get_window_attrib(self.handle, glfw.MAXIMIZED):
             return None
         x, y = glfw.get_window_pos(self.handle)
         return (x, y, *self.size)
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether it is minimised."""
+        return bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED))
 
     @property
     def framebuffer_size(self) -> ScreenSize:
@@ -147,7 +152,7 @@ def _is_on_a_screen(place: tuple[int, int, int, int]) -> bool:
     return any(left <= x < left + width and top <= y < top + height for left, top, width, height in areas)
 
 
-def _open(title: str, place: tuple[int, int, int, int] | None) -> Any:
+def _open(title: str, place: tuple[int, int, int, int] | None, is_maximized: bool) -> Any:
     if not glfw.init():
         return None
     glfw.default_window_hints()
@@ -156,6 +161,7 @@ def _open(title: str, place: tuple[int, int, int, int] | None) -> Any:
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
     glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
     glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+    glfw.window_hint(glfw.MAXIMIZED, is_maximized)
     return glfw.create_window(*_size_within_screens(place), title, None, None)
 
 

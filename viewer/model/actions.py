@@ -241,9 +241,9 @@ class ToggleSection:
 
 @dataclass(frozen=True)
 class PlaceWindow:
-    """The window is here: x, y, width, height in screen units."""
+    """The window is here: x, y, width, height in screen units; None: where it was, while it fills the screen."""
 
-    place: tuple[int, int, int, int]
+    place: tuple[int, int, int, int] | None
 
 
 @dataclass(frozen=True)

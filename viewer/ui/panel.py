@@ -174,22 +174,28 @@ def _progress(state: AppState, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     imgui.progress_bar(progress.share, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
     is_working = not progress.is_complete and state.stopped != state.generation
-    if is_working and _small_button("Cancel", "Make no more views; those that are there stay.", layout):
-        actions.append(StopWork())
-    if state.stopped == state.generation and state.scene and _small_button("Resume", "Make the views again.", layout):
-        actions.append(ResumeWork())
-    quiet(words)
+    if is_working:
+        if _words_and_button(words, "Cancel", "Make no more views; those that are there stay.", layout):
+            actions.append(StopWork())
+    elif state.stopped == state.generation and state.scene:
+        if _words_and_button(words, "Resume", "Make the views again.", layout):
+            actions.append(ResumeWork())
+    else:
+        quiet(words)
     return actions
 
 
-def _small_button(text: str, tip: str, layout: Layout) -> bool:
-    """A button at the right end of the line, which goes on at its left."""
+def _words_and_button(words: str, text: str, tip: str, layout: Layout) -> bool:
+    """Quiet words, and a button at the right end of their first line; the words keep clear of it."""
     start, padding = imgui.get_cursor_pos_x(), 2 * imgui.get_style().frame_padding.x
     room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x - padding
     imgui.set_cursor_pos_x(start + room)
     pressed = imgui.small_button(text)
     tooltip(tip, layout)
     imgui.same_line(start)
+    imgui.push_text_wrap_pos(start + room - padding / 2)
+    imgui.text_colored(imgui.get_style().color_(imgui.Col_.text_disabled), words)
+    imgui.pop_text_wrap_pos()
     return bool(pressed)
 
 

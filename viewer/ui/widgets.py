@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from viewer.model.layout import Layout
 
 LABEL_WIDTH = 92.0
+GRIP_WIDTH = 12.0
 
 
 def label(text: str, layout: Layout, tip: str = "") -> None:
@@ -32,6 +35,8 @@ def slider(
     label(text, layout, tip)
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if is_logarithmic else 0)
     changed, new = imgui.slider_float(f"##{text}", value, *limits, form, flags)
+    ends = tuple(map(math.log, (new, *limits))) if is_logarithmic else (new, *limits)
+    _draw_grip(ends, layout)
     tooltip(tip, layout)
     return new if changed else None
 
@@ -40,8 +45,23 @@ def whole_slider(text: str, value: int, limits: tuple[int, int], layout: Layout,
     """A row with a slider over whole numbers."""
     label(text, layout, tip)
     changed, new = imgui.slider_int(f"##{text}", value, *limits, "%d", imgui.SliderFlags_.always_clamp)
+    _draw_grip((new, *limits), layout)
     tooltip(tip, layout)
     return new if changed else None
+
+
+def _draw_grip(value_and_limits: tuple[float, ...], layout: Layout) -> None:
+    """A line below the value of the last slider as far as it goes, and a grip at its end: it covers no words."""
+    value, low, high = value_and_limits
+    corner, far = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    share = min(max((value - low) / (high - low), 0.0), 1.0) if high > low else 0.0
+    grip, thin, thick = GRIP_WIDTH * layout.ui_scale, 2 * layout.ui_scale, 4 * layout.ui_scale
+    x = corner.x + share * (far.x - corner.x - grip)
+    is_held = imgui.is_item_active() or imgui.is_item_hovered()
+    color = imgui.get_color_u32(imgui.Col_.check_mark if is_held else imgui.Col_.button_active)
+    draw = imgui.get_window_draw_list()
+    draw.add_rect_filled(imgui.ImVec2(corner.x, far.y - thin), imgui.ImVec2(x, far.y), color)
+    draw.add_rect_filled(imgui.ImVec2(x, far.y - thick), imgui.ImVec2(x + grip, far.y), color, thin)
 
 
 def checkbox(text: str, is_on: bool, layout: Layout, tip: str = "") -> bool | None:
@@ -64,7 +84,7 @@ def choice(text: str, is_chosen: bool, layout: Layout, size: tuple[float, float]
     """A button that stays lit while it is chosen; True when it was pressed."""
     if is_chosen:
         for color in (imgui.Col_.button, imgui.Col_.button_hovered):
-            imgui.push_style_color(color, imgui.get_style().color_(imgui.Col_.slider_grab))
+            imgui.push_style_color(color, imgui.get_style().color_(imgui.Col_.button_active))
     pressed = imgui.button(text, imgui.ImVec2(*size))
     if is_chosen:
         imgui.pop_style_color(2)

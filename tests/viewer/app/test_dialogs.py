@@ -7,7 +7,9 @@ import os
 import pytest
 from imgui_bundle import portable_file_dialogs
 
-from viewer.app.dialogs import Dialog
+from viewer.app.dialogs import Dialog, SaveDialog
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import SavePrompt
 
 
 @pytest.mark.parametrize(("what", "kind"), [("photo", "open_file"), ("folder", "select_folder")])
@@ -23,3 +25,10 @@ def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(
     assert anywhere == ""
     for patterns in filters:
         assert {"*.jpg", "*.JPG", "*.HEIC", "*.hif"} <= set(patterns[1].split())
+
+
+def test_where_to_save_is_asked_with_what_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[object, ...]] = []
+    monkeypatch.setattr(portable_file_dialogs, "save_file", lambda *words: asked.append(words))
+    SaveDialog(SavePrompt("photos/one-iibr.png", ScreenSize(3, 2)))
+    assert asked[0][:2] == ("Save the picture", os.path.join(os.getcwd(), "photos", "one-iibr.png"))

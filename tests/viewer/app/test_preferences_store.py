@@ -106,3 +106,13 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="file") as error:
         store_preferences(AppState(), tmp_path / "file" / "folder")
     assert "\n" not in str(error.value)
+
+
+def test_a_window_that_filled_the_screen_does_so_again_and_knows_where_it_was(tmp_path: Path) -> None:
+    state = AppState()
+    for action in (PlaceWindow((10, 20, 900, 700)), PlaceWindow(None)):
+        state = reduce(state, action)
+    store_preferences(state, tmp_path)
+    again = load_preferences(AppState(), tmp_path).preferences
+    assert (again.window, again.is_maximized) == ((10, 20, 900, 700), True)
+    assert not reduce(state, PlaceWindow((0, 0, 800, 600))).preferences.is_maximized

@@ -57,6 +57,13 @@ def test_help_comes_without_asking_and_by_its_short_name(
     assert ("Usage: " in shown.out, shown.err) == (True, "")
 
 
+def test_a_shell_completes_commands() -> None:
+    """By the installed command's name; what the shell asks for comes in the environment."""
+    words = {"_IIBR_COMPLETE": "complete_bash", "COMP_WORDS": "iibr scr", "COMP_CWORD": "1"}
+    code = "import sys; sys.argv = ['iibr']; from viewer.entry import main; main()"
+    assert run_apart(code, **words).stdout.split() == ["screenshot"]
+
+
 def test_generate_writes_a_light_field_that_opens(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:

@@ -49,7 +49,7 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
             return _paint(state, place)
         case DropStroke() if state.stroke is not None:
             # the worker was stopped when the stroke began
-            return replace(state, stroke=None, generation=state.generation + 1)
+            return replace(state, stroke=None, generation=state.next_generation)
         case ResetDepth():
             return _with_settings(state, DepthSettings(state.scene.source.depth.refine), "ResetDepth", is_finished=True)
     return state
@@ -86,7 +86,8 @@ def is_depth_ahead(state: AppState, asked_for: DepthSettings) -> bool:
 
 
 def _with_settings(state: AppState, depth_settings: DepthSettings, kind: str, is_finished: bool) -> AppState:
-    after = replace(state, depth=depth_settings, generation=state.generation + is_finished)
+    generation = state.next_generation if is_finished else state.generation
+    after = replace(state, depth=depth_settings, generation=generation)
     return record_edit(state, after, kind)
 
 

@@ -71,7 +71,7 @@ def _restore(state: AppState, edit: Edit, history: History) -> AppState:
         optics=edit.optics,
         depth_strength=edit.depth_strength,
         depth=edit.depth,
-        generation=state.generation + restarts,
+        generation=state.next_generation if restarts else state.generation,
         motion=Motion(speed=state.motion.speed),
         history=history,
     )

@@ -60,6 +60,7 @@ from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import (
     SECTIONS,
     AppState,
+    FinishedField,
     Motion,
     Notice,
     PathPrompt,
@@ -119,13 +120,13 @@ def reduce(state: AppState, action: Action) -> AppState:
 def _file_or_prompt(state: AppState, action: Action) -> AppState:
     match action:
         case OpenPath(source):
-            progress = Progress(doing=f"reading {source.path}")
-            generation = state.generation + 1
-            return replace(state, source=source, progress=progress, generation=generation, prompt=None)
+            progress = Progress(doing=f"reading {PurePath(source.path).name}")
+            generation, left = state.next_generation, _leave_field(state)
+            return replace(state, source=source, progress=progress, generation=generation, prompt=None, left_field=left)
         case StopWork():
             return stop_work(state)
         case ResumeWork() if state.scene is not None:
-            return replace(state, generation=state.generation + 1, stopped=None)
+            return replace(state, generation=state.next_generation, stopped=None)
         case WorkerLost():
             return replace(
                 add_notice(state, Notice(LOST, is_error=True)), progress=Progress(), stopped=state.generation
@@ -153,6 +154,14 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state
+
+
+def _leave_field(state: AppState) -> FinishedField | None:
+    """What to come back to should the next file not open; as before where none has opened since."""
+    if state.scene is None or state.scene.source is not state.source:
+        return state.left_field
+    is_finished = state.progress.is_complete and state.shown_generation == state.generation
+    return FinishedField(state.progress, state.depth_strength, state.depth) if is_finished else None
 
 
 def _reduce_motion(state: AppState, action: MotionAction) -> AppState:
@@ -191,7 +200,8 @@ def _set_depth_strength(state: AppState, action: SetDepthStrength) -> AppState:
         return state
     strength = clamp(action.strength, 0.0, DEPTH_STRENGTH_LIMIT)
     restarts = action.is_finished and state.source is not None
-    return replace(state, depth_strength=strength, generation=state.generation + restarts)
+    generation = state.next_generation if restarts else state.generation
+    return replace(state, depth_strength=strength, generation=generation)
 
 
 def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
@@ -213,7 +223,7 @@ def _reduce_preferences(preferences: Preferences, action: PreferencesAction) -> 
             is_open = preferences.open_sections
             return replace(preferences, open_sections=tuple(s for s in SECTIONS if (s in is_open) != (s == section)))
         case PlaceWindow(place):
-            return replace(preferences, window=place)
+            return replace(preferences, window=place or preferences.window, is_maximized=place is None)
     return preferences
 
 

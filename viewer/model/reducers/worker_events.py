@@ -38,7 +38,8 @@ def stop_work(state: AppState) -> AppState:
     is_reading = state.scene is None or state.scene.source is not state.source
     if is_reading and state.source is not None:
         left = _leave_job(state)
-        return left if left.generation != state.generation else replace(left, stopped=state.generation, source=None)
+        is_back = left.scene is not None and left.scene.source is left.source
+        return left if is_back else replace(left, stopped=state.generation, source=None)
     if not progress.total or progress.is_complete:
         return state
     doing = f"stopped at {progress.done} of {progress.total} views"
@@ -54,6 +55,8 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         scene=scene,
         progress=Progress(doing="making views"),
         views_there=frozenset({scene.grid.centre}),
+        left_field=None,
+        shown_generation=state.generation,
         optics=carry_optics(state.optics, old, scene),
         history=map_optics(state.history, lambda optics: carry_optics(optics, old, scene)),
         inspection=replace(state.inspection, pair=None, probe=None),
@@ -101,10 +104,14 @@ def _offers(scene: Scene) -> tuple[Notice, ...]:
 
 
 def _leave_job(state: AppState) -> AppState:
-    """Nothing more comes of this job. Where another scene was open before, the program returns to it: its views may
-    not all have been made.
+    """Nothing more comes of this job. Where another scene was open before, the program returns to it: as it is where
+    all its views are there, else they are made.
     """
-    state = replace(state, progress=Progress())
+    left = state.left_field
+    state = replace(state, progress=Progress(), left_field=None)
     if state.scene is None or state.scene.source is state.source:
         return state
-    return replace(state, source=state.scene.source, generation=state.generation + 1)
+    state = replace(state, source=state.scene.source)
+    if left is not None and (left.depth_strength, left.depth) == (state.depth_strength, state.depth):
+        return replace(state, progress=left.progress, generation=state.shown_generation, given_up=state.generation)
+    return replace(state, generation=state.next_generation)

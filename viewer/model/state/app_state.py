@@ -230,19 +230,24 @@ Saved = Literal["picture", "map"]
 
 @dataclass(frozen=True)
 class SavePrompt:
-    """The question where to save the picture, and how large, or its disparity map. already_there: there is one."""
+    """The question where to save the picture, and how large, or its disparity map. already_there: there is one.
+
+    problem: why nothing can be saved there, "" before that is known.
+    """
 
     path: str
     size_px: ScreenSize
     already_there: bool = False
     what: Saved = "picture"
+    problem: str = ""
 
 
 @dataclass(frozen=True)
 class PalettePrompt:
-    """The list of commands, narrowed down by what was typed."""
+    """The list of commands, narrowed down by what was typed. selected: which of those left Enter runs."""
 
     text: str = ""
+    selected: int = 0
 
 
 Prompt = PathPrompt | SavePrompt | PalettePrompt | Literal["help", "quit"]
@@ -254,6 +259,13 @@ class ChooseTask:
     """Let the user choose in the system's dialog."""
 
     what: ChoiceOf
+
+
+@dataclass(frozen=True)
+class ChoosePlaceTask:
+    """Let the user choose in the system's dialog where the file goes that this prompt asks about."""
+
+    prompt: SavePrompt
 
 
 @dataclass(frozen=True)
@@ -280,7 +292,7 @@ class ReadTruthTask:
     path: str
 
 
-Task = ChooseTask | SaveTask | CancelSaveTask | ReadMaskTask | ReadTruthTask
+Task = ChooseTask | ChoosePlaceTask | SaveTask | CancelSaveTask | ReadMaskTask | ReadTruthTask
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
 Theme = Literal["dark", "light"]
@@ -290,12 +302,24 @@ SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "depth", 
 
 @dataclass(frozen=True)
 class Preferences:
-    """What outlasts the program. window: x, y, width, height in screen units, None before the first."""
+    """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
+    whether it filled the screen then.
+    """
 
     theme: Theme = "dark"
     font_scale: float = 1.0
     open_sections: tuple[Section, ...] = ("view", "focus", "aperture", "light")
     window: tuple[int, int, int, int] | None = None
+    is_maximized: bool = False
+
+
+@dataclass(frozen=True)
+class FinishedField:
+    """All views of a scene are there, while another one is read: what they were made with, to come back to."""
+
+    progress: Progress
+    depth_strength: float
+    depth: DepthSettings
 
 
 @dataclass(frozen=True)
@@ -320,7 +344,9 @@ class AppState:
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
     file has them. saving: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this scene what
-    is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once.
+    is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs: whether the
+    system has file dialogs. left_field: None where the open scene was left unfinished, or not at all. shown_generation:
+    whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a number.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -351,6 +377,15 @@ class AppState:
     has_chosen_focus: bool = False
     has_chosen_aperture: bool = False
     told_aperture: bool = False
+    has_dialogs: bool = False
+    left_field: FinishedField | None = None
+    shown_generation: int = 0
+    given_up: int = 0
+
+    @property
+    def next_generation(self) -> int:
+        """Of the next job."""
+        return max(self.generation, self.given_up) + 1
 
     @property
     def has_unsaved_edits(self) -> bool:

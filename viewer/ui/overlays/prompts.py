@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
-from viewer.model.commands import COMMANDS, action_for_path, commands_matching
+from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching
 from viewer.model.layout import Layout, ScreenSize
-from viewer.model.state.app_state import AppState, PalettePrompt, PathPrompt, Prompt, SavePrompt, SaveTask
+from viewer.model.state.app_state import (
+    AppState,
+    ChoosePlaceTask,
+    PalettePrompt,
+    PathPrompt,
+    Prompt,
+    SavePrompt,
+    SaveTask,
+)
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
 
 PROMPT_WIDTH = 460.0
-MOST_SHOWN = 12
+ROWS_SHOWN = 12
 LARGEST_SIDE = 65536
 MOUSE = (
     ("Drag", "Move the viewpoint"),
@@ -41,7 +50,6 @@ _FLAGS = (
     | imgui.WindowFlags_.no_resize
     | imgui.WindowFlags_.no_move
     | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
     | imgui.WindowFlags_.always_auto_resize
 )
 
@@ -87,18 +95,22 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     _focus_on_appearing()
     label("File", layout)
     path, entered = _text_field("path", prompt.path)
-    edited = replace(prompt, path=path, already_there=prompt.already_there and path == prompt.path)
+    edited = prompt if path == prompt.path else replace(prompt, path=path, already_there=False, problem="")
     edited = edited if is_map else _size_rows(edited, state, layout)
     gap(layout, 2)
     quiet(MAP_ENDINGS if is_map else "The name's ending decides: .png, or .exr in linear light.")
-    if prompt.already_there:
+    problem = prompt.problem or ("There is a file of this name already." if prompt.already_there else "")
+    if problem:
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
-        imgui.text_wrapped("There is a file of this name already.")
+        imgui.text_wrapped(problem)
         imgui.pop_style_color()
     pressed, closed = _buttons("Replace" if prompt.already_there else "Save", layout)
+    if state.has_dialogs:
+        imgui.same_line()
+        if button("Choose a folder and name…", layout):
+            return [DoTask(ChoosePlaceTask(edited))]
     if pressed or entered:
-        task = SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what)
-        return [DoTask(task), ShowPrompt(None)]
+        return [DoTask(SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what))]
     return _prompt_actions(closed, edited, prompt)
 
 
@@ -130,25 +142,40 @@ def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
 
 
 def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
-    """Commands that match what was typed; Enter takes the first."""
+    """Commands that match what was typed; the arrow keys select one of them, Enter runs it."""
     _focus_on_appearing()
     imgui.set_next_item_width(-1)
     text, entered = _text_field("command", prompt.text, "Type a command")
     matching = commands_matching(text)
-    chosen = matching[0] if entered and matching else None
-    room = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
-    for command in matching[:MOST_SHOWN]:
-        pressed, _ = imgui.selectable(command.name, False)
+    steps = imgui.is_key_pressed(imgui.Key.down_arrow) - imgui.is_key_pressed(imgui.Key.up_arrow)
+    selected = min(max((prompt.selected if text == prompt.text else 0) + steps, 0), max(len(matching) - 1, 0))
+    chosen = matching[selected] if entered and matching else None
+    pressed = _command_rows(matching, selected, has_moved=bool(steps))
+    if not matching:
+        quiet("No command of that name.")
+    chosen = pressed or chosen
+    if chosen is not None:
+        return [ShowPrompt(None), chosen.action(replace(state, prompt=None))]
+    return _prompt_actions(False, PalettePrompt(text, selected), prompt)
+
+
+def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -> Command | None:
+    """Rows that scroll where there are many; has_moved: bring the selected one into sight. What was pressed."""
+    pressed = None
+    height = min(len(commands), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing()
+    imgui.begin_child("commands", imgui.ImVec2(0, max(height, 1)), 0, imgui.WindowFlags_.no_nav)
+    room = imgui.get_content_region_avail().x - imgui.get_style().item_inner_spacing.x
+    for i, command in enumerate(commands):
+        if imgui.selectable(command.name, i == selected)[0]:
+            pressed = command
+        if i == selected and has_moved:
+            imgui.set_scroll_here_y()
         if command.chords:
             words = command.chords[0].words
             imgui.same_line(room - imgui.calc_text_size(words).x)
             imgui.text_disabled(words)
-        chosen = command if pressed else chosen
-    if not matching:
-        quiet("No command of that name.")
-    if chosen is not None:
-        return [ShowPrompt(None), chosen.action(replace(state, prompt=None))]
-    return _prompt_actions(False, PalettePrompt(text), prompt)
+    imgui.end_child()
+    return pressed
 
 
 def _help(layout: Layout) -> list[Action]:

@@ -1,0 +1,127 @@
+"""Prompts in a real window: the list of commands, where to save, what a file that does not open leaves alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from iibr_core.types import GridShape
+from tests.viewer.conftest import SMALL_WINDOW, Driver
+from viewer.app.window_slot import STEP
+from viewer.model.actions import AskToSave, OpenPath, ShowPrompt, StopWork
+from viewer.model.commands import COMMANDS
+from viewer.model.state.app_state import PalettePrompt, SavePrompt, Source
+
+Opener = Callable[..., Driver]
+
+
+@pytest.fixture(autouse=True)
+def _no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
+
+
+@pytest.fixture
+def viewer(open_window: Opener, photo_path: Path) -> Driver:
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    driver.send("mousemove", *driver.position(0.1, 0.1))
+    driver.until_idle()
+    return driver
+
+
+def test_arrows_select_a_command_far_down_the_list_and_enter_runs_it(viewer: Driver) -> None:
+    viewer.app.do(ShowPrompt(PalettePrompt()))
+    viewer.until_idle()
+    place = [command.name for command in COMMANDS].index("Larger text")
+    assert place > 12, "else nothing scrolls"
+    for _ in range(place):
+        viewer.send("key", "Down")
+        viewer.app.step()
+    viewer.until(lambda app: app.state.prompt == PalettePrompt("", place))
+    viewer.until_idle()
+    before = viewer.app.state.preferences.font_scale
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.preferences.font_scale > before)
+    assert viewer.app.state.prompt is None
+
+
+def test_up_stays_at_the_first_command_and_typing_begins_there_again(viewer: Driver) -> None:
+    viewer.app.do(ShowPrompt(PalettePrompt()))
+    viewer.until_idle()
+    viewer.send("key", "Down", "key", "Down")
+    viewer.until(lambda app: app.state.prompt == PalettePrompt("", 2))
+    viewer.send("type", "text")
+    viewer.until(lambda app: app.state.prompt == PalettePrompt("text", 0))
+    viewer.send("key", "Up")
+    viewer.until_idle()
+    assert viewer.app.state.prompt == PalettePrompt("text", 0)
+
+
+def test_tab_goes_on_from_the_name_to_the_width(viewer: Driver, tmp_path: Path) -> None:
+    viewer.app.do(AskToSave())
+    viewer.until_idle()
+    viewer.type(str(tmp_path / "a.png"))
+    viewer.send("key", "Tab")
+    viewer.until_idle()
+    viewer.type("48")
+    viewer.send("key", "Return")
+    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and app.state.prompt.size_px == (48, 32))
+
+
+def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: Driver, tmp_path: Path) -> None:
+    viewer.app.do(AskToSave())
+    viewer.until_idle()
+    viewer.type(str(tmp_path / "a.jqg"))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and bool(app.state.prompt.problem))
+    prompt = viewer.app.state.prompt
+    assert isinstance(prompt, SavePrompt)
+    assert prompt.path == str(tmp_path / "a.jqg")
+    assert ".png" in prompt.problem
+    viewer.until_idle()
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.prompt is None)
+
+
+def test_a_file_that_does_not_open_leaves_the_finished_field_alone(viewer: Driver, tmp_path: Path) -> None:
+    before, generation = viewer.app.scene_view.views_uploaded, viewer.app.state.generation
+    broken = tmp_path / "broken.jpg"
+    broken.write_bytes(b"no picture")
+    for number in (1, 2):
+        viewer.app.window.on_drop(None, [str(broken)])
+        viewer.until(lambda app: bool(app.state.notices) and "broken.jpg" in app.state.notices[-1].text)
+        viewer.until_idle()
+        assert viewer.app.state.generation == viewer.app.scene_view.generation == generation, number
+        assert viewer.app.state.progress.done == 9
+    assert viewer.app.scene_view.views_uploaded == before
+    viewer.app.do(OpenPath(Source(str(tmp_path / "scene.png"), grid=GridShape(1, 1))))
+    viewer.until(lambda app: app.scene_view.generation > generation)
+    viewer.until_idle()
+    assert viewer.app.state.progress.total == 1
+
+
+def test_a_file_that_is_given_up_while_it_is_read_leaves_the_finished_field_alone(
+    viewer: Driver, tmp_path: Path
+) -> None:
+    before = viewer.app.scene_view.views_uploaded
+    viewer.app.do(OpenPath(Source(str(tmp_path / "scene.png"))), StopWork())
+    viewer.until_idle()
+    assert viewer.app.scene_view.views_uploaded == before
+    assert viewer.app.state.progress.is_complete
+
+
+def test_a_second_window_does_not_open_exactly_on_the_first(open_window: Opener, tmp_path: Path) -> None:
+    """Two windows of one process, one after the other made: the slots are files, so that processes see them too."""
+    from viewer.app.window_slot import WindowSlot
+
+    first = open_window(None, kept_in=tmp_path)
+    first.until(lambda app: app.frames_shown > 0)
+    second = WindowSlot(tmp_path)
+    assert second.shift(SMALL_WINDOW) == (STEP, STEP, *SMALL_WINDOW[2:])
+    second.close()
+    first.close()
+    again = WindowSlot(tmp_path)
+    assert again.shift(SMALL_WINDOW) == SMALL_WINDOW
+    again.close()
