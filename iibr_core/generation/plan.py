@@ -48,6 +48,8 @@ MOST_HIDDEN, MOST_LONGER_S = 0.75, 1.0
 and gains 0.00 to 0.02 dB. It is not asked if that takes this much longer, in processor time.
 """
 MOST_VIEWS_A_SIDE = 9
+MOST_COMFORTABLE = 2.0
+"""Times the parallax for viewing: a disparity that is taken as given and moves more is told."""
 MOST_NOISE_PX = 1.0
 """So much may a map's noise move from the first view to the last: relief that is hardly more than noise moves less."""
 MOST_STRENGTH = 100.0
@@ -79,7 +81,7 @@ class ScenePlan:
     px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
     of the light field, and at most while generating it, the field not counted. reasons: the same in sentences. costs:
     time and memory of making all views, in each quality. quality: the one to make them in. draft_bytes: what drafts of
-    views may take, beside peak_bytes.
+    views may take, beside peak_bytes. notes: what the user should know of the choices, one sentence each.
     """
 
     grid: GridShape
@@ -95,6 +97,7 @@ class ScenePlan:
     given_range: tuple[float, float] | None = None
     quality: Quality = DEFAULT_QUALITY
     draft_bytes: int = 0
+    notes: tuple[str, ...] = ()
 
     def field_disparity(self, given: Disparity) -> Disparity:
         """The disparity the light field is generated from (px per view step of this plan's grid)."""
@@ -103,10 +106,13 @@ class ScenePlan:
         return Disparity(values, given.source, given.notes)
 
 
-def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverrides | None = None) -> ScenePlan:
+def plan_for_viewing(
+    photo: Photo, disparity: Disparity, overrides: PlanOverrides | None = None, keeps_views: bool = True
+) -> ScenePlan:
     """Plan for the viewer: picks the focus plane that stays still, the baseline and the grid.
 
-    Raises InputError if an override is out of range, or if a grid the user asked for does not fit into memory.
+    keeps_views: else each is written and forgotten. Raises InputError if an override is out of range, or if a grid the
+    user asked for does not fit into memory.
     """
     wanted = overrides or PlanOverrides()
     if not abs(wanted.depth_strength) <= MOST_STRENGTH:
@@ -138,7 +144,7 @@ def plan_for_viewing(photo: Photo, disparity: Disparity, overrides: PlanOverride
         )
     reasons += _wild_reasons(given, relief)
     plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, budget)
-    _require_room(plan, photo, budget, keeps_views=True)
+    _require_room(plan, photo, budget, keeps_views)
     return replace(plan, given_range=(relief.low, relief.high))
 
 
@@ -148,17 +154,30 @@ def plan_literal(
     grid: GridShape,
     memory_bytes: int | None = None,
     quality: Quality | None = None,
+    keeps_views: bool = False,
 ) -> ScenePlan:
-    """Plan for `iibr generate --grid`: the given disparity is taken as it is, views at integer steps.
+    """Plan for `--literal`: the given disparity is taken as it is, views at integer steps.
 
-    quality: None leaves it to the plan. Raises InputError if the grid has no view or generating it, each view written
-    and forgotten, does not fit into memory.
+    quality: None leaves it to the plan. keeps_views: else each is written and forgotten. Raises InputError if the grid
+    has no view or generating it does not fit into memory.
     """
     reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
     budget = budget_of(memory_bytes)
     plan = _complete_plan(photo, disparity, grid, 1.0, 0.0, reasons, quality)
-    _require_room(plan, photo, budget, keeps_views=False)
-    return plan
+    _require_room(plan, photo, budget, keeps_views)
+    return replace(plan, notes=_wide_notes(plan, photo.size.width))
+
+
+def _wide_notes(plan: ScenePlan, width: int) -> tuple[str, ...]:
+    """A sentence where the views differ by far more than those that are planned for viewing."""
+    low, high = plan.disparity_range_px
+    moved_px = (max(plan.grid) - 1) * (high - low)
+    if moved_px <= MOST_COMFORTABLE * TOTAL_PARALLAX * width:
+        return ()
+    return (
+        f"The nearest moves {moved_px:.0f} px against the farthest from the first view to the last,"
+        f" {moved_px / width:.0%} of the width: most of it is made up. Without --literal it is {TOTAL_PARALLAX:.0%}.",
+    )
 
 
 def _require_room(plan: ScenePlan, photo: Photo, budget: Budget, keeps_views: bool) -> None:

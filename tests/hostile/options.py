@@ -62,6 +62,27 @@ _screenshot = [
     for value in values
 ]
 
+_export = [
+    Case(f"export {' '.join(words)}", ("export", "photo.png", *words), says=says)
+    for words, says in (
+        (("--to", "hologram", "-o", "new.png"), "hologram"),
+        (("--to", "", "-o", "new.png"), "--to"),
+        (("--to", "quilt"), "-o"),
+        (("-o", "new.png"), "--to"),
+        (("--to", "quilt", "-o", "new.txt"), ".png"),
+        (("--to", "quilt", "-o", "new.png", "--device", "holodeck"), "holodeck"),
+        (("--to", "quilt", "-o", "new.png", "--frames", "3"), "--frames"),
+        (("--to", "anaglyph", "-o", "new.png", "--device", "go"), "--device"),
+        (("--to", "sbs", "-o", "new.png", "--eyes", "nan"), "--eyes"),
+        (("--to", "sbs", "-o", "new.png", "--size", "0x4"), "--size"),
+        (("--to", "sbs", "-o", "new.png", "--literal"), "--grid"),
+        (("--to", "anaglyph", "-o", "photo.png", "--force"), "photo.png"),
+        (("--to", "anaglyph", "-o", "saved.png"), "--force"),
+        (("--to", "anaglyph", "-o", "missing/new.png"), "missing"),
+        (("--to", "anaglyph", "-o", "new.png", "--view", "1,1"), "--view"),
+    )
+]
+
 _clamped = [
     Case(
         f"screenshot {option} {value}", ("screenshot", "photo.png", "-o", "new.png", option, value), 0, "", ("new.png",)
@@ -150,4 +171,4 @@ _others = [
     )
 ]
 
-OPTION_CASES = (*_values, *_screenshot, *_clamped, *_models, *_contradictions, *_ignored, *_others)
+OPTION_CASES = (*_values, *_screenshot, *_export, *_clamped, *_models, *_contradictions, *_ignored, *_others)

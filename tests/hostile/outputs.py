@@ -11,12 +11,13 @@ from tests.hostile.inputs import LONG_NAME, NOT_UTF8
 WRITING: dict[str, tuple[str, ...]] = {
     "screenshot": ("screenshot", "photo.png", "--disparity", "map.pfm", "--grid", "1", "-o"),
     "generate": ("generate", "photo.png", "--disparity", "map.pfm", "--grid", "1", "--out"),
+    "export": ("export", "photo.png", "--disparity", "map.pfm", "--grid", "1", "--to", "anaglyph", "-o"),
     "evaluate": ("evaluate", "field", "--views", "1", "--quality", "fast", "--out"),
     "train": ("train", "--steps", "1", "--out"),
 }
 """What writes, all but where to."""
 
-SUFFIX = {"screenshot": ".png", "generate": "", "evaluate": "", "train": ".safetensors"}
+SUFFIX = {"screenshot": ".png", "export": ".png", "generate": "", "evaluate": "", "train": ".safetensors"}
 
 
 def _read_only(folder: Path) -> None:
@@ -169,7 +170,7 @@ _full = [
         # Or Python, which does not see that they are cut off, keeps bytes of modules that are no good to anybody.
         environment={"PYTHONDONTWRITEBYTECODE": "1"},
     )
-    for command in ("screenshot", "generate")
+    for command in ("screenshot", "generate", "export")
     for room in (200, 500)
 ]
 

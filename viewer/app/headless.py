@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from viewer.app.image_export import render_pixels
+from viewer.app.save_places import require_size
 from viewer.background.comparison_worker import ComparisonJob
+from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
+from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
@@ -29,7 +32,7 @@ from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import Probed
-from viewer.model.state.optics import CENTRE
+from viewer.model.state.optics import CENTRE, Optics
 
 LAYOUT_FRAMES = 3
 """ImGui knows the size of a text only after it was built once."""
@@ -121,6 +124,18 @@ class HeadlessViewer:
         pixels = render_pixels(self._scene_view, self.state, layout.picture_px.size, as_float)
         image[y : y + box_height, x : x + box_width] = pixels
         return image
+
+    def draw(
+        self, optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE, is_linear: bool = False
+    ) -> NDArray[Any]:
+        """A picture for an export, see `viewer.app.exports.source.Draw`."""
+        require_size(size_px)
+        return self._scene_view.picture(optics, size_px, is_linear, part)
+
+    @property
+    def loaded(self) -> LoadedPhoto | None:
+        """The photo that is open, None for a light field."""
+        return self._scene_view.loaded
 
     def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
         """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""

@@ -62,5 +62,5 @@ def render_pixels(scene_view: SceneView, state: AppState, size_px: ScreenSize, a
     Larger pictures than the graphics card can hold are drawn in parts. Raises InputError beyond MAX_PIXELS.
     """
     require_size(size_px)
-    pixels = scene_view.picture(state, size_px, is_linear=as_float)
+    pixels = scene_view.picture(state.optics, size_px, is_linear=as_float)
     return srgb_from_linear(pixels) if as_float else pixels

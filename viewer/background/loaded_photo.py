@@ -24,7 +24,7 @@ from iibr_core.generation.memory_model import (
     require_reading,
     require_views,
 )
-from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing
+from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -163,11 +163,17 @@ def _require_map(source: Source, budget: Budget, keeps_views: bool) -> None:
     require_map(budget, path.name, header.size, header.bytes_beside, keeps_views)
 
 
-def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> ScenePlan:
-    """The plan for viewing. What was not edited keeps its parallax: clips and strokes must not move all the rest.
+def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_views: bool = True) -> ScenePlan:
+    """The plan for viewing, or for disparity as it is given. What was not edited keeps its parallax: clips and strokes
+    must not move all the rest.
 
-    Raises InputError where an override is out of range.
+    keeps_views: else each is written and forgotten. Raises InputError where an override is out of range.
     """
+    if source.is_literal:
+        if source.grid is None:
+            raise InputError("--literal counts disparity in px from view to view: say how many with --grid")
+        memory = source.depth.memory_bytes
+        return plan_literal(loaded.photo, loaded.disparity, source.grid, memory, source.quality, keeps_views)
     zero = source.focus_disparity
     if loaded.depth_settings.edits != UNEDITED:
         zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
@@ -175,7 +181,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float) -> Sce
         wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
         depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
     overrides = PlanOverrides(source.grid, depth_strength, zero, source.depth.memory_bytes, source.quality)
-    return plan_for_viewing(loaded.photo, loaded.disparity, overrides)
+    return plan_for_viewing(loaded.photo, loaded.disparity, overrides, keeps_views)
 
 
 def still_disparity(source: Source, before_strokes: FloatImage) -> float:

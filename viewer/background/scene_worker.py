@@ -127,7 +127,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         depth_source=loaded.disparity.source,
         is_hdr=loaded.photo.is_hdr,
         plan=plan,
-        notes=loaded.photo.notes + loaded.disparity.notes,
+        notes=loaded.photo.notes + loaded.disparity.notes + plan.notes,
         focal_px=_known_focal_px(loaded.photo),
         subject_disparity_px=_median_of_middle(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,

@@ -14,11 +14,13 @@ from iibr_core.types import GridShape
 from viewer.cli.options import (
     DepthFrom,
     DepthModel,
+    DepthStrength,
     DisparityFile,
     DisparityScale,
     Force,
     Inpaint,
     LightFieldFormat,
+    Literal,
     MaxPixels,
     Memory,
     PhotoPath,
@@ -44,6 +46,8 @@ def generate(
     depth_model: DepthModel = None,
     refine: Refine = 1.0,
     format: LightFieldFormat = "hci",
+    literal: Literal = False,
+    depth_strength: DepthStrength = 1.0,
     with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
     max_pixels: MaxPixels = None,
     memory: Memory = None,
@@ -51,7 +55,7 @@ def generate(
     inpaint: Inpaint = DEFAULT_INPAINTER,
     force: Force = False,
 ) -> None:
-    """Write the light field of a photo; its disparity counts literally, in pixels per view.
+    """Write the light field of a photo, with the parallax that the window shows.
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
     """
@@ -60,19 +64,18 @@ def generate(
     from viewer.model.state.app_state import Source
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
-    source = Source(str(photo), choice, grid, max_pixels=max_pixels)
+    source = Source(str(photo), choice, grid, max_pixels=max_pixels, quality=quality, is_literal=literal)
     require_existing(source)
     new_writer = writer_for(format)
     new_writer.require_place(out, inputs_with_sidecar(source), force)
     require_model(choice)
 
     from iibr_core.generation.light_field import generate as generated
-    from iibr_core.generation.plan import plan_literal
-    from viewer.background.loaded_photo import load_photo
+    from viewer.background.loaded_photo import load_photo, make_plan
 
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
-    plan = plan_literal(loaded.photo, loaded.disparity, grid, memory, quality)
+    plan = make_plan(source, loaded, depth_strength, keeps_views=False)
     total = grid.rows * grid.columns
     views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, inpaint=inpaint)
     with (
@@ -89,5 +92,5 @@ def generate(
             show(done, total)
     height, width = loaded.photo.size
     print(f"{total} views of {width}x{height} in {seconds:.2f} s ({1000 * seconds / total:.1f} ms per view): {out}")
-    print_notes(loaded.photo.notes + loaded.disparity.notes)
+    print_notes(loaded.photo.notes + loaded.disparity.notes + plan.notes)
     print_depth(loaded.origin)

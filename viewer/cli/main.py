@@ -11,6 +11,7 @@ from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import InputError
 from viewer.cli.demo import demo
 from viewer.cli.evaluate import evaluate
+from viewer.cli.export import export
 from viewer.cli.generate import generate
 from viewer.cli.models import models
 from viewer.cli.plan import plan
@@ -34,7 +35,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (evaluate, view, generate, screenshot, plan, train, demo):
+for command in (evaluate, view, generate, screenshot, export, plan, train, demo):
     app.command()(command)
 app.add_typer(models, name="models")
 

@@ -13,6 +13,7 @@ import typer
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import InputError, ViewOffset
+from viewer.cli.lens_options import NO_LENS_OPTIONS, LensOptions
 from viewer.cli.options import (
     SCREEN_SIZE,
     DepthFrom,
@@ -49,8 +50,7 @@ from viewer.model.layout import ScreenSize
 if TYPE_CHECKING:
     from iibr_core.depth.choice import DepthOrigin
     from viewer.model.actions import Action
-    from viewer.model.state.app_state import Scene, Source
-    from viewer.model.state.optics import Optics
+    from viewer.model.state.app_state import Source
 
 
 class Backend(StrEnum):
@@ -59,47 +59,6 @@ class Backend(StrEnum):
     auto = "auto"
     egl = "egl"
     osmesa = "osmesa"
-
-
-@dataclass(frozen=True)
-class _LensOptions:
-    """What the options say about the lens, None where they say nothing."""
-
-    view: ViewOffset | None = None
-    focus: float | None = None
-    aperture: float | None = None
-
-    def actions(self) -> list[Action]:
-        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
-
-        actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
-        actions += [] if self.focus is None else [SetFocus(self.focus)]
-        return actions + ([] if self.aperture is None else [SetAperture(self.aperture)])
-
-    def require_within(self, scene: Scene) -> None:
-        """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.
-        Where there is a single view, it is what every viewpoint shows.
-        """
-        from viewer.model.lens.limits import eye_limits
-
-        if self.view is None or scene.grid == (1, 1):
-            return
-        for axis, value, views in (("S", self.view.s, scene.grid.columns), ("T", self.view.t, scene.grid.rows)):
-            low, high = eye_limits(views)
-            if not low <= value <= high:
-                raise InputError(f"--view: {axis} is {value:g}, for {scene.name} it goes from {low:g} to {high:g}")
-
-    def notes(self, optics: Optics) -> tuple[str, ...]:
-        """What was asked for beyond what the scene has, and what was taken instead."""
-        asked = (
-            ("--focus", self.focus, optics.focus_disparity),
-            ("--aperture", self.aperture, optics.aperture_diameter),
-        )
-        return tuple(
-            f"{option} {value:g} is beyond what the scene has: {taken:g} was taken."
-            for option, value, taken in asked
-            if value is not None and value != taken
-        )
 
 
 @dataclass(frozen=True)
@@ -114,7 +73,7 @@ class _Shot:
     edits: DepthEdits = UNEDITED
     actions: tuple[Action, ...] = ()
     notes: tuple[str, ...] = ()
-    lens: _LensOptions = _LensOptions()
+    lens: LensOptions = NO_LENS_OPTIONS
 
 
 def screenshot(
@@ -181,7 +140,7 @@ def screenshot(
     require_picture_memory(shot.size, shot.source.depth.memory_bytes, output.suffix.lower() == ".exr")
     require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)
     require_model(choice)
-    shot = replace(shot, lens=_LensOptions(view, focus, aperture))
+    shot = replace(shot, lens=LensOptions(view, focus, aperture))
     notes, origin = _write(shot, output, ui, backend)
     print(output)
     print_depth(origin)

@@ -18,6 +18,7 @@ from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.layout import ScreenSize
@@ -179,16 +180,20 @@ class SceneView:
             self.renderer.refine()
         return self._drawn
 
-    def picture(self, state: AppState, size_px: ScreenSize, is_linear: bool = False) -> NDArray[Any]:
+    def picture(
+        self, optics: Optics, size_px: ScreenSize, is_linear: bool = False, part: TargetWindow = WHOLE_PICTURE
+    ) -> NDArray[Any]:
         """The converged picture of any size, (height, width, 3): uint8, sRGB-encoded, or float32 linear light.
 
-        Before the first view it is black. The window's own picture stays.
+        part: what of it is drawn. Before the first view it is black. The window's own picture stays.
         """
-        return self.renderer.converged_picture(state.optics, size_px, is_linear)
+        return self.renderer.converged_picture(optics, size_px, is_linear, part)
 
-    def start_picture(self, optics: Optics, size_px: ScreenSize, is_linear: bool) -> PictureDrawing:
+    def start_picture(
+        self, optics: Optics, size_px: ScreenSize, is_linear: bool, part: TargetWindow = WHOLE_PICTURE
+    ) -> PictureDrawing:
         """The same, to be drawn a step at a time; another one, or other views, stop it."""
-        return self.renderer.start_picture(optics, size_px, is_linear)
+        return self.renderer.start_picture(optics, size_px, is_linear, part)
 
     @property
     def note(self) -> str:

@@ -89,7 +89,7 @@ def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
     scene_view, size_px = opened._scene_view, (WIDTH, HEIGHT)
     scene_view.converge(opened.state, size_px)
     shown, drawn = scene_view.renderer.read_image(), scene_view.pictures_drawn
-    scene_view.picture(opened.state, (40, 30))
+    scene_view.picture(opened.state.optics, (40, 30))
     assert np.array_equal(scene_view.renderer.read_image(), shown)
     scene_view.converge(opened.state, size_px)
     assert scene_view.pictures_drawn == drawn

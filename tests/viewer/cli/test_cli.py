@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS
+from iibr_core.types import TOTAL_PARALLAX
 from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.cli.main import main
@@ -39,7 +41,7 @@ def run_apart(
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env={**clean, **environment}, timeout=120)
 
 
-@pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "plan", "train", "demo"])
+@pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "export", "plan", "train", "demo"])
 def test_help_has_an_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str) -> None:
     assert run(monkeypatch, *[command] if command else [], "--help") == 0
     text = capsys.readouterr().out
@@ -75,6 +77,21 @@ def test_generate_writes_a_light_field_that_opens(
     assert re.fullmatch(rf"9 views of 96x64 in [\d.]+ s \([\d.]+ ms per view\): {re.escape(str(out))}", line)
     assert len(list(out.glob("input_Cam*.png"))) == len(list(out.glob("disp_Cam*.pfm"))) == 9
     assert run(monkeypatch, "screenshot", out, "-o", tmp_path / "field.png", "--view", "-1,1") == 0
+
+
+def test_generate_shows_what_the_window_shows_unless_disparity_is_taken_literally(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    """As given, the square moves by 3 px from view to view: 12 of 96 from the first to the last."""
+    moved = {}
+    for name, words in (("planned", ()), ("literal", ("--literal",))):
+        out = tmp_path / name
+        assert run(monkeypatch, "generate", photo_path, "--grid", 5, "--out", out, *words) == 0
+        values = read_pfm(out / "gt_disp_lowres.pfm")
+        moved[name] = 4 * float(values.max() - values.min())
+        assert ("Without --literal it is 4%" in capsys.readouterr().err) == (name == "literal")
+    assert moved["literal"] == pytest.approx(12)
+    assert moved["planned"] == pytest.approx(TOTAL_PARALLAX * WIDTH)
 
 
 @pytest.fixture

@@ -53,6 +53,11 @@ class TargetWindow(NamedTuple):
     width: float
     height: float
 
+    def window(self, inner: TargetWindow) -> TargetWindow:
+        """A part of what these targets hold, in texture coordinates of the picture. inner: in those of the targets."""
+        left, top = self.left + inner.left * self.width, self.top + inner.top * self.height
+        return TargetWindow(left, top, inner.width * self.width, inner.height * self.height)
+
     def in_target(self, cell: PictureCell) -> PictureCell:
         """A part of the picture in texture coordinates of the targets, as far as they hold it."""
         x = ((edge - self.left) / self.width for edge in (cell.left, cell.right))

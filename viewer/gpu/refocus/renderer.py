@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from functools import partial
 
 import moderngl
@@ -28,7 +29,7 @@ from viewer.gpu.refocus.frame_budget import (
     choose_quality_level,
     stretch_image,
 )
-from viewer.gpu.refocus.lens import lens_of
+from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow, lens_of
 from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.refocus.picture_drawing import PictureDrawing, read_pixels
 from viewer.gpu.render_targets import RenderTargets
@@ -158,22 +159,27 @@ class Renderer:
             self._errors.add(self.read_image(), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
-    def start_picture(self, optics: Optics, size_px: ScreenSize, is_linear: bool) -> PictureDrawing:
+    def start_picture(
+        self, optics: Optics, size_px: ScreenSize, is_linear: bool, part: TargetWindow = WHOLE_PICTURE
+    ) -> PictureDrawing:
         """A picture with every sample it will get, of any size, to be drawn step by step; one at a time.
 
-        is_linear: float32 linear light, not cut off at white; else sRGB-encoded uint8. What was drawn last stays as it
-        is. Another field, or another image of a view that is there, stops it.
+        is_linear: float32 linear light, not cut off at white; else sRGB-encoded uint8. part: what of the picture is
+        drawn, stretched to size_px. What was drawn last stays as it is. Another field, or another image of a view that
+        is there, stops it.
         """
         self._stop_picture()
         accumulator = Accumulator(self.ctx, self.programs)
         accumulator.passes.adaptive = self.adaptive
-        whole = self._accumulation_of(optics, size_px, BEST_QUALITY)
+        whole = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
         self._picture = PictureDrawing(self.gl, accumulator, self._open_field(), whole, is_linear)
         return self._picture
 
-    def converged_picture(self, optics: Optics, size_px: ScreenSize, is_linear: bool) -> NDArray[np.uint8 | np.float32]:
+    def converged_picture(
+        self, optics: Optics, size_px: ScreenSize, is_linear: bool, part: TargetWindow = WHOLE_PICTURE
+    ) -> NDArray[np.uint8 | np.float32]:
         """The picture of `start_picture`, (height, width, 3), at once."""
-        drawing = self.start_picture(optics, size_px, is_linear)
+        drawing = self.start_picture(optics, size_px, is_linear, part)
         drawing.advance()
         self._stop_picture()
         return drawing.image
@@ -255,9 +261,12 @@ class Renderer:
         self._targets[size_px] = targets
         return targets
 
-    def _accumulation_of(self, optics: Optics, size_px: ScreenSize, level: QualityLevel) -> ProgressiveAccumulation:
+    def _accumulation_of(
+        self, optics: Optics, size_px: ScreenSize, level: QualityLevel, part: TargetWindow = WHOLE_PICTURE
+    ) -> ProgressiveAccumulation:
         field = self._open_field()
-        lens = lens_of(optics, field, size_px[0], self.prefilter, level)
+        whole_width_px = round(size_px[0] / part.width)
+        lens = replace(lens_of(optics, field, whole_width_px, self.prefilter, level), part=part)
         count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
         return ProgressiveAccumulation(lens, size_px, tuple(r2_sequence(count)))
 

@@ -28,7 +28,8 @@ class Source:
     """What to open and what the user decided about it; None leaves the choice to the program.
 
     path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
-    transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`.
+    transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`. is_literal:
+    disparity counts as it is given, in px per step of the grid, instead of the plan's parallax.
     """
 
     path: str
@@ -38,6 +39,7 @@ class Source:
     max_pixels: int | None = None
     quality: Quality | None = None
     inpaint: str = DEFAULT_INPAINTER
+    is_literal: bool = False
 
 
 def source_beside(source: Source | None, path: str) -> Source:

@@ -1,0 +1,119 @@
+"""Quilts and stereo pictures, read by Pillow: which view lies where, what is held still, how the anaglyph is mixed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.formats.quilts import DEVICES
+from iibr_core.types import ImageSize, InputError, ViewOffset
+from tests.viewer.app.exports.conftest import exported
+from viewer.app.exports.parallax import fitted, side_pictures
+from viewer.app.exports.source import ExportSource
+from viewer.model.layout import ScreenSize
+from viewer.model.state.optics import Optics
+
+
+def pixels(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def left_edge_of_square(picture: np.ndarray) -> float:
+    """Where the near square begins in the picture's middle row, to a part of a pixel: half of its light is there."""
+    redness = (picture[..., 0] - picture[..., 2])[picture.shape[0] // 2].astype(float)
+    start = int(np.argmax(redness > redness.max() / 2))
+    before, after = redness[start - 1], redness[start]
+    return start - (after - redness.max() / 2) / max(after - before, 1e-6)
+
+
+def test_quilt_has_its_first_view_at_the_bottom_left(source: ExportSource, tmp_path: Path) -> None:
+    out = exported(source, "quilt", tmp_path / "a.png")
+    assert out.name == "a_qs8x6a1.5.png"
+    quilt = pixels(out)
+    height, width = quilt.shape[0] // 6, quilt.shape[1] // 8
+    assert (height, width) == (64, 96)
+    for s, tile in ((-1.0, quilt[-height:, :width]), (1.0, quilt[:height, -width:])):
+        expected = source.draw(Optics(eye=ViewOffset(0.0, s)), ScreenSize(width, height))
+        assert np.abs(tile - expected.astype(int)).max() <= 1
+    second = source.draw(Optics(eye=ViewOffset(0.0, -1 + 2 / 47)), ScreenSize(width, height))
+    assert np.abs(quilt[-height:, width : 2 * width] - second.astype(int)).max() <= 1
+
+
+def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
+    near = source.scene.disparity_range_px[1]
+    places = {}
+    for focus in (0.0, near):
+        eyes = side_pictures(source.scene, Optics(focus_disparity=focus), 2)
+        drawn = [source.draw(eye.optics, ScreenSize(288, 192), eye.part).astype(int) for eye in eyes]
+        left, right = map(left_edge_of_square, drawn)
+        places[focus] = left - right
+    assert places[near] == pytest.approx(0, abs=0.4)
+    assert places[0.0] == pytest.approx(2 * near * 3, abs=0.8), "else it moves by its disparity, times the scale"
+
+
+def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:
+    with pytest.raises(InputError, match="too much to be held still"):
+        side_pictures(source.scene, Optics(focus_disparity=30.0), 2)
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_every_display_gets_what_it_asks_for(name: str) -> None:
+    quilt = DEVICES[name]
+    places = [quilt.place(view) for view in range(quilt.views)]
+    assert places[0][0].stop == quilt.size.height
+    assert places[0][1].start == 0
+    assert places[-1][0].start == quilt.size.height - quilt.rows * quilt.tile.height
+    assert places[-1][1].stop == quilt.columns * quilt.tile.width
+    assert len({(rows.start, columns.start) for rows, columns in places}) == quilt.views
+
+
+def test_tiles_of_a_display_are_stretched_to_its_shape(source: ExportSource, tmp_path: Path) -> None:
+    """The 16" display's tiles are square and shown 1.777 wide: a 3:2 picture, shown whole, is narrower than that."""
+    assert DEVICES["16-landscape"].tile == ImageSize(857, 857)
+    assert fitted(1.5, ScreenSize(857, 857), 1.777) == (round(857 * 1.5 / 1.777), 857)
+    assert fitted(2.5, ScreenSize(857, 857), 1.777) == (857, round(857 * 1.777 / 2.5))
+
+
+def test_stereo_pictures(source: ExportSource, tmp_path: Path) -> None:
+    size = ScreenSize(96, 64)
+    left, right = (source.draw(Optics(eye=ViewOffset(0.0, s)), size).astype(int) for s in (-1.0, 1.0))
+    expected = {
+        "sbs": ("a_LRF_Full_SBS.png", np.hstack([left, right])),
+        "over-under": ("a_TB.png", np.vstack([left, right])),
+        "cross-eyed": ("a.png", np.hstack([right, left])),
+    }
+    for kind, (name, whole) in expected.items():
+        out = exported(source, kind, tmp_path / "a.png")
+        assert out.name == name
+        assert np.array_equal(pixels(out), whole)
+    half = exported(source, "half-sbs", tmp_path / "a_LRF_Half_SBS.png")
+    assert (half.name, pixels(half).shape) == ("a_LRF_Half_SBS.png", (64, 96, 3))
+    assert np.abs(pixels(half)[:, :48] - source.draw(Optics(eye=ViewOffset(0.0, -1.0)), ScreenSize(48, 64))).max() <= 1
+
+
+def test_eyes_stand_as_far_apart_as_asked(source: ExportSource, tmp_path: Path) -> None:
+    out = pixels(exported(source, "cross-eyed", tmp_path / "a.png", eyes=0.0))
+    assert np.array_equal(out[:, :96], out[:, 96:])
+
+
+def test_anaglyph_is_mixed_in_linear_light(source: ExportSource, tmp_path: Path) -> None:
+    """Dubois's matrices written out, for each eye alone, and cut off before they are added."""
+    left_from_rgb = [[0.437, 0.449, 0.164], [-0.062, -0.062, -0.024], [-0.048, -0.050, -0.017]]
+    right_from_rgb = [[-0.011, -0.032, -0.007], [0.377, 0.761, 0.009], [-0.026, -0.093, 1.234]]
+
+    def light(encoded: np.ndarray) -> np.ndarray:
+        x = encoded / 255
+        return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+
+    eyes = [source.draw(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64)) for s in (-1.0, 1.0)]
+    total = sum(
+        np.clip(np.einsum("ij,yxj->yxi", matrix, light(eye)), 0, 1)
+        for matrix, eye in zip((left_from_rgb, right_from_rgb), eyes)
+    )
+    linear = np.clip(total, 0, 1)
+    encoded = np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055)
+    out = pixels(exported(source, "anaglyph", tmp_path / "a.png"))
+    assert np.abs(out - encoded * 255).max() <= 0.51

@@ -1,0 +1,100 @@
+"""Every kind of export: the command line and the window's menu ask here. A new kind is a file of its own and one line.
+
+Light, so that they can be listed before anything is loaded: functions are "module:name" in this folder, imported once
+they are used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
+
+from iibr_core.formats.outputs import require_file_place, require_folder_place
+from iibr_core.types import InputError
+
+if TYPE_CHECKING:
+    from viewer.app.exports.options import ExportOptions
+    from viewer.app.exports.source import ExportSource
+    from viewer.model.state.app_state import Scene
+
+PICTURE = (".png",)
+EYES = ("focus", "aperture", "size", "eyes")
+
+
+@dataclass(frozen=True)
+class ExportKind:
+    """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
+    names of the options about exports and the lens that mean something to it. path: makes the file's name what players
+    expect. needs: packages, of the extra `export`.
+    """
+
+    words: str
+    endings: tuple[str, ...]
+    write: str
+    heeds: tuple[str, ...] = ()
+    path: str = ""
+    needs: tuple[str, ...] = ()
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the graphics card draws it; else it is made of the views themselves."""
+        return "aperture" in self.heeds
+
+
+EXPORTS = {
+    "quilt": ExportKind(
+        "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device"),
+        path="quilt:quilt_path",
+    ),
+    "sbs": ExportKind("Side by side", PICTURE, "stereo:write_side_by_side", EYES, "stereo:full_path"),
+    "half-sbs": ExportKind(
+        "Side by side, half width", PICTURE, "stereo:write_half_side_by_side", EYES, "stereo:half_path"
+    ),
+    "over-under": ExportKind("Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path"),
+    "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES),
+    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES),
+}  # fmt: skip
+"""By the name that people type."""
+
+
+def export_kind(name: str) -> ExportKind:
+    """Raises InputError for a kind that nobody knows."""
+    if name not in EXPORTS:
+        raise InputError(f"{name!r} is nothing that can be exported: give {', '.join(EXPORTS)}")
+    return EXPORTS[name]
+
+
+def require_ending(kind: ExportKind, path: Path) -> None:
+    """Raise InputError where a file's name does not say that it is of this kind."""
+    if kind.endings and path.suffix.lower() not in kind.endings:
+        raise InputError(f"{path}: is to end in {' or '.join(kind.endings)}")
+
+
+def export_path(kind: ExportKind, path: Path, scene: Scene, options: ExportOptions) -> Path:
+    """The name that is written. Raises InputError for options that mean nothing."""
+    if not kind.path:
+        return path
+    named: Path = _resolve(kind.path)(path, scene, options)
+    return named
+
+
+def require_export_place(kind: ExportKind, path: Path, inputs: Sequence[Path], may_replace: bool) -> None:
+    """Raise InputError where that may not be written, AlreadyThereError where something is. inputs: what is read."""
+    require_ending(kind, path)
+    if kind.endings:
+        require_file_place(path, inputs, may_replace)
+    else:
+        require_folder_place(path, inputs, may_replace, is_whole=True)
+
+
+def writer_of(kind: ExportKind) -> Callable[[Path, ExportSource, ExportOptions], None]:
+    """What writes it; raises InputError where that cannot be, Cancelled once it should stop."""
+    writer: Callable[[Path, ExportSource, ExportOptions], None] = _resolve(kind.write)
+    return writer
+
+
+def _resolve(entry: str) -> Any:
+    return resolve_name(f"{__package__}.{entry}")

@@ -1,0 +1,105 @@
+"""What an export is made of: the scene as it is open, pictures that are drawn of it, views that are made of it anew.
+
+A kind of export is a function that writes one file or folder of this, in whatever thread; drawing is handed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from numpy.typing import NDArray
+
+from iibr_core.generation.plan import ScenePlan
+from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.types import Disparity, ReportProgress, ViewUpdate
+from viewer.background.loaded_photo import LoadedPhoto
+from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import Scene
+from viewer.model.state.optics import Optics
+
+Item = TypeVar("Item")
+
+
+class Draw(Protocol):
+    """Draws the converged picture."""
+
+    def __call__(
+        self, optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE, is_linear: bool = False
+    ) -> NDArray[Any]:
+        """(height, width, 3): uint8, sRGB-encoded, or float32 linear light. part: what of it is drawn.
+
+        Raises Cancelled once the export should stop, InputError where there is no room.
+        """
+
+
+def undrawn(
+    optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE, is_linear: bool = False
+) -> NDArray[Any]:
+    """For kinds that draw nothing."""
+    raise AssertionError("this kind of export is said to draw nothing")
+
+
+@dataclass(frozen=True, eq=False)
+class ExportSource:
+    """scene: that is open; loaded: its photo, None for a light field from disk. optics: as the window shows it.
+
+    report_progress: heard in whatever thread exports. should_stop: asked often.
+    """
+
+    scene: Scene
+    loaded: LoadedPhoto | None
+    optics: Optics
+    draw: Draw
+    report_progress: ReportProgress
+    should_stop: ShouldStop
+
+    def watched(self, items: Iterable[Item], total: int, doing: str) -> Iterator[Item]:
+        """The items, telling how many were taken. Raises Cancelled once the export should stop."""
+        for done, item in enumerate(items):
+            raise_if_stopped(self.should_stop)
+            self.report_progress(done, total, doing)
+            yield item
+        self.report_progress(total, total, doing)
+
+    def views(self, zero: float | None = None) -> Iterator[ViewUpdate]:
+        """Every view of the scene's grid once, the centre first, none of them kept.
+
+        zero: the disparity (as given) that stays still, where it is to be another than the plan's; for photos only.
+        Raises Cancelled once the export should stop.
+        """
+        total = self.scene.grid.rows * self.scene.grid.columns
+        if self.loaded is None:
+            from iibr_core.formats.light_fields.registry import open_light_field
+            from iibr_core.formats.light_fields.views import read_views
+
+            made = read_views(open_light_field(Path(self.scene.source.path)))[1]
+        else:
+            from iibr_core.generation.light_field import generate
+
+            source, plan = self.scene.source, self.plan(zero)
+            disparity = plan.field_disparity(self.loaded.disparity)
+            made = generate(
+                self.loaded.photo, disparity, plan, self.should_stop, quality=source.quality, inpaint=source.inpaint
+            )
+        yield from self.watched(made, total, "making views")
+        raise_if_stopped(self.should_stop)
+
+    def plan(self, zero: float | None = None) -> ScenePlan:
+        """Of a photo's views; see `views`."""
+        plan = self.scene.plan
+        assert plan is not None, "a light field from disk has no plan"
+        if zero is None:
+            return plan
+        low, high = (value + (plan.disparity_zero - zero) * plan.disparity_scale for value in plan.disparity_range_px)
+        return replace(plan, disparity_zero=zero, disparity_range_px=(low, high))
+
+    def centre_disparity(self) -> Disparity | None:
+        """Of the centre view, px per view step; None where the scene has none."""
+        if self.loaded is not None:
+            return self.plan().field_disparity(self.loaded.disparity)
+        centre = next(self.views())
+        return None if centre.disparity is None else Disparity(centre.disparity, self.scene.name)

@@ -1,0 +1,83 @@
+"""Two pictures, for the left and the right eye, in one file: side by side, one over the other, crossed, as anaglyph."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.formats.quilts import tagged
+from viewer.app.exports.options import ExportOptions
+from viewer.app.exports.parallax import side_pictures
+from viewer.app.exports.source import ExportSource
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import Scene
+
+FULL_TAG, HALF_TAG, OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB"
+"""At the end of a file's name, for players: left first, side by side; top and bottom."""
+
+Eyes = tuple[NDArray[Any], NDArray[Any]]
+
+
+def full_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
+    """With the tag of pictures side by side."""
+    return tagged(path, FULL_TAG)
+
+
+def half_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
+    """With the tag of pictures side by side, each of half the width."""
+    return tagged(path, HALF_TAG)
+
+
+def over_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
+    """With the tag of one over the other."""
+    return tagged(path, OVER_TAG)
+
+
+def draw_eyes(source: ExportSource, options: ExportOptions, squeeze: int = 1) -> Eyes:
+    """The left eye's picture and the right one's, (H, W, 3) uint8. squeeze: the width is divided by it.
+
+    Raises InputError where what is in focus cannot be held still, Cancelled once the export should stop.
+    """
+    scene = source.scene
+    eyes = side_pictures(scene, source.optics, 2, options.eyes)
+    width, height = options.size or ScreenSize(max(round(eyes[0].aspect * scene.height), 1), scene.height)
+    size = ScreenSize(max(width // squeeze, 1), height)
+    drawn = (source.draw(eye.optics, size, eye.part) for eye in eyes)
+    left, right = source.watched(drawn, 2, "drawing")
+    return left, right
+
+
+def write_side_by_side(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """The left eye's at the left."""
+    _write(path, np.hstack(draw_eyes(source, options)))
+
+
+def write_half_side_by_side(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """The same, together as wide as one."""
+    _write(path, np.hstack(draw_eyes(source, options, squeeze=2)))
+
+
+def write_over_under(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """The left eye's on top."""
+    _write(path, np.vstack(draw_eyes(source, options)))
+
+
+def write_cross_eyed(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """The left eye's at the right, to be seen with crossed eyes."""
+    _write(path, np.hstack(draw_eyes(source, options)[::-1]))
+
+
+def write_anaglyph(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """For red-cyan glasses, the left eye's red."""
+    from iibr_core.formats.stereo import anaglyph
+
+    _write(path, anaglyph(*draw_eyes(source, options)))
+
+
+def _write(path: Path, pixels: NDArray[Any]) -> None:
+    from iibr_core.formats.images.photo import write_image
+
+    write_image(path, pixels)

@@ -1,0 +1,58 @@
+"""What a command's options say about the lens."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from iibr_core.types import InputError, ViewOffset
+
+if TYPE_CHECKING:
+    from viewer.model.actions import Action
+    from viewer.model.state.app_state import Scene
+    from viewer.model.state.optics import Optics
+
+
+@dataclass(frozen=True)
+class LensOptions:
+    """What the options say about the lens, None where they say nothing."""
+
+    view: ViewOffset | None = None
+    focus: float | None = None
+    aperture: float | None = None
+
+    def actions(self) -> list[Action]:
+        """What sets the lens so."""
+        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+
+        actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
+        actions += [] if self.focus is None else [SetFocus(self.focus)]
+        return actions + ([] if self.aperture is None else [SetAperture(self.aperture)])
+
+    def require_within(self, scene: Scene) -> None:
+        """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.
+        Where there is a single view, it is what every viewpoint shows.
+        """
+        from viewer.model.lens.limits import eye_limits
+
+        if self.view is None or scene.grid == (1, 1):
+            return
+        for axis, value, views in (("S", self.view.s, scene.grid.columns), ("T", self.view.t, scene.grid.rows)):
+            low, high = eye_limits(views)
+            if not low <= value <= high:
+                raise InputError(f"--view: {axis} is {value:g}, for {scene.name} it goes from {low:g} to {high:g}")
+
+    def notes(self, optics: Optics) -> tuple[str, ...]:
+        """What was asked for beyond what the scene has, and what was taken instead."""
+        asked = (
+            ("--focus", self.focus, optics.focus_disparity),
+            ("--aperture", self.aperture, optics.aperture_diameter),
+        )
+        return tuple(
+            f"{option} {value:g} is beyond what the scene has: {taken:g} was taken."
+            for option, value, taken in asked
+            if value is not None and value != taken
+        )
+
+
+NO_LENS_OPTIONS = LensOptions()
