@@ -34,6 +34,7 @@ from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
 from viewer.model.actions import (
     Action,
+    DismissNotice,
     DoTask,
     Notify,
     OpenFailed,
@@ -129,6 +130,8 @@ class App:
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
         self._stepped_at = 0.0
+        self._noticed: Notice | None = None
+        self._noticed_at = 0.0
         self._took_s: deque[float] = deque(maxlen=FRAMES_OF_A_CLICK)
         self._shown: Frame | None = None
         self._same_frames = 0
@@ -217,12 +220,21 @@ class App:
         actions = self._side_effects.run(self.state)
         while (result := self._comparisons.next_result()) is not None:
             actions += self.inspection_view.take(result)
+        actions += self._expire_notices(self._stepped_at)
         if self.state.motion.is_running:
             actions.append(Tick(self._stepped_at))
         actions += self._place_window()
         if self._worker.is_lost and self.state.stopped != self.state.generation == self._submitted:
             actions.append(WorkerLost())
         return actions
+
+    def _expire_notices(self, now_s: float) -> list[Action]:
+        """The newest is the one that is seen: the others' time begins when they are."""
+        notice = self.state.notices[-1] if self.state.notices else None
+        if notice is not self._noticed:
+            self._noticed, self._noticed_at = notice, now_s
+        is_over = notice is not None and now_s - self._noticed_at > notice.seconds
+        return [DismissNotice(notice)] if notice is not None and is_over else []
 
     def _place_window(self) -> list[Action]:
         """Where the window is, where that is news."""

@@ -219,6 +219,11 @@ class DismissNotice:
 
 
 @dataclass(frozen=True)
+class DismissNotices:
+    """Take all of them away."""
+
+
+@dataclass(frozen=True)
 class SetTheme:
     """Light or dark."""
 
@@ -291,6 +296,7 @@ Action = (
     | SetHover
     | Notify
     | DismissNotice
+    | DismissNotices
     | EditsSaved
     | Quit
 )

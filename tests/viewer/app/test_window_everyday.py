@@ -101,8 +101,7 @@ def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: P
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "saved")
     viewer.until_idle()
     assert viewer.app.state.optics == Optics()
-    place = [notice.offer is not None for notice in viewer.app.state.notices].index(True)
-    viewer.press(f"Use its settings##{place}", "notices")
+    viewer.press("Use its settings", "notices")
     viewer.until(lambda app: app.state.optics == wanted)
     assert not any(notice.offer for notice in viewer.app.state.notices)
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from imgui_bundle import imgui
 
+from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver
 from viewer.app.window_slot import STEP
-from viewer.model.actions import AskToSave, OpenPath, ShowPrompt, StopWork
+from viewer.model.actions import AskToSave, Notify, OpenPath, ShowPrompt, StopWork
 from viewer.model.commands import COMMANDS
-from viewer.model.state.app_state import PalettePrompt, SavePrompt, Source
+from viewer.model.state.app_state import Notice, PalettePrompt, PathPrompt, SavePrompt, Source
 
 Opener = Callable[..., Driver]
 
@@ -125,3 +128,32 @@ def test_a_second_window_does_not_open_exactly_on_the_first(open_window: Opener,
     again = WindowSlot(tmp_path)
     assert again.shift(SMALL_WINDOW) == SMALL_WINDOW
     again.close()
+
+
+def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver) -> None:
+    heights = []
+    for number in range(3):
+        viewer.app.do(Notify(Notice(f"Notice {number}, as long as the others are.")))
+        viewer.until_idle()
+        heights.append(imgui.internal.find_window_by_name("notices").size.y)
+    assert heights[2] == heights[1], "they do not pile up"
+    viewer.press("Close all (3)", "notices")
+    viewer.until(lambda app: not app.state.notices)
+
+
+def test_notices_go_by_themselves_the_newest_first(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("viewer.model.state.app_state.SHORT_NOTICE_S", 0.0)
+    viewer.app.do(Notify(Notice("It failed.", is_error=True)), Notify(Notice("Saved a.png")))
+    viewer.until(lambda app: len(app.state.notices) == 1)
+    assert viewer.app.state.notices[0].is_error, "that stays longer"
+    monkeypatch.setattr("viewer.model.state.app_state.LONG_NOTICE_S", 0.0)
+    viewer.until(lambda app: not app.state.notices)
+
+
+def test_a_photo_without_depth_has_a_button_that_opens_a_map(open_window: Opener, tmp_path: Path) -> None:
+    write_image(tmp_path / "alone.png", np.full((64, 96, 3), 100, np.uint8))
+    driver = open_window(tmp_path / "alone.png", grid=GridShape(3, 3))
+    driver.until_idle()
+    assert not any("--" in notice.text for notice in driver.app.state.notices)
+    driver.press("Open a depth map…", "notices")
+    driver.until(lambda app: app.state.prompt == PathPrompt("map"))

@@ -11,6 +11,7 @@ from viewer.model.actions import (
     AskForPath,
     AskToSave,
     DismissNotice,
+    DismissNotices,
     DoTask,
     EditsSaved,
     EndGesture,
@@ -151,6 +152,8 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return add_notice(state, notice)
         case DismissNotice(notice):
             return replace(state, notices=tuple(other for other in state.notices if other != notice))
+        case DismissNotices():
+            return replace(state, notices=())
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state

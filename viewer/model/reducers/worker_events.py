@@ -13,6 +13,7 @@ from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
 from viewer.model.state.app_state import AppState, History, Motion, Notice, Progress, Scene
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import of_next_scene
+from viewer.model.window_words import notice_in_window
 
 RECENT_KEPT = 8
 
@@ -29,7 +30,7 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
             shown = state.progress if state.stopped == state.generation else progress
             return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
-            return _leave_job(add_notice(state, Notice(message, is_error=True)))
+            return _leave_job(add_notice(state, notice_in_window(message, is_error=True)))
 
 
 def stop_work(state: AppState) -> AppState:
@@ -64,7 +65,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     if old is not None and old.source is scene.source:
         return opened
     # the same file, opened again, is new
-    notices = (*(Notice(note) for note in scene.notes), *_offers(scene))[-NOTICES_KEPT:]
+    notices = (*map(notice_in_window, scene.notes), *_offers(scene))[-NOTICES_KEPT:]
     motion = Motion(speed=state.motion.speed)
     recent = remember_recent(state.recent, scene.source.path)
     inspection = of_next_scene(state.inspection)

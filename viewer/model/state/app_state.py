@@ -136,13 +136,25 @@ class SavedSettings:
     unknown_fields: tuple[str, ...] = ()
 
 
+SHORT_NOTICE_S, LONG_NOTICE_S = 12.0, 60.0
+
+
 @dataclass(frozen=True)
 class Notice:
-    """A message the user can dismiss. offer: settings that a button beside it takes over."""
+    """A message the user can dismiss, or wait for it to go. offer: settings that a button beside it takes over.
+
+    commands: names of commands that do what it advises, a button each.
+    """
 
     text: str
     is_error: bool = False
     offer: SavedSettings | None = None
+    commands: tuple[str, ...] = ()
+
+    @property
+    def seconds(self) -> float:
+        """How long it stays: long enough to be read, and to reach for what it offers."""
+        return LONG_NOTICE_S if self.is_error or self.offer is not None or self.commands else SHORT_NOTICE_S
 
 
 LoopKind = Literal["circle", "eight", "swing"]

@@ -1,16 +1,17 @@
-"""Notices over the lower left of the picture, each with a button that takes it away, and one for what it offers; above
-them the picture that is being saved.
+"""The newest notice, over the lower left of the picture, with buttons that take it away or do what it advises; the one
+before comes up after it. Above it the picture that is being saved.
 """
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DismissNotice, DoTask, TakeSettings
+from viewer.model.actions import Action, DismissNotice, DismissNotices, DoTask, TakeSettings
+from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState, Notice
 from viewer.model.state.saving import CancelSaveTask, Saving
-from viewer.ui.style import Palette, palette_of
+from viewer.ui.style import palette_of
 
 NOTICE_WIDTH = 420.0
 LEAST_HEIGHT = 40.0
@@ -26,7 +27,7 @@ _FLAGS = (
 
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
-    """Build the notices, the newest at the bottom; what was pressed comes back as actions."""
+    """Build the newest notice; what was pressed comes back as actions."""
     if not state.notices and state.saving is None:
         return []
     margin = MARGIN * layout.ui_scale
@@ -38,13 +39,13 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     width = min(NOTICE_WIDTH * layout.ui_scale, right - margin)
     if width <= 0:
         return []
-    palette = palette_of(state.preferences.theme)
     imgui.set_next_window_pos(imgui.ImVec2(margin, bottom), 0, imgui.ImVec2(0, 1))
     most = max(bottom - margin / 2, LEAST_HEIGHT * layout.ui_scale)
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
     imgui.begin("notices", None, _FLAGS)
     actions = _saving(state.saving, layout) if state.saving is not None else []
-    actions += [action for i, notice in enumerate(state.notices) for action in _notice(i, notice, palette)]
+    if state.notices:
+        actions += _notice(state.notices[-1], state)
     imgui.end()
     return actions
 
@@ -69,15 +70,25 @@ def _saving(saving: Saving, layout: Layout) -> list[Action]:
     return actions
 
 
-def _notice(index: int, notice: Notice, palette: Palette) -> list[Action]:
-    actions: list[Action] = [DismissNotice(notice)] if imgui.button(f"×##{index}") else []
+def _notice(notice: Notice, state: AppState) -> list[Action]:
+    """The notice, what it offers, and how many more there are."""
+    palette, others = palette_of(state.preferences.theme), len(state.notices) - 1
+    actions: list[Action] = [DismissNotice(notice)] if imgui.button("×") else []
     imgui.same_line()
     imgui.begin_group()
     imgui.align_text_to_frame_padding()
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     imgui.text_wrapped(notice.text)
     imgui.pop_style_color()
-    if notice.offer is not None and imgui.button(f"Use its settings##{index}"):
+    if notice.offer is not None and imgui.button("Use its settings"):
         actions.append(TakeSettings(notice.offer))
+    for name in notice.commands:
+        if imgui.button(name):
+            actions.append(BY_NAME[name].action(state))
+        imgui.same_line()
+    if notice.commands:
+        imgui.new_line()
+    if others and imgui.button(f"Close all ({others + 1})"):
+        actions.append(DismissNotices())
     imgui.end_group()
     return actions

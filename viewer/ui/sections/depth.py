@@ -15,6 +15,7 @@ from viewer.model.lens.limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.state.app_state import AppState, ChooseTask, Scene, source_with_depth
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
+from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
 from viewer.ui.widgets import button, checkbox, choice, gap, label, last_part, quiet, slider, tooltip
 
@@ -43,7 +44,7 @@ def depth_line(scene: Scene, layout: Layout) -> None:
     origin = scene.depth_origin
     quiet(origin.line if origin is not None else f"Depth: {scene.depth_source}.")
     if origin is not None:
-        tooltip("\n".join((*origin.failures, origin.advice)).strip(), layout)
+        tooltip("\n".join(map(words_in_window, (*origin.failures, origin.advice))).strip(), layout)
 
 
 def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -66,10 +67,10 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Which source of depth is asked for, with the models that are here; advice where it is poor."""
     origin = scene.depth_origin
     if origin is not None and origin.advice:
-        quiet(origin.advice)
+        quiet(words_in_window(origin.advice))
     for failure in origin.failures if origin is not None else ():
         imgui.bullet()
-        quiet(failure)
+        quiet(words_in_window(failure))
     source = state.source
     if source is None:
         return []
@@ -167,7 +168,7 @@ def _files(state: AppState, layout: Layout) -> list[Action]:
     if button("Open map…", layout, "A disparity map for this photo: PFM, EXR, NPY or 16-bit PNG."):
         actions.append(DoTask(ChooseTask("map")))
     imgui.same_line(0, 4 * layout.ui_scale)
-    if button("Save map…", layout, "The disparity with all edits, to be opened again with --disparity."):
+    if button("Save map…", layout, "The disparity with all edits; beside the photo it is found again."):
         actions.append(AskToSave("map"))
     imgui.same_line(0, 4 * layout.ui_scale)
     is_edited = state.source is not None and state.depth.edits != DepthEdits()

@@ -1,0 +1,44 @@
+"""What the core says, in the words of the window: nobody there types options, a button does what they would.
+
+The core speaks to the command line, where `--max-pixels` is what one needs to hear.
+"""
+
+from __future__ import annotations
+
+import re
+
+from iibr_core.depth.choice import BETTER_WAYS
+from viewer.model.state.app_state import Notice
+
+DEPTH_COMMANDS = ("Open a depth map…", "Open a depth model…")
+"""What helps where depth is guessed or missing, by the names of commands."""
+
+_WORDS = (
+    (re.escape(BETTER_WAYS), "With a depth map or a depth model it is true to the scene."),
+    (r"Give a map with --disparity FILE, or put one", "Open a map, or put one"),
+    (r"give --max-pixels (\d+), or raise --memory", r"\1 pixels of it would fit"),
+    (r"at most --grid (\d+), or raise --memory or", r"at most \1 x \1 views, or"),
+    (r"raise --memory,? or ", ""),
+    (r"lower --max-pixels to (\d+)", r"open it with \1 pixels"),
+    (r" \(--max-pixels \d+\)", ""),
+    (r"the budget \(--memory\) is|--memory is", "the memory this program may take is"),
+    (r"`iibr models get ([\w.-]+)`|iibr models get ([\w.-]+)", r"the button below"),
+    (r"use --quality fast, or train them anew with `iibr train`", "install the program anew"),
+    (r"give --force to replace it, or choose", "choose"),
+    (r"--([a-z]+)-([a-z]+)", r"\1 \2"),
+    (r"--([a-z]+)", r"\1"),
+)
+_ASKS_FOR_DEPTH = re.compile(r"--disparity FILE|--depth-model|--depth model|" + re.escape(BETTER_WAYS))
+
+
+def notice_in_window(text: str, is_error: bool = False) -> Notice:
+    """A notice that says this, without options, and offers the commands that do what it advises."""
+    commands = DEPTH_COMMANDS if _ASKS_FOR_DEPTH.search(text) else ()
+    return Notice(words_in_window(text), is_error, commands=commands)
+
+
+def words_in_window(text: str) -> str:
+    """The text without options of the command line."""
+    for pattern, words in _WORDS:
+        text = re.sub(pattern, words, text)
+    return " ".join(text.split())
