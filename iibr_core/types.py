@@ -6,8 +6,9 @@ Disparity d     pixels per view step, of the view it is given for. A point seen 
                 (x - d * s, y - d * t) in view (t, s). Larger is closer; 0 is the plane that does not move.
 Pixel centres   integers in arrays (the picture spans -0.5 .. width - 0.5); + 0.5 only in GL texture coordinates.
 Rows            row 0 is the top everywhere on the CPU.
-Colour          sRGB-encoded, 1 = white, as photos are; HDR values exceed 1 on the same curve, continued. Sums of
-                light are taken in linear light (`iibr_core.color`).
+Colour          encoded by sRGB's curve, 1 = white, as photos are; HDR values exceed 1 on the same curve, continued.
+                Of the photo's own primaries (`ColorSpace`), so that none is cut off; sRGB where nothing else is said.
+                Sums of light are taken in linear light (`iibr_core.color`).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ FloatImage = NDArray[np.float32]
 """float32: (H, W) or (H, W, 3) where no other shape is given."""
 
 StoredColors = NDArray[np.uint8] | NDArray[np.float16]
-"""(H, W, 3), sRGB-encoded: uint8 for ordinary photos (255 = white), float16 for HDR ones (1 = white)."""
+"""(H, W, 3), encoded by sRGB's curve: uint8 for ordinary photos (255 = white), float16 for HDR ones (1 = white)."""
 
 
 Quality = Literal["fast", "balanced", "exact"]
@@ -81,11 +82,34 @@ def image_size(pixels: NDArray[Any]) -> ImageSize:
     return ImageSize(pixels.shape[0], pixels.shape[1])
 
 
+@dataclass(frozen=True)
+class ColorSpace:
+    """Which red, green and blue the numbers of a picture mean; their curve is sRGB's in every space.
+
+    xyz_from_linear: the rows of a matrix to XYZ under D50, the white of colour profiles (ICC.1:2022, annex E).
+    """
+
+    name: str
+    xyz_from_linear: tuple[tuple[float, float, float], ...]
+
+
+SRGB = ColorSpace(
+    "sRGB",
+    ((0.4360747, 0.3850649, 0.1430804), (0.2225045, 0.7168786, 0.0606169), (0.0139322, 0.0971045, 0.7141733)),
+)
+"""IEC 61966-2-1."""
+DISPLAY_P3 = ColorSpace(
+    "Display P3",
+    ((0.5151187, 0.2919778, 0.1571035), (0.2411892, 0.6922441, 0.0665668), (-0.0010505, 0.0418791, 0.7840713)),
+)
+"""Of phones and screens of today: SMPTE EG 432-1's primaries under D65."""
+
+
 @dataclass(frozen=True, eq=False)
 class Photo:
     """A photo as the core sees it.
 
-    pixels: (H, W, 3) float32, sRGB-encoded, finite, >= 0; `is_hdr` photos exceed 1.
+    pixels: (H, W, 3) float32, encoded by sRGB's curve, of `color_space`, finite, >= 0; `is_hdr` photos exceed 1.
     focal_px: focal length in pixels of this size. notes: what reading it changed, one sentence each, for people.
     Raises InputError for pixels that are not finite, so that no later step has to check.
     """
@@ -95,6 +119,7 @@ class Photo:
     name: str
     is_hdr: bool = False
     notes: tuple[str, ...] = ()
+    color_space: ColorSpace = SRGB
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.pixels).all():

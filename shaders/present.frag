@@ -1,7 +1,8 @@
 #version 330 core
 // Linear light to the screen: layers put together, exposure, sRGB, and the flip from row 0 first to GL's bottom up.
-// LINEAR: without sRGB, and not cut off at white.
+// LINEAR: without sRGB, and not cut off at white or 0.
 #include "srgb.glsl"
+#include "primaries.glsl"
 
 uniform sampler2D focus_layer;
 #ifdef LAYERS
@@ -39,7 +40,7 @@ void main() {
     vec4 sum = texelFetch(focus_layer, ivec2(at * vec2(textureSize(focus_layer, 0))), 0);
     vec3 light = sum.rgb / max(sum.a, 1e-12);
 #endif
-    light *= exposure;
+    light = in_target(light * exposure);
 #ifndef LINEAR
     light = srgb_from_linear(clamp(light, 0.0, 1.0));
 #endif

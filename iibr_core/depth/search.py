@@ -84,7 +84,7 @@ def open_with_depth(
     there is none; Cancelled where should_stop says so.
     """
     choice, path = choice or DepthChoice(), Path(path)
-    photo = read_photo(path, max_pixels)
+    photo = read_photo(path, max_pixels, keeps_primaries=True)
     search = _DepthSearch(path, photo, choice, max_pixels, should_stop, report_progress)
     if choice.file is not None:
         return _finish(search.of_file(Path(choice.file)), choice, grid, should_stop)
@@ -205,7 +205,7 @@ def _all_in_focus_photo(photo: Photo, data: bytes, orientation: int, max_pixels:
     """The all-in-focus picture as the photo, turned like it; the photo itself where that is damaged or another one."""
     try:
         with picture_file(data, "the all-in-focus picture") as path:
-            sharp = read_photo(path, max_pixels)
+            sharp = read_photo(path, max_pixels, keeps_primaries=True)
             pixels = upright(sharp.pixels, orientation) if read_orientation(path) == 1 else sharp.pixels
     except InputError as error:
         return replace(photo, notes=(*photo.notes, f"The blurred picture is shown: {error}"))
@@ -213,7 +213,7 @@ def _all_in_focus_photo(photo: Photo, data: bytes, orientation: int, max_pixels:
         return replace(photo, notes=(*photo.notes, "The blurred picture is shown: the sharp one has another shape."))
     focal_px = photo.focal_px * pixels.shape[1] / photo.size.width
     note = "The sharp picture that the file holds is shown, not the blurred one."
-    return replace(photo, pixels=pixels, focal_px=focal_px, notes=(*photo.notes, note))
+    return replace(photo, pixels=pixels, focal_px=focal_px, notes=(*photo.notes, note), color_space=sharp.color_space)
 
 
 def _rotate(estimate: Estimate, size: ImageSize, orientation: int) -> Estimate:

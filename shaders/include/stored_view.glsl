@@ -1,12 +1,13 @@
 // Stored views as they are, for looking at: no lens, no parallax.
 #include "srgb.glsl"
+#include "primaries.glsl"
 
 uniform sampler2DArray colors;  // rgb: square root of linear light
 uniform float exposure;         // factor
 
 // A colour on the screen from a sum of roots of light.
 vec3 shown(vec3 root) {
-    return srgb_from_linear(clamp(root * root * exposure, 0.0, 1.0));
+    return srgb_from_linear(clamp(in_target(root * root * exposure), 0.0, 1.0));
 }
 
 // What stands where a view has not come yet: grey, with lines across it.

@@ -39,7 +39,7 @@ from iibr_core.rendering import (
 )
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
-from iibr_core.types import Disparity, GridShape, ImageSize, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import DISPLAY_P3, Disparity, GridShape, ImageSize, Photo, ViewOffset, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
@@ -276,6 +276,9 @@ FINITE = {
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
     "rendering.view_synthesis.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
     "types.Disparity": lambda v, _: Disparity(depths(v), "wild"),
+    "color.photo_in_srgb": lambda v, _: (
+        color.photo_in_srgb(Photo(image(v), 20.0, "wild", color_space=DISPLAY_P3)).pixels
+    ),
     "types.Photo": lambda v, _: Photo(image(v), 20.0, "wild"),
     "rendering.visibility_weights.visibility_weights": lambda v, _: visibility_weights(found(v)),
 }
@@ -292,6 +295,8 @@ ELEMENTWISE = {
 """One wild element changes no other."""
 
 FINITE_BY_CONTRACT = {
+    "color.convert": "of a Photo, see color.photo_in_srgb",
+    "color.primaries_matrix": "of colour spaces that the reader of profiles checked",
     "color.bytes_from_encoded": "of photos and of views, as for `stored_from_encoded`",
     "generation.stored_views.encode_for_storage": "of rendered views only, as for `stored_from_encoded`",
     "color.stored_from_encoded": "made for every view; Photo and the synthesis see to it",
@@ -339,7 +344,7 @@ READS_OR_TELLS = {
     "formats.light_fields.numbered_grid": "read_numbered_grid",
     "formats.light_fields.hci": "read_hci HciWriter",
     "formats.images.downsampling": "downsampled_linear finite_pixels linear_light OddValues Rows",
-    "formats.images.color_profile": "ColorProfile UnusableProfileError color_profile color_profile_of",
+    "formats.images.color_profile": "ColorProfile UnusableProfileError color_profile color_profile_of color_space_of",
     "formats.images.avif": "is_avif read_avif avif_size",
     "formats.images.heic": "is_heic read_heic heic_size read_heic_depth describe",
     "formats.light_fields.llff": "read_llff",
@@ -378,7 +383,7 @@ READS_OR_TELLS = {
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "rendering.view_synthesis": "ViewSynthesis",
-    "types": "ViewOffset GridShape ImageSize image_size ignore_progress InputError",
+    "types": "ColorSpace ViewOffset GridShape ImageSize image_size ignore_progress InputError",
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import stored_from_encoded
+from iibr_core.color import bytes_from_encoded, convert, stored_from_encoded
 from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.runtime.extras import is_installed
-from iibr_core.types import FloatImage, GridShape, InputError, Quality, StoredColors
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, Quality, StoredColors
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.inspection_request import InspectionRequest
@@ -33,7 +33,8 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, eq=False)
 class ComparisonInputs:
-    """What requests are made from: the photo and its plan, or the stored view (H, W, 3) of a light field from disk.
+    """What requests are made from: the photo and its plan, or the stored view (H, W, 3) of a light field from disk, in
+    sRGB.
 
     quality, inpaint: of the scene's own views.
     """
@@ -43,6 +44,11 @@ class ComparisonInputs:
     plan: ScenePlan | None = None
     stored: StoredColors | None = None
     inpaint: str = DEFAULT_INPAINTER
+
+    @property
+    def color_space(self) -> ColorSpace:
+        """Of what is made from them."""
+        return SRGB if self.loaded is None else self.loaded.photo.color_space
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +134,13 @@ class ComparisonJob:
             truth = read_stored_view(open_light_field(Path(os.path.expanduser(request.truth.path))), *request.view)
             made = inputs.stored
             if made is None:
-                made = _bytes_of(self._make_view(request, inputs, inputs.quality, should_stop).colors)
+                view = self._make_view(request, inputs, inputs.quality, should_stop)
+                made = _bytes_of(view.colors, inputs.color_space)
             if truth.shape != made.shape:
                 raise InputError(f"{request.truth.path}: its views have changed; choose the folder again")
             return _bytes_of(made), _bytes_of(truth)
         fast, exact = (self._make_view(request, inputs, quality, should_stop) for quality in ("fast", "exact"))
-        return _bytes_of(fast.colors), _bytes_of(exact.colors)
+        return _bytes_of(fast.colors, inputs.color_space), _bytes_of(exact.colors, inputs.color_space)
 
     def _make_view(
         self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality, should_stop: Callable[[], bool]
@@ -191,8 +198,11 @@ class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):
             yield from self._comparison_job.results_of(request, inputs, job.should_stop)
 
 
-def _bytes_of(colors: StoredColors | FloatImage) -> Bytes:
-    """Stored or encoded colours as sRGB bytes; what exceeds white is white."""
+def _bytes_of(colors: StoredColors | FloatImage, color_space: ColorSpace = SRGB) -> Bytes:
+    """Stored or encoded colours of a space as sRGB bytes; what exceeds white is white."""
+    if color_space != SRGB:
+        white = 255 if colors.dtype == np.uint8 else 1
+        return bytes_from_encoded(convert(np.asarray(colors / white, np.float32), SRGB, color_space))
     if colors.dtype == np.uint8:
         return np.asarray(colors, np.uint8)
     return np.asarray(stored_from_encoded(colors.astype(np.float32), False), np.uint8)

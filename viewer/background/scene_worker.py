@@ -134,6 +134,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         depth_origin=loaded.origin,
         levels=loaded.levels,
         depth_models=loaded.models,
+        color_space=loaded.photo.color_space,
     )
 
 

@@ -70,14 +70,16 @@ def generate(
     new_writer.require_place(out, inputs_with_sidecar(source), force)
     require_model(choice)
 
+    from iibr_core.color import photo_in_srgb
     from iibr_core.generation.light_field import generate as generated
     from viewer.background.loaded_photo import load_photo, make_plan
 
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
+    photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
     plan = make_plan(source, loaded, depth_strength, keeps_views=False)
     total = grid.rows * grid.columns
-    views = generated(loaded.photo, plan.field_disparity(loaded.disparity), plan, inpaint=inpaint)
+    views = generated(photo_read, plan.field_disparity(loaded.disparity), plan, inpaint=inpaint)
     with (
         new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         show_progress("making views") as show,

@@ -13,7 +13,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, ViewOffset, ViewUpdate
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
@@ -181,19 +181,30 @@ class SceneView:
         return self._drawn
 
     def picture(
-        self, optics: Optics, size_px: ScreenSize, is_linear: bool = False, part: TargetWindow = WHOLE_PICTURE
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        is_linear: bool = False,
+        part: TargetWindow = WHOLE_PICTURE,
+        color_space: ColorSpace = SRGB,
     ) -> NDArray[Any]:
-        """The converged picture of any size, (height, width, 3): uint8, sRGB-encoded, or float32 linear light.
+        """The converged picture of any size, (height, width, 3): uint8, encoded, or float32 linear light.
 
-        part: what of it is drawn. Before the first view it is black. The window's own picture stays.
+        part: what of it is drawn. color_space: of the result. Before the first view it is black. The window's own
+        picture stays.
         """
-        return self.renderer.converged_picture(optics, size_px, is_linear, part)
+        return self.renderer.converged_picture(optics, size_px, is_linear, part, color_space)
 
     def start_picture(
-        self, optics: Optics, size_px: ScreenSize, is_linear: bool, part: TargetWindow = WHOLE_PICTURE
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        is_linear: bool,
+        part: TargetWindow = WHOLE_PICTURE,
+        color_space: ColorSpace = SRGB,
     ) -> PictureDrawing:
         """The same, to be drawn a step at a time; another one, or other views, stop it."""
-        return self.renderer.start_picture(optics, size_px, is_linear, part)
+        return self.renderer.start_picture(optics, size_px, is_linear, part, color_space)
 
     @property
     def note(self) -> str:
@@ -210,7 +221,9 @@ class SceneView:
         return self._drawn is None or self._drawn.views_uploaded == self.views_uploaded
 
     def _open_field(self, scene: Scene, grid: GridShape) -> None:
-        self.renderer.open_field(grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity)
+        self.renderer.open_field(
+            grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity, scene.color_space
+        )
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):

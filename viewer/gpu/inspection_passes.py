@@ -9,10 +9,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import srgb_from_linear
-from iibr_core.types import ViewOffset
+from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, srgb_from_linear
+from iibr_core.types import SRGB, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.programs import Program, ProgramCache
+from viewer.gpu.programs import Program, ProgramCache, set_primaries
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
 
@@ -75,7 +75,7 @@ class InspectionPasses:
     def draw_epi(self, field: LightFieldTexture, line: Line, size_px: ScreenSize, exposure: float) -> int:
         """One line of the picture in every view of a row or column. size_px: (width, height)."""
         name, switches = ("upright", ("UPRIGHT",)) if line.is_upright else ("across", ())
-        program, quad = self._programs.get("epi.frag", switches)
+        program, quad = self._programs.get("epi.frag", switches + _converting(field))
         places = [(row, line.view) for row in range(field.grid.rows)]
         if not line.is_upright:
             places = [(line.view, column) for column in range(field.grid.columns)]
@@ -119,7 +119,10 @@ class InspectionPasses:
         read = texture.read(alignment=1)
         self._release(texture, framebuffer)
         root = np.frombuffer(read, np.float16) if field.hdr else np.frombuffer(read, np.uint8)
-        return _encoded_from_root(root).reshape(field.height, field.width, 3)
+        encoded = _encoded_from_root(root).reshape(field.height, field.width, 3)
+        if field.color_space == SRGB:
+            return encoded
+        return bytes_from_encoded(convert(encoded_from_stored(encoded), SRGB, field.color_space))
 
     def draw_overlay(
         self,
@@ -192,7 +195,7 @@ class InspectionPasses:
     def _draw_stored(
         self, field: LightFieldTexture, layer: int, size_px: ScreenSize, exposure: float, as_stored: bool = False
     ) -> None:
-        program, quad = self._programs.get("stored_view.frag", ("AS_STORED",) if as_stored else ())
+        program, quad = self._programs.get("stored_view.frag", ("AS_STORED",) if as_stored else _converting(field))
         self._ctx.disable(moderngl.BLEND)
         self._use_colors(program, field, exposure)
         taps = min(math.ceil(max(field.width / size_px[0], field.height / size_px[1])), MAX_TAPS)
@@ -206,6 +209,7 @@ class InspectionPasses:
     def _use_colors(self, program: Program, field: LightFieldTexture, exposure: float) -> None:
         field.colors.use(0)
         program.set_uniforms(colors=0, exposure=exposure)
+        set_primaries(program, SRGB, field.color_space)
 
     def _use_image(self, name: str, size_px: ScreenSize) -> int:
         """Draw into this image from now on; a new size makes it anew."""
@@ -244,6 +248,11 @@ class InspectionPasses:
 
 def _layer(field: LightFieldTexture, row: int, column: int) -> int:
     return field.layer(row, column) if field.present[row, column] else -1
+
+
+def _converting(field: LightFieldTexture) -> tuple[str, ...]:
+    """Switches for what goes to the screen, which is sRGB."""
+    return () if field.color_space == SRGB else ("OTHER_PRIMARIES",)
 
 
 def _encoded_from_root(root: NDArray[np.uint8] | NDArray[np.float16]) -> NDArray[np.uint8]:

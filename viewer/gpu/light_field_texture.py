@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors
+from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
 
 _ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255).astype(np.uint8)
 
@@ -31,6 +31,7 @@ class LightFieldTexture:
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
     view step. blocks: RG16F, least and greatest disparity of each BLOCK_PX square. present, has_disparity: (V, U) bool.
     uploads: (V, U), how often each was stored.
+    color_space: of the light; sRGB until something else is said.
     range_px: (farthest, nearest) disparity, known from the first view that has any.
     """
 
@@ -57,6 +58,7 @@ class LightFieldTexture:
         self.has_disparity = np.zeros(grid, bool)
         self.uploads = np.zeros(grid, int)
         self.range_px = (0.0, 0.0)
+        self.color_space = SRGB
         self._dtype = np.float16 if hdr else np.uint8
         layers = self._kept.rows * self._kept.columns
         self.colors = _allocate(ctx, (width, height, layers), 4, "f2" if hdr else "f1")

@@ -14,7 +14,9 @@ from typing import Any
 
 import moderngl
 
+from iibr_core.color import primaries_matrix
 from iibr_core.runtime.resources import resource_folder
+from iibr_core.types import ColorSpace
 
 _INCLUDE = re.compile(r'\s*#include\s+"([^"]+)"')
 _UNIFORM = re.compile(r"^\s*uniform\s+\w+\s+([^;]+);", re.MULTILINE)
@@ -142,6 +144,12 @@ def _explain(message: str, stages: Mapping[str, FlatSource], fragment: str) -> s
     first = found[0][1]
     body = _MESSAGE_LINE.sub(lambda match: f"{stage.locate(int(match[1]))}:", message[found[0][0].start() :])
     return f"{first}: the shader does not compile\n{body.strip()}"
+
+
+def set_primaries(program: Program, target: ColorSpace, source: ColorSpace) -> None:
+    """Tell a program with OTHER_PRIMARIES how light of the one becomes light of the other: see shaders/include."""
+    if "target_from_source" in program.declared:
+        program.set_uniform("target_from_source", tuple(primaries_matrix(target, source).T.ravel().tolist()))
 
 
 class ProgramCache:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from safetensors import SafetensorError
 
+from iibr_core.color import photo_in_srgb
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, require_unchanged, weight_files
@@ -66,6 +67,7 @@ def estimate_with(
     """
     _require_weights(model.folder)
     require_unchanged(model.folder)
+    photo = photo_in_srgb(photo)
     report_progress(0, 0, f"looking for what {model.title} said before")
     network_input = None
     if model.package == TRANSFORMERS:

@@ -1,36 +1,32 @@
 """What a photo's numbers mean where its embedded colour profile (ICC) says that they are not sRGB.
 
 Photos carry profiles of one kind: a curve for each of red, green and blue, then a matrix (ICC.1:2022, annex F.3). They
-are computed here with all the bits that the photo has; colours that sRGB does not hold are moved to its edge.
+are computed here with all the bits that the photo has. The primaries stay the photo's own, so no colour is lost.
 """
 
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.images.oiio_reader import text_attribute
-from iibr_core.types import FloatImage
+from iibr_core.color import srgb_from_linear
+from iibr_core.formats.images.oiio_reader import FLOATING_TYPES, text_attribute
+from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, FloatImage
 
-ROWS_AT_ONCE = 64
-"""Of a photo: what comes between takes twice its memory."""
 KNOTS = 65536
 """Of a curve: one for each value of 16 bits."""
-SRGB_D50 = np.array(
-    [
-        [0.4360747, 0.3850649, 0.1430804],
-        [0.2225045, 0.7168786, 0.0606169],
-        [0.0139322, 0.0971045, 0.7141733],
-    ]
-)
-"""XYZ under profiles' white (D50, Bradford) of linear sRGB: IEC 61966-2-1 with ICC.1:2022, annex E."""
+SAME_PRIMARIES = 2e-3
+"""Of XYZ: as much as the programs that write profiles differ about sRGB's and Display P3's."""
 LEAST_DETERMINANT = 1e-4
 """Of the matrix: primaries on one line are none."""
+BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+"""Cones from XYZ (ICC.1:2022, annex E.3)."""
+D50 = np.array([0.9642, 1.0, 0.8249])
 PARAMETRIC = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}
 """Parameters of each kind of formula (ICC.1:2022, table 68)."""
 MOST_PROFILE_BYTES = 4 * 2**20
@@ -39,32 +35,48 @@ MOST_PROFILE_BYTES = 4 * 2**20
 
 @dataclass(frozen=True, eq=False)
 class ColorProfile:
-    """curves: (3, KNOTS), linear light of red, green and blue. matrix: (3, 3), linear sRGB from that."""
+    """curves: (3, KNOTS), linear light of red, green and blue. color_space: what these are."""
 
     curves: FloatImage
-    matrix: FloatImage
+    color_space: ColorSpace
 
-    def linear_srgb(self, pixels: NDArray[Any]) -> FloatImage:
-        """Linear light within sRGB, float32, of pixels (H, W, 3), uint8 or uint16."""
-        steps = (KNOTS - 1) // np.iinfo(pixels.dtype).max  # 257 or 1
-        curves = np.ascontiguousarray(self.curves[:, ::steps])
-        result = np.empty(pixels.shape, np.float32)
-        for first in range(0, len(pixels), ROWS_AT_ONCE):
-            rows = slice(first, first + ROWS_AT_ONCE)
-            light = np.stack([curves[channel][pixels[rows, :, channel]] for channel in range(3)], axis=-1)
-            np.clip(light @ self.matrix.T, 0, 1, out=result[rows])
-        return result
+    def linear(self, pixels: NDArray[Any]) -> FloatImage:
+        """Linear light of `color_space`, 0..1, float32, of pixels (H, W, 3), uint8 or uint16."""
+        return _look_up(self.curves, pixels)
+
+    def encoded(self, pixels: NDArray[Any]) -> FloatImage:
+        """The same, encoded by sRGB's curve."""
+        return _look_up(srgb_from_linear(self.curves), pixels)
 
 
 class UnusableProfileError(ValueError):
     """Damaged, or not of the kind that photos have; the message says which."""
 
 
-def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
-    """The profile in a picture's header, and a note about it; None, "" without one, or for sRGB.
+def _look_up(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
+    """(H, W, 3) of curves (3, KNOTS) at pixels (H, W, 3)."""
+    steps = (KNOTS - 1) // np.iinfo(pixels.dtype).max  # 257 or 1
+    result = np.empty(pixels.shape, np.float32)
+    for channel, curve in enumerate(curves):
+        result[..., channel] = np.ascontiguousarray(curve[::steps])[pixels[..., channel]]
+    return result
 
-    None and a note where it cannot be used: the picture counts as sRGB then.
+
+def color_space_of(spec: Any) -> ColorSpace:
+    """Of a picture's numbers: by its profile, or what OpenEXR has in its place; sRGB where it says nothing."""
+    if str(spec.format) in FLOATING_TYPES:
+        return _space_of_chromaticities(spec.getattribute("chromaticities"))
+    profile = color_profile_of(spec)[0]
+    return SRGB if profile is None else profile.color_space
+
+
+def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
+    """The profile in the header of a picture of whole numbers, and a note about it; None, "" without one, or for sRGB.
+
+    None and a note where it cannot be used: the picture counts as sRGB then. Grey has no primaries.
     """
+    if str(spec.format) in FLOATING_TYPES or spec.nchannels < 3:
+        return None, ""
     value = spec.getattribute("ICCProfile")
     name = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
     if value is None or "sRGB" in name:
@@ -72,7 +84,9 @@ def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
     profile, complaint = _read(bytes(value) if isinstance(value, np.ndarray) else b"")
     if profile is None:
         return None, f"The colour profile '{name}' {complaint} and is ignored: colours are taken as sRGB."
-    return profile, f"Colours were converted to sRGB by the photo's profile, '{name}'."
+    if profile.color_space.name not in (SRGB.name, DISPLAY_P3.name):
+        profile = replace(profile, color_space=replace(profile.color_space, name=name))
+    return profile, f"Colours are those of the photo's profile, '{name}'."
 
 
 @lru_cache(maxsize=4)  # a photo is read in many parts
@@ -97,7 +111,35 @@ def color_profile(data: bytes) -> ColorProfile:
         raise UnusableProfileError("is damaged") from error
     if not (np.isfinite(curves).all() and abs(np.linalg.det(matrix)) > LEAST_DETERMINANT):
         raise UnusableProfileError("is damaged")
-    return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), np.linalg.solve(SRGB_D50, matrix).astype(np.float32))
+    return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), _color_space(matrix))
+
+
+def _color_space(matrix: NDArray[np.float64]) -> ColorSpace:
+    """The space of these primaries; one that is known where they hardly differ."""
+    for known in (SRGB, DISPLAY_P3):
+        if np.abs(matrix - np.array(known.xyz_from_linear)).max() < SAME_PRIMARIES:
+            return known
+    red, green, blue = (tuple(map(float, row)) for row in matrix)
+    return ColorSpace("its own", (red, green, blue))  # type: ignore[arg-type]  # three numbers each
+
+
+def _space_of_chromaticities(value: Any) -> ColorSpace:
+    """Of red's, green's, blue's and white's x and y (OpenEXR's `chromaticities`), seen under D50 (Bradford); sRGB where
+    they mean nothing.
+    """
+    if not isinstance(value, tuple) or len(value) != 8:
+        return SRGB
+    xy = np.array(value, np.float64).reshape(4, 2)
+    if not (np.isfinite(xy).all() and np.abs(xy).max() < 10 and np.abs(xy[:, 1]).min() > 0):
+        return SRGB
+    xyz = np.stack([xy[:, 0] / xy[:, 1], np.ones(4), (1 - xy.sum(axis=1)) / xy[:, 1]])
+    if abs(np.linalg.det(xyz[:, :3])) < LEAST_DETERMINANT:
+        return SRGB
+    cones = BRADFORD @ np.stack([D50, xyz[:, 3]], axis=1)
+    if not (cones > 0).all():
+        return SRGB
+    adapted = np.linalg.solve(BRADFORD, (cones[:, :1] / cones[:, 1:]) * BRADFORD)
+    return _color_space(adapted @ (xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])))
 
 
 def _tags(data: bytes) -> dict[bytes, bytes]:

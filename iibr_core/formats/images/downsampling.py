@@ -56,11 +56,11 @@ def downsampled_linear(open_rows: Callable[[], Rows], size: ImageSize) -> tuple[
 
 
 def linear_light(raster: Raster) -> FloatImage:
-    """Linear light over black, (H, W, 3), of finite pixels; by the profile that comes with them."""
+    """Linear light over black, (H, W, 3), of finite pixels; by the profile that comes with them, of its space."""
     pixels = raster.pixels
     profile = color_profile_of(raster.spec)[0]
     if profile is not None and pixels.dtype.kind == "u" and pixels.shape[2] == 3:
-        linear: NDArray[Any] = profile.linear_srgb(pixels)
+        linear: NDArray[Any] = profile.linear(pixels)
     elif pixels.dtype.kind == "u":
         steps = full_scale(pixels.dtype)
         linear = linear_from_srgb(np.arange(steps + 1, dtype=np.float32) / steps)[pixels]

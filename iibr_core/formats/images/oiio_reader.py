@@ -22,6 +22,7 @@ ROWS_AT_ONCE = 64
 """Of a file without tiles: a multiple of what most strips hold."""
 MOST_PNG_SIDE = 1_000_000
 """As libpng has it."""
+FLOATING_TYPES = ("half", "float", "double")
 PNG_START = b"\x89PNG\r\n\x1a\n"
 
 
@@ -199,7 +200,7 @@ def full_scale(dtype: Any) -> int:
 
 
 def _reading_type(stored: Any) -> str:
-    if str(stored) in ("half", "float", "double"):
+    if str(stored) in FLOATING_TYPES:
         return "float"
     return "uint8" if stored.size() == 1 else "uint16"
 

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
+from iibr_core.color import bytes_from_encoded, convert, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file, shown_name
 from iibr_core.formats.images.avif import is_avif, read_avif
-from iibr_core.formats.images.color_profile import color_profile_of
+from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
 from iibr_core.formats.images.heic import is_heic, read_heic
 from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute
 from iibr_core.formats.images.oiio_writer import write_image_file
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo
+from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
@@ -33,12 +33,18 @@ PNG_SETTINGS: Mapping[str, str | int | float] = {"png:compressionLevel": 1, "png
 ENCODED_ROWS = 64
 
 
-def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float = DEFAULT_FOV_DEG) -> Photo:
+def read_photo(
+    path: Path,
+    max_pixels: int = DEFAULT_MAX_PIXELS,
+    fov_deg: float = DEFAULT_FOV_DEG,
+    keeps_primaries: bool = False,
+) -> Photo:
     """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads), HEIC or AVIF as a photo, upright,
     max_pixels large at most.
 
-    fov_deg: horizontal field of view where the file gives no focal length. Raises InputError, naming the file, if it
-    is missing, no picture, cut off, or absurdly large.
+    fov_deg: horizontal field of view where the file gives no focal length. keeps_primaries: the photo stays in the
+    colour space of its file, else it is converted to sRGB, which cuts off what that lacks. Raises InputError, naming
+    the file, if it is missing, no picture, cut off, or absurdly large.
     """
     path = Path(path)
     if max_pixels < 1:
@@ -52,6 +58,9 @@ def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float 
     else:
         linear, is_opaque, odd = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(path), size)
         encoded = _encode_in_place(linear)
+    space = color_space_of(spec)
+    if not keeps_primaries:
+        encoded, space = convert(encoded, SRGB, space), SRGB
     notes = _color_notes(spec) + _alpha_notes(is_opaque)
     if size != stored_size:
         said = f"{stored_size} to {size}"
@@ -62,7 +71,7 @@ def read_photo(path: Path, max_pixels: int = DEFAULT_MAX_PIXELS, fov_deg: float 
         focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
     else:
         focal_px *= math.sqrt(size.height * size.width / (stored_size.height * stored_size.width))
-    return Photo(pixels, focal_px, shown_name(path.stem), bool(pixels.max() > 1), notes + _odd_notes(odd))
+    return Photo(pixels, focal_px, shown_name(path.stem), bool(pixels.max() > 1), notes + _odd_notes(odd), space)
 
 
 def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | int | float] | None = None) -> None:
@@ -116,7 +125,10 @@ def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
 
     Opaque integer files without a profile pass untouched: they are encoded already.
     """
-    if raster.pixels.dtype.kind == "u" and raster.alpha is None and color_profile_of(raster.spec)[0] is None:
+    profile = color_profile_of(raster.spec)[0]
+    if raster.pixels.dtype.kind == "u" and raster.alpha is None:
+        if profile is not None and raster.pixels.shape[2] == 3:
+            return profile.encoded(raster.pixels), True, OddValues(0, 0.0)
         encoded = raster.pixels.astype(np.float32) * np.float32(1 / np.iinfo(raster.pixels.dtype).max)
         # Writable, as all other photos are: kernels are compiled once more for arrays that are not.
         whole = np.repeat(encoded, 3, axis=2) if encoded.shape[2] == 1 else encoded

@@ -10,13 +10,15 @@ import pillow_heif
 import pytest
 from PIL import Image, ImageCms
 
-from iibr_core.color import linear_from_srgb
-from iibr_core.formats.images.color_profile import ColorProfile, UnusableProfileError, color_profile
+from iibr_core.color import convert, linear_from_srgb, photo_in_srgb, srgb_from_linear
+from iibr_core.formats.images.color_profile import ColorProfile, UnusableProfileError, color_profile, color_space_of
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.types import DISPLAY_P3, SRGB
 
 P3 = ((0.51512, 0.24120, -0.00105), (0.29198, 0.69225, 0.04189), (0.15710, 0.06657, 0.78407))
 """XYZ under D50 of Display P3's red, green and blue, as in Apple's profile."""
 ADOBE = ((0.60974, 0.31111, 0.01947), (0.20528, 0.62567, 0.06087), (0.14919, 0.06322, 0.74457))
+SRGB_PRIMARIES = tuple(zip(*SRGB.xyz_from_linear))
 SRGB_CURVE = ("para", 3, (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045))
 RNG = np.random.default_rng(4)
 COLORS = RNG.integers(0, 256, (40, 60, 3), np.uint8)
@@ -80,8 +82,36 @@ def test_photos_are_converted_as_littlecms_does(tmp_path, primaries, curve):
     photo = read_photo(tmp_path / "a.png")
     difference = np.abs(255 * photo.pixels - converted(COLORS, data).astype(float))
     assert difference.max() < 1.6, "its eight bits are rounded, ours are not"
-    assert photo.notes == ("Colours were converted to sRGB by the photo's profile, 'made here'.",)
+    assert photo.notes == ("Colours are those of the photo's profile, 'made here'.",)
+    assert photo.color_space == SRGB
     assert not photo.is_hdr
+
+
+def test_photos_may_keep_their_own_primaries(tmp_path):
+    """Display P3 has sRGB's curve: its numbers then stay as they are, those that sRGB lacks too."""
+    for primaries, name in ((P3, DISPLAY_P3.name), (ADOBE, "made here"), (SRGB_PRIMARIES, SRGB.name)):
+        Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=profile_bytes(primaries))
+        photo = read_photo(tmp_path / "a.png", keeps_primaries=True)
+        assert np.abs(255 * photo.pixels - COLORS).max() < 0.1
+        assert photo.color_space.name == name
+        small = read_photo(tmp_path / "a.png", 600, keeps_primaries=True)
+        assert (small.color_space, small.size) == (photo.color_space, (20, 30))
+        expected = converted(COLORS, profile_bytes(primaries))
+        assert np.abs(255 * photo_in_srgb(photo).pixels - expected).max() < 1.6
+
+
+def test_of_an_exr_they_are_its_chromaticities(tmp_path):
+    import OpenImageIO as oiio
+
+    p3_xy = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)
+    for value, expected in ((p3_xy, DISPLAY_P3), ((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329), SRGB)):
+        spec = oiio.ImageSpec(1, 1, 3, "float")
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), value)
+        assert color_space_of(spec) == expected
+    for value in ((0.0,) * 8, (float("nan"),) * 8, (1e30,) * 8, (0.3, 0.3) * 4, (*p3_xy[:6], -1.0, 0.1)):
+        spec = oiio.ImageSpec(1, 1, 3, "float")
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), value)
+        assert color_space_of(spec) == SRGB
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.webp", "a.heic"])
@@ -116,14 +146,15 @@ def test_alpha_is_taken_over_black_in_linear_light(tmp_path):
     patch = np.full((4, 4, 4), (200, 80, 60, 128), np.uint8)
     Image.fromarray(patch).save(tmp_path / "a.png", icc_profile=profile_bytes())
     linear = linear_from_srgb(read_photo(tmp_path / "a.png").pixels)
-    opaque = color_profile(profile_bytes()).linear_srgb(patch[..., :3])
-    assert np.allclose(linear, opaque * (128 / 255), atol=1e-5)
+    opaque = linear_from_srgb(converted(patch[..., :3].copy(), profile_bytes()) / 255)
+    assert np.allclose(linear, opaque * (128 / 255), atol=4e-3)
 
 
 def test_grey_stays_grey():
     grey = np.repeat(np.arange(256, dtype=np.uint8)[:, None, None], 3, axis=2)
-    linear = color_profile(profile_bytes()).linear_srgb(grey)
-    assert np.ptp(linear, axis=2).max() < 1e-3, "the profile's own numbers are rounded"
+    linear = color_profile(profile_bytes()).linear(grey)
+    in_srgb = linear_from_srgb(convert(srgb_from_linear(linear), SRGB, DISPLAY_P3))
+    assert np.ptp(in_srgb, axis=2).max() < 1e-5
     assert np.allclose(linear[..., 1], linear_from_srgb(grey[..., 1] / 255), atol=1e-3)
 
 
@@ -179,6 +210,6 @@ def test_flipped_bytes_give_colours_or_a_refusal(seed):
     except UnusableProfileError:
         return
     assert isinstance(profile, ColorProfile)
-    linear = profile.linear_srgb(COLORS)
+    linear = profile.linear(COLORS)
     assert np.isfinite(linear).all()
     assert 0 <= linear.min() <= linear.max() <= 1

@@ -10,7 +10,7 @@ from dataclasses import field as dataclass_field
 
 import moderngl
 
-from iibr_core.types import ViewOffset
+from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.lens import WHOLE, Lens, PictureCell
@@ -157,14 +157,17 @@ class Accumulator:
         targets: RenderTargets,
         framebuffer: moderngl.Framebuffer,
         is_linear: bool,
+        color_space: ColorSpace = SRGB,
     ) -> None:
-        """Smooth what is summed up and write it. is_linear: as light, unbounded, instead of sRGB-encoded."""
+        """Smooth what is summed up and write it. is_linear: as light, unbounded, instead of encoded. color_space: of
+        the result.
+        """
         self._disable_tests()
         if accumulation.lens.keeps_layers:
             narrowing = _smoothing_spread(accumulation.lens) / math.sqrt(max(accumulation.pass_index, 1))
             self.passes.smooth(accumulation.lens, targets, min(narrowing, 1.0))
         framebuffer.use()
-        self.passes.present(accumulation.lens, targets, is_linear)
+        self.passes.present(accumulation.lens, targets, is_linear, color_space)
 
     def _draw_some(
         self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets, count: int

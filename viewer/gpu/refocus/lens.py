@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.view_sampling import UNMOVED, ApertureSample, aperture_samples
@@ -78,6 +78,7 @@ class Lens:
     pixels that one px of disparity beside the focus moves from one sample to the next. widest_blur_px: the most that
     comes to in this field. samples_across: the whole blur in units of blur_px. keeps_layers: whether light is kept
     apart by defocus and smoothed. most_sources: stored views that a pinhole view is made of. part: what is drawn.
+    color_space: of the field's light.
     """
 
     optics: Optics
@@ -95,6 +96,7 @@ class Lens:
     exposure: float
     most_sources: int
     part: TargetWindow = WHOLE_PICTURE
+    color_space: ColorSpace = SRGB
 
     @property
     def sharp_up_to_px(self) -> tuple[float, float]:
@@ -167,6 +169,7 @@ def lens_of(
         highlight_gain=0.0 if field.hdr else HIGHLIGHT_GAIN * optics.highlight_recovery * min(diameter, 1.0),
         exposure=2.0**optics.exposure_stops,
         most_sources=level.sources,
+        color_space=field.color_space,
     )
 
 

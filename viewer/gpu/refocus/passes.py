@@ -12,9 +12,9 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from iibr_core.types import ViewOffset
+from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
-from viewer.gpu.programs import Program, ProgramCache
+from viewer.gpu.programs import Program, ProgramCache, set_primaries
 from viewer.gpu.refocus.lens import WHOLE, WHOLE_PICTURE, Lens, PictureCell
 from viewer.gpu.refocus.view_sampling import (
     MAX_SOURCES,
@@ -248,11 +248,15 @@ class Passes:
             target.use()
             quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def present(self, lens: Lens, targets: RenderTargets, is_linear: bool) -> None:
-        """The finished picture, into the framebuffer in use. is_linear: as light, unbounded, not sRGB-encoded."""
+    def present(self, lens: Lens, targets: RenderTargets, is_linear: bool, color_space: ColorSpace = SRGB) -> None:
+        """The finished picture, into the framebuffer in use. is_linear: as light, unbounded, not encoded. color_space:
+        of the result.
+        """
         self._ctx.disable(moderngl.BLEND)
-        switches = lens.keeps_layers and "LAYERS", is_linear and "LINEAR"
+        converts = lens.color_space != color_space and "OTHER_PRIMARIES"
+        switches = lens.keeps_layers and "LAYERS", is_linear and "LINEAR", converts
         program, quad = self._programs.get("present.frag", tuple(switch for switch in switches if switch))
+        set_primaries(program, color_space, lens.color_space)
         targets.light.textures[0].use(0)
         program.set_uniforms(focus_layer=0, exposure=lens.exposure)
         if lens.keeps_layers:

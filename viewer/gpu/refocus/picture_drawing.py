@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
@@ -28,7 +29,8 @@ Pixels = NDArray[np.uint8 | np.float32]
 class PictureDrawing:
     """Draws a picture tile by tile into targets of its own. Call it only from the thread its context belongs to.
 
-    image: (height, width, 3), whole once `is_done`: float32 linear light, not cut off at white, or sRGB-encoded uint8.
+    image: (height, width, 3), whole once `is_done`: float32 linear light, not cut off at white or 0, or uint8, encoded
+    by sRGB's curve.
     is_stopped: by `stop`, because the field it is drawn from has changed; the image then stays unfinished.
     """
 
@@ -39,8 +41,10 @@ class PictureDrawing:
         field: LightFieldTexture,
         whole: ProgressiveAccumulation,
         is_linear: bool,
+        color_space: ColorSpace = SRGB,
     ) -> None:
-        """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun.
+        """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun. color_space: of the
+        image.
 
         Views that `field` gets from now on are not seen: all tiles show the same.
         """
@@ -52,6 +56,7 @@ class PictureDrawing:
         self._field = field.snapshot()
         self._whole = whole
         self._is_linear = is_linear
+        self._color_space = color_space
         self._tiles = picture_tiles(whole.size_px, gl.max_texture_size)
         self._tiles_done = 0
         self._under_way: ProgressiveAccumulation | None = None
@@ -102,7 +107,7 @@ class PictureDrawing:
         self._under_way = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
         pixels = STEP_S / self._gl.seconds_per_fetch if self._is_in_steps else math.inf
         yield from self._accumulator.sum_up_in_steps(self._field, accumulation, targets, pixels)
-        self._accumulator.finish(accumulation, targets, target.framebuffer, self._is_linear)
+        self._accumulator.finish(accumulation, targets, target.framebuffer, self._is_linear, self._color_space)
         yield
         drawn = read_pixels(target.framebuffer, np.float32 if self._is_linear else np.uint8)
         self.image[tile.kept] = drawn[tile.kept_of_drawn]

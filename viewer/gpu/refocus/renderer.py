@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
@@ -77,8 +77,16 @@ class Renderer:
     def adaptive(self, is_on: bool) -> None:
         self._accumulator.passes.adaptive = is_on
 
-    def open_field(self, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool) -> None:
-        """Start an empty light field of this size in place of the one before.
+    def open_field(
+        self,
+        grid: GridShape,
+        width: int,
+        height: int,
+        hdr: bool,
+        with_disparity: bool,
+        color_space: ColorSpace = SRGB,
+    ) -> None:
+        """Start an empty light field of this size in place of the one before. color_space: of its views.
 
         Where the graphics driver cannot hold all views, fewer are kept, and `note` says so. Raises InputError where it
         cannot hold a single one; the old field then stays.
@@ -87,6 +95,7 @@ class Renderer:
         if self.field is not None:
             self._stop_picture()
             self.field.release()
+        field.color_space = color_space
         self.field = field
         self._accumulation = None
 
@@ -160,26 +169,36 @@ class Renderer:
         self._learn(accumulation.done, seconds)
 
     def start_picture(
-        self, optics: Optics, size_px: ScreenSize, is_linear: bool, part: TargetWindow = WHOLE_PICTURE
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        is_linear: bool,
+        part: TargetWindow = WHOLE_PICTURE,
+        color_space: ColorSpace = SRGB,
     ) -> PictureDrawing:
         """A picture with every sample it will get, of any size, to be drawn step by step; one at a time.
 
-        is_linear: float32 linear light, not cut off at white; else sRGB-encoded uint8. part: what of the picture is
-        drawn, stretched to size_px. What was drawn last stays as it is. Another field, or another image of a view that
-        is there, stops it.
+        is_linear: float32 linear light, not cut off at white or 0; else uint8, encoded by sRGB's curve. part: what of
+        the picture is drawn, stretched to size_px. color_space: of the result. What was drawn last stays as it is.
+        Another field, or another image of a view that is there, stops it.
         """
         self._stop_picture()
         accumulator = Accumulator(self.ctx, self.programs)
         accumulator.passes.adaptive = self.adaptive
         whole = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
-        self._picture = PictureDrawing(self.gl, accumulator, self._open_field(), whole, is_linear)
+        self._picture = PictureDrawing(self.gl, accumulator, self._open_field(), whole, is_linear, color_space)
         return self._picture
 
     def converged_picture(
-        self, optics: Optics, size_px: ScreenSize, is_linear: bool, part: TargetWindow = WHOLE_PICTURE
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        is_linear: bool,
+        part: TargetWindow = WHOLE_PICTURE,
+        color_space: ColorSpace = SRGB,
     ) -> NDArray[np.uint8 | np.float32]:
         """The picture of `start_picture`, (height, width, 3), at once."""
-        drawing = self.start_picture(optics, size_px, is_linear, part)
+        drawing = self.start_picture(optics, size_px, is_linear, part, color_space)
         drawing.advance()
         self._stop_picture()
         return drawing.image

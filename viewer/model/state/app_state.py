@@ -12,7 +12,7 @@ from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import GridShape, Quality, ViewOffset
+from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ViewOffset
 from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.inspection import Inspection
@@ -70,7 +70,7 @@ class Scene:
     has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
     not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
     file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
-    view step as given. depth_models: names of those on this machine.
+    view step as given. depth_models: names of those on this machine. color_space: of its views.
     """
 
     source: Source
@@ -90,6 +90,7 @@ class Scene:
     depth_origin: DepthOrigin | None = None
     levels: Levels | None = None
     depth_models: tuple[str, ...] = ()
+    color_space: ColorSpace = SRGB
 
     @property
     def size(self) -> ScreenSize:

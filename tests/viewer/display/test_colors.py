@@ -1,0 +1,53 @@
+"""Colours that sRGB lacks, from a photo's file to the screen: only the last step cuts them off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
+from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
+from viewer.app.headless import HeadlessViewer
+from viewer.model.state.app_state import Source
+from viewer.model.state.optics import MoveEye, SetAperture
+
+PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255))
+IN_SRGB = converted(np.array([PATCHES], np.uint8), profile_bytes())[0].astype(float)
+"""By littleCMS, from Display P3: the first is (216, 69, 50)."""
+SIDE = 16
+
+
+def photo_of_patches(path, **options):
+    """Patches side by side."""
+    row = np.repeat(np.array(PATCHES, np.uint8), SIDE, axis=0)
+    Image.fromarray(np.repeat(row[None], SIDE, axis=0)).save(path, **options)
+    return Source(str(path))
+
+
+def middles(picture):
+    """The colour in the middle of each patch."""
+    return picture[SIDE // 2, SIDE // 2 :: SIDE].astype(float)
+
+
+@pytest.mark.parametrize("eye", [ViewOffset(0.0, 0.0), ViewOffset(0.5, 0.25)], ids=str)
+def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path, eye):
+    with HeadlessViewer() as viewer:
+        viewer.open(photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes()), 1.0, lambda made: None)
+        viewer.do(MoveEye(eye), SetAperture(2.0))
+        assert viewer.state.scene.color_space == DISPLAY_P3
+        assert np.abs(middles(viewer.picture()) - IN_SRGB).max() <= 2
+        size = viewer.state.scene.size
+        kept = viewer._scene_view.picture(viewer.state.optics, size, color_space=DISPLAY_P3)
+        assert np.abs(middles(kept) - PATCHES).max() <= 1
+        light = middles(viewer._scene_view.picture(viewer.state.optics, size, is_linear=True))
+        assert light.min() < -0.01, "light that sRGB lacks is not cut off where nothing asks for it"
+        stored = viewer._inspection_view._passes.read_view(viewer._scene_view.renderer.field, 0, 0)
+        assert np.abs(middles(stored) - IN_SRGB).max() <= 3
+
+
+def test_srgb_photos_are_not_touched(tmp_path):
+    with HeadlessViewer() as viewer:
+        viewer.open(photo_of_patches(tmp_path / "plain.png"), 1.0, lambda made: None)
+        assert viewer.state.scene.color_space == SRGB
+        assert np.array_equal(middles(viewer.picture()), PATCHES)
