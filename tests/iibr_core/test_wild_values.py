@@ -336,6 +336,7 @@ READS_OR_TELLS = {
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar sidecars_of map_to_read flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
+    "formats.animations": "even_size require_video_size write_animation",
     "formats.quilts": "Quilt quilt_for lay_out tagged",
     "formats.stereo": "anaglyph",
     "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",

@@ -13,7 +13,7 @@ from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import never
 from iibr_core.types import InputError, ViewOffset
-from viewer.app.exports.options import ExportOptions
+from viewer.app.exports.options import ANIMATIONS, AnimationKind, ExportOptions
 from viewer.app.exports.registry import (
     EXPORTS,
     ExportKind,
@@ -54,13 +54,12 @@ from viewer.cli.options import (
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import LOOPS, LoopKind
 
 if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
     from viewer.model.state.app_state import Scene, Source
 
-ABOUT_EXPORTS = ("view", "focus", "aperture", "size", "device", "eyes", "motion", "frames", "rate")
+ABOUT_EXPORTS = ("view", "focus", "aperture", "size", "device", "eyes", "motion", "keys", "frames", "rate")
 """Options that some kinds heed and others do not."""
 MOST_FRAMES, MOST_RATE = 10_000, 240.0
 
@@ -80,12 +79,12 @@ def device_from_text(text: str) -> str:
     return text
 
 
-def motion_from_text(text: str) -> LoopKind:
-    """A motion, by name. Raises BadParameter."""
-    for loop in LOOPS:
-        if text == loop:
-            return loop
-    raise typer.BadParameter(f"{text!r} is no motion: give {' or '.join(LOOPS)}")
+def motion_from_text(text: str) -> AnimationKind:
+    """What moves in an animation, by name. Raises BadParameter."""
+    for motion in ANIMATIONS:
+        if text == motion:
+            return motion
+    raise typer.BadParameter(f"{text!r} is no motion: give {', '.join(ANIMATIONS)}")
 
 
 def rate_from_text(text: str) -> float:
@@ -133,10 +132,12 @@ def export(
         ),
     ] = None,
     motion: Annotated[
-        LoopKind | None,
-        typer.Option(
-            parser=motion_from_text, metavar="|".join(LOOPS), help="Path of the viewpoint.", show_default="circle"
-        ),
+        AnimationKind | None,
+        typer.Option(parser=motion_from_text, metavar="|".join(ANIMATIONS), help="What moves.", show_default="circle"),
+    ] = None,
+    keys: Annotated[
+        Path | None,
+        typer.Option("--path", metavar="FILE", help="Keys of a path of your own, a line each: s t [focus [aperture]]."),
     ] = None,
     frames: Annotated[
         int | None, typer.Option(min=1, max=MOST_FRAMES, help="Of an animation, or pictures of a stack.")
@@ -177,11 +178,15 @@ def export(
     require_ending(to, output)
     if to.needs:
         require_extra("export", *to.needs)
-    inputs = inputs_with_sidecar(source)
+    inputs = inputs_with_sidecar(source, keys)
+    if keys is not None:
+        from viewer.app.exports.animation import read_keys
+
+        read_keys(keys)
     if not to.path:
         require_export_place(to, output, inputs, force)
     require_model(choice)
-    options = ExportOptions(size, device, eyes, motion, frames, rate)
+    options = ExportOptions(size, device, eyes, motion, keys, frames, rate)
     target = output
 
     def require_place(scene: Scene) -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from viewer.model.state.app_state import Scene
 
 PICTURE = (".png",)
+MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
 EYES = ("focus", "aperture", "size", "eyes")
 
 
@@ -56,6 +57,11 @@ EXPORTS = {
     "over-under": ExportKind("Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path"),
     "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES),
     "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES),
+    "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",)),
+    "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",)),
+    "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING),
+    "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING),
+    "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING),
 }  # fmt: skip
 """By the name that people type."""
 

@@ -1,0 +1,46 @@
+"""`iibr export`, as a user runs it: what it writes, what it says, what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from tests.viewer.cli.test_cli import run
+
+
+def test_a_drawn_kind(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "a.gif"
+    words = ("--to", "gif", "-o", out, "--grid", 3, "--frames", 3, "--motion", "swing", "--size", "30x20")
+    assert run(monkeypatch, "export", photo_path, *words) == 0
+    assert capsys.readouterr().out.splitlines() == [str(out)]
+    with Image.open(out) as image:
+        assert (image.size, image.n_frames) == ((30, 20), 3)  # type: ignore[attr-defined]
+
+
+def test_the_name_that_is_written_is_the_one_that_must_not_be_there(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "new"
+    out.mkdir()
+    words = ("export", photo_path, "--to", "half-sbs", "-o", out / "a.png", "--grid", 3)
+    assert run(monkeypatch, *words) == 0
+    assert capsys.readouterr().out.splitlines() == [str(out / "a_LRF_Half_SBS.png")]
+    before = (out / "a_LRF_Half_SBS.png").read_bytes()
+    assert run(monkeypatch, *words) == 2
+    assert "--force" in capsys.readouterr().err
+    assert [(path.name, path.read_bytes()) for path in out.iterdir()] == [("a_LRF_Half_SBS.png", before)]
+
+
+def test_what_is_read_as_keys_is_not_written_onto(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    keys = tmp_path / "keys.gif"
+    keys.write_text("0 0\n0 1\n")
+    words = ("export", photo_path, "--to", "gif", "-o", keys, "--path", keys, "--force")
+    assert run(monkeypatch, *words) == 2
+    assert "keys.gif" in capsys.readouterr().err
+    assert keys.read_text() == "0 0\n0 1\n"

@@ -1,0 +1,123 @@
+"""Animations: the viewpoint on its loops, the focus or the aperture going and coming back, or a path of the user's own.
+
+Every path is closed: the last frame leads to the first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.formats.animations import VIDEOS, even_size, require_video_size, write_animation
+from iibr_core.formats.files import open_binary
+from iibr_core.types import ImageSize, InputError, ViewOffset
+from viewer.app.exports.options import AnimationKind, ExportOptions
+from viewer.app.exports.source import ExportSource
+from viewer.model.layout import ScreenSize
+from viewer.model.lens.limits import aperture_limit, clamp_optics
+from viewer.model.reducers.camera_motion import point_on_loop
+from viewer.model.state.app_state import Scene
+from viewer.model.state.optics import Optics
+
+USUAL_SECONDS = 4.0
+USUAL_RATE = {".gif": 15.0, ".png": 15.0, ".webp": 25.0}
+"""Where it is another than USUAL_VIDEO_RATE: what compresses little has fewer frames, and smaller ones."""
+USUAL_VIDEO_RATE = 30.0
+USUAL_WIDTH_PX = {".gif": 480, ".png": 480, ".webp": 960}
+OPENED = 0.8
+"""Of the widest aperture, for motions that need an open one."""
+MOST_PATH_BYTES = 1_000_000
+MOST_KEYS = 1000
+
+
+def write_motion(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Raises InputError where it cannot be written, Cancelled once the export should stop."""
+    kind = path.suffix.lower()
+    rate = options.rate or USUAL_RATE.get(kind, USUAL_VIDEO_RATE)
+    count = options.frames or max(round(USUAL_SECONDS * rate), 2)
+    size = options.size or _usual_size(source.scene, kind)
+    require_video_size(path, ImageSize(size.height, size.width))
+    optics = optics_on_path(source.scene, source.optics, options, count)
+    drawn = (source.draw(each, size) for each in optics)
+    frames = source.watched(drawn, count, "drawing frames")
+    write_animation(path, frames, ImageSize(size.height, size.width), rate)
+
+
+def optics_on_path(scene: Scene, optics: Optics, options: ExportOptions, count: int) -> list[Optics]:
+    """So many, evenly spread over one turn of a closed path. Raises InputError for a path that cannot be read."""
+    turns = [k / count for k in range(count)]
+    if options.keys is not None:
+        keys = read_keys(options.keys)
+        if any(not _is_within(scene, _between(keys, k / len(keys), optics)) for k in range(len(keys))):
+            raise InputError(f"{options.keys}: a key lies beyond what {scene.name} has; take smaller numbers")
+        return [clamp_optics(_between(keys, turn, optics), scene) for turn in turns]
+    motion = options.motion or "circle"
+    return [_on_motion(scene, optics, motion, turn) for turn in turns]
+
+
+def read_keys(path: Path) -> list[tuple[float, ...]]:
+    """A path of the user's own: a text with a line a key, "s t focus aperture", the last two as they are where they are
+    left out; # begins a comment. Raises InputError.
+    """
+    with open_binary(path) as file:
+        text = file.read(MOST_PATH_BYTES).decode("utf-8", "replace")
+    keys: list[tuple[float, ...]] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.split("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        try:
+            values = tuple(map(float, words))
+        except ValueError:
+            values = ()
+        if not 2 <= len(values) <= 4 or not all(map(math.isfinite, values)):
+            raise InputError(f"{path}: line {number} is no key; give numbers: s t [focus [aperture]]")
+        keys.append(values)
+    if not 1 <= len(keys) <= MOST_KEYS:
+        raise InputError(f"{path}: holds {len(keys)} keys; give 1 to {MOST_KEYS} lines: s t [focus [aperture]]")
+    return keys
+
+
+def _between(keys: Sequence[tuple[float, ...]], turn: float, optics: Optics) -> Optics:
+    """On the closed Catmull-Rom spline through the keys; what a key leaves out is the optics'."""
+    whole = np.array([(*key, optics.focus_disparity, optics.aperture_diameter)[:4] if len(key) == 2 else
+                      (*key, optics.aperture_diameter)[:4] for key in keys])  # fmt: skip
+    at = turn * len(keys)
+    first, x = int(at), at - int(at)
+    a, b, c, d = (whole[(first + i) % len(keys)] for i in (-1, 0, 1, 2))
+    s, t, focus, aperture = b + x / 2 * (c - a + x * (2 * a - 5 * b + 4 * c - d + x * (3 * (b - c) + d - a)))
+    return replace(
+        optics,
+        eye=ViewOffset(float(t), float(s)),
+        focus_disparity=float(focus),
+        aperture_diameter=max(float(aperture), 0.0),
+    )
+
+
+def _is_within(scene: Scene, optics: Optics) -> bool:
+    allowed = clamp_optics(optics, scene)
+    asked, taken = ((*o.eye, o.focus_disparity, o.aperture_diameter) for o in (optics, allowed))
+    return np.allclose(asked, taken, atol=1e-6)
+
+
+def _on_motion(scene: Scene, optics: Optics, motion: AnimationKind, turn: float) -> Optics:
+    wave = (1 - math.cos(2 * math.pi * turn)) / 2
+    opened = optics.aperture_diameter or OPENED * aperture_limit(scene.grid)
+    match motion:
+        case "focus":
+            far, near = scene.disparity_range_px
+            return replace(optics, focus_disparity=near + wave * (far - near), aperture_diameter=opened)
+        case "aperture":
+            return replace(optics, aperture_diameter=wave * opened)
+    return replace(optics, eye=point_on_loop(motion, turn, scene.grid))
+
+
+def _usual_size(scene: Scene, kind: str) -> ScreenSize:
+    width = min(scene.width, USUAL_WIDTH_PX.get(kind, scene.width))
+    size = ImageSize(max(round(scene.height * width / scene.width), 1), width)
+    height, width = even_size(size) if kind in VIDEOS else size
+    return ScreenSize(width, height)
