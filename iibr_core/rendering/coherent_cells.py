@@ -194,8 +194,9 @@ def backward_warp(
                         d = guess[i]
                         source_x = min(max(left + i + d * s, 0.0), last_u)
                         source_y = min(max(first_row + row + d * t, 0.0), last_v)
-                        u, v = np.uint64(source_x), np.uint64(source_y)
-                        fx, fy = source_x - u, source_y - v
+                        column, line = int(source_x), int(source_y)
+                        fx, fy = source_x - column, source_y - line
+                        u, v = np.uint64(column), np.uint64(line)
                         upper = (1 - fx) * surface[v, u] + fx * surface[v, u + ONE]
                         lower = (1 - fx) * surface[v + ONE, u] + fx * surface[v + ONE, u + ONE]
                         guess[i] = upper + fy * (lower - upper)

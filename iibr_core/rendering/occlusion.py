@@ -48,7 +48,10 @@ def _covered(weights):
     result = np.empty((rows, width), np.float32)
     for row in range(rows):
         for x in range(width):
-            result[row, x] = _coverage(weights, row, x)
+            # Most rays: the first surface covers them, and the others have no share.
+            result[row, x] = 1.0
+            if weights[0, row, x] < 1.0:
+                result[row, x] = _coverage(weights, row, x)
     return result
 
 

@@ -36,7 +36,7 @@ def resample_colors(
 ) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
     """Colours (N, W, 3), sRGB-encoded, of target rays; disparity (N, W) and source (N, W) of the heaviest candidates.
 
-    Rays without candidates, or not wanted (N, W), are black at disparity 0 of source 0.
+    Rays without candidates, or not wanted (N, W), are black; the former at disparity 0 of source 0.
     """
     shape = candidates.count.shape
     colors, disparity = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
@@ -56,11 +56,11 @@ def resample_colors(
     return colors, disparity, source
 
 
-def heaviest_candidate(candidates: Candidates, weights: FloatImage) -> tuple[FloatImage, NDArray[np.uint8]]:
-    """Disparity and source, each (N, W), of the heaviest candidates; 0 where there is none."""
-    disparity, source = np.zeros(candidates.count.shape, np.float32), np.zeros(candidates.count.shape, np.uint8)
-    _heaviest(candidates.count, candidates.disparity, candidates.source, weights, disparity, source)
-    return disparity, source
+def heaviest_candidate(
+    rays: RaySet, candidates: Candidates, weights: FloatImage
+) -> tuple[FloatImage, NDArray[np.uint8]]:
+    """Disparity and source of `resample_colors`, without the colours."""
+    return resample_colors(rays, candidates, weights, np.zeros(candidates.count.shape, np.bool_))[1:]
 
 
 @kernel
@@ -201,27 +201,32 @@ def _gather_plain(
 ):  # fmt: skip
     """What `_gather` does, for the rays that are easiest, and most: one candidate, no edge and no border near it.
 
-    They are struck off from remaining. This is `cubic` written out, in single precision and without tests.
+    They are struck off from remaining. This is `cubic` written out, in single precision and without tests. All rays
+    with one candidate get their disparity and source.
     """
     _, height, width, _ = images.shape
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
-            if count[row, x] != 1 or not remaining[row, x]:
+            if count[row, x] != 1:
+                continue
+            d, k = candidate_disparity[row, x], np.uint64(candidate_source[row, x])
+            disparity[row, x], source[row, x] = d, k
+            if not remaining[row, x]:
                 continue
             # Backward warp: the point of the source that this ray shows.
-            d, k = candidate_disparity[row, x], np.uint64(candidate_source[row, x])
             source_x, source_y = x + d * offsets[k, 1], first_row + row + d * offsets[k, 0]
             # All 16 taps inside the picture and on one surface.
             if not (1 <= source_x < width - 2 and 1 <= source_y < height - 2):
                 continue
-            u, v = np.uint64(source_x), np.uint64(source_y)
+            # By way of signed integers: from and to floats those are converted faster.
+            left, top = int(source_x), int(source_y)
+            u, v = np.uint64(left), np.uint64(top)
             if edge_level[k, v, u] > limits[k]:
                 continue
             remaining[row, x] = False
-            disparity[row, x], source[row, x] = d, k
             # Separable: along the rows, then across them. Single precision is far finer than an 8-bit step.
-            x0, x1, x2, x3 = _keys_single(np.float32(source_x - u))
-            y0, y1, y2, y3 = _keys_single(np.float32(source_y - v))
+            x0, x1, x2, x3 = _keys_single(np.float32(source_x - left))
+            y0, y1, y2, y3 = _keys_single(np.float32(source_y - top))
             for c in range(3):
                 colors[row, x, c] = max(
                     y0 * (x0 * images[k, v - ONE, u - ONE, c] + x1 * images[k, v - ONE, u, c]
@@ -246,7 +251,7 @@ def _gather(
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
             used = np.int64(count[row, x])
-            if used == 0 or not wanted[row, x]:
+            if used < 2 and not (used == 1 and wanted[row, x]):
                 continue
             # Weights of a ray sum to what is covered of it; the heaviest candidate gives its disparity and source.
             total, heavy = 0.0, 0
@@ -256,6 +261,8 @@ def _gather(
                     heavy = k
             disparity[row, x] = candidate_disparity[heavy, row, x]
             source[row, x] = candidate_source[heavy, row, x]
+            if not wanted[row, x]:
+                continue
             sole = weights[heavy, row, x] >= SOLE * total
             sum_r = sum_g = sum_b = 0.0
             # Colours: the sum of w_k c_k over w_k > 0 (the paper's equation 1).
@@ -287,19 +294,3 @@ def _gather(
             if not sole:
                 sum_r, sum_g, sum_b = srgb_scalar(sum_r), srgb_scalar(sum_g), srgb_scalar(sum_b)
             colors[row, x, 0], colors[row, x, 1], colors[row, x, 2] = sum_r, sum_g, sum_b
-
-
-@kernel
-def _heaviest(count, candidate_disparity, candidate_source, weights, disparity, source):
-    for row in range(count.shape[0]):
-        for x in range(count.shape[1]):
-            used = np.int64(count[row, x])
-            if used == 0:
-                continue
-            # The first of equals, as in `_gather`.
-            heavy = 0
-            for k in range(1, used):
-                if weights[k, row, x] > weights[heavy, row, x]:
-                    heavy = k
-            disparity[row, x] = candidate_disparity[heavy, row, x]
-            source[row, x] = candidate_source[heavy, row, x]

@@ -32,7 +32,7 @@ from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import MOSTLY_COVERED, WHOLE, covered_share, entropy, occlusion_mask
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
-from iibr_core.rendering.resampling import OWN_SURFACE_PX, heaviest_candidate, resample_colors
+from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
@@ -291,7 +291,6 @@ class ViewSynthesis:
         raise_if_stopped(self._should_stop)
         undecided = None
         if self._transformer:
-            disparity, source = heaviest_candidate(candidates, weights)
             undecided = find_undecided_rays(
                 rays, candidates, weights, (disparity, source), (inner.start, inner.stop), self._every,
                 self._hypotheses, occluded | (share < WHOLE),

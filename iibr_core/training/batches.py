@@ -124,7 +124,7 @@ def ambiguous_rays_of_view(
     weights = visibility_weights(candidates)
     inner = above, above + rows[1] - rows[0]
     return find_ambiguous_rays(
-        rays, candidates, weights, heaviest_candidate(candidates, weights), inner, every, hypotheses
+        rays, candidates, weights, heaviest_candidate(rays, candidates, weights), inner, every, hypotheses
     )
 
 

@@ -237,7 +237,9 @@ FINITE = {
     ],
     "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
     "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0, 1)),
-    "rendering.resampling.heaviest_candidate": lambda v, _: resampling.heaviest_candidate(found(v), shown(v)[0]),
+    "rendering.resampling.heaviest_candidate": lambda v, _: resampling.heaviest_candidate(
+        rays(v), found(v), shown(v)[0]
+    ),
     "rendering.resampling.resample_colors": lambda v, _: shown(v)[1],
     "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
         image(0.5), known(v), 0.5
