@@ -27,8 +27,10 @@ from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
 from viewer.background.comparison_worker import ComparisonWorker
 from viewer.background.jobs import Failed, ProgressReport
-from viewer.background.scene_worker import SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
+from viewer.background.read_ahead import PhotoAhead, PhotosAhead, photos_within_budget
+from viewer.background.scene_worker import PhotosFound, SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
 from viewer.display.depth_preview import DepthPreview
+from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
@@ -55,11 +57,14 @@ from viewer.model.inspection_request import (
 )
 from viewer.model.layout import Layout, layout_of
 from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
+from viewer.model.reducers.folder import photos_ahead
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask
+from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask, source_beside
 from viewer.model.state.depth_editing import DepthSettings, DropStroke
+from viewer.model.state.folder import ShowFilmstrip
 from viewer.model.state.inspection import Probed
 from viewer.ui.host import UiHost
+from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.screen import build_screen
 from viewer.ui.style import Look
 
@@ -122,6 +127,8 @@ class App:
         self._depth = DepthPreview(self.scene_view)
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
+        self._filmstrip = FilmstripView(self._gl, wake)
+        self._ahead = PhotosAhead(wake)
         self._worker = SceneWorker(wake)
         self._side_effects = SideEffects(self.scene_view, wake)
         self._kept_in = kept_in
@@ -158,7 +165,8 @@ class App:
         self._ui.begin(layout, look, sum(self._took_s))
         pointer = read_pointer()
         actions = gesture_start(pointer, self.state)
-        actions += build_screen(self.state, layout, self.scene_view.texture if picture else None, textures)
+        thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
+        actions += build_screen(self.state, layout, self.scene_view.texture if picture else None, textures, thumbnails)
         actions += self._input(pointer, layout)
         self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages))
         self.do(*actions)
@@ -166,6 +174,7 @@ class App:
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self._is_busy |= bool(actions) or self._side_effects.is_drawing
         self._direct_worker()
+        self._read_ahead()
         self._keep_recent()
         self._took_s.append(time.perf_counter() - start)
 
@@ -196,10 +205,12 @@ class App:
         """Stop the worker, keep what is kept, and free everything. A file that is being written is finished first."""
         self.window.hide()
         self._worker.close()
+        self._ahead.close()
         self._comparisons.close()
         self._keep()
         self._side_effects.close()
         self._ui.release()
+        self._filmstrip.release()
         self.inspection_view.release()
         self.scene_view.release()
         self._gl.release()
@@ -256,6 +267,8 @@ class App:
                 return [ProgressMade(result.id, result.progress)]
             case Failed():
                 return [OpenFailed(result.id, result.message)]
+            case PhotosFound():
+                return [OpenPath(source_beside(self.state.source, result.path)), ShowFilmstrip(True)]
         try:
             return self._take_views(result)
         except InputError as error:  # no room on the graphics card: there is no use in more views
@@ -310,11 +323,33 @@ class App:
         loaded = self.scene_view.loaded if scene and scene.source is self.state.source else None
         if self.state.stroke is not None:
             return  # it will be another one
+        source, strength = self.state.source, self.state.depth_strength
+        if loaded is None and self._ahead.is_reading(source):
+            self._worker.cancel()
+            return  # it is nearly there
+        ahead = self._ahead.take(source, strength) if loaded is None else None
+        if loaded is None:
+            self._keep_left()
         self._submitted, self._depth_settings = self.state.generation, depth_settings_for_worker(self.state)
-        strength = self.state.depth_strength
+        loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (loaded, None)
         self._worker.submit(
-            SceneRequest(self.state.generation, self.state.source, strength, loaded, self._depth_settings)
+            SceneRequest(self.state.generation, source, strength, loaded, self._depth_settings, plan=plan)
         )
+
+    def _keep_left(self) -> None:
+        """The photo that is left may be gone back to."""
+        scene, loaded = self.state.scene, self.scene_view.loaded
+        if scene is None or scene.plan is None or loaded is None:
+            return
+        if loaded.depth_settings == DepthSettings(scene.source.depth.refine):
+            self._ahead.keep(PhotoAhead(scene.source, self.state.depth_strength, loaded, scene.plan))
+
+    def _read_ahead(self) -> None:
+        """What is likely to be opened next, once there is something to look at."""
+        scene = self.state.scene
+        if scene is not None and scene.source is self.state.source:
+            wanted = photos_ahead(self.state)[: photos_within_budget(scene)]
+            self._ahead.want(wanted, self.state.depth_strength)
 
     def _preview_depth(self) -> None:
         """While depth is edited, show it; the views of what it was before need not be made."""

@@ -18,6 +18,7 @@ from iibr_core.types import InputError
 from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
 from viewer.model.reducers.worker_events import RECENT_KEPT
 from viewer.model.state.app_state import SECTIONS, AppState, Notice, Preferences, Section, Theme
+from viewer.model.state.folder import FolderOrder
 
 PREFERENCES_FILE = "preferences.json"
 RECENT_FILE = "recent.json"
@@ -124,6 +125,12 @@ def _place(kept: Any) -> tuple[int, int, int, int] | None:
     return (x, y, width, height) if is_possible else None
 
 
+def _folder_order(kept: Any) -> FolderOrder:
+    if kept not in ("name", "time"):
+        raise ValueError
+    return "time" if kept == "time" else "name"
+
+
 def _yes_or_no(kept: Any) -> bool:
     if not isinstance(kept, bool):
         raise ValueError
@@ -136,6 +143,8 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "open_sections": _sections,
     "window": _place,
     "is_maximized": _yes_or_no,
+    "shows_filmstrip": _yes_or_no,
+    "folder_order": _folder_order,
 }
 
 

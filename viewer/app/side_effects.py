@@ -19,6 +19,7 @@ from viewer.app.picture_saver import PictureSaver, refusal
 from viewer.app.save_places import inputs_of_scene, map_path
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
+from viewer.background.photo_folder import list_photos
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
@@ -33,6 +34,7 @@ from viewer.model.state.app_state import (
     SaveTask,
     Task,
 )
+from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
 from viewer.model.state.optics import ApertureMask, SetApertureShape
 from viewer.model.state.saving import CancelSaveTask
@@ -92,6 +94,8 @@ class SideEffects:
                 self._submit(partial(_read_mask, self._masks[-1]))
             case ReadTruthTask(path):
                 self._submit(partial(read_truth, path))
+            case ListFolderTask(path):
+                self._submit(partial(list_photos, path))
             case SaveTask(what="map"):
                 return self._save_map(task, state)
             case SaveTask():
@@ -159,6 +163,8 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
     match result.value:
         case ApertureMask() as mask:
             return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
+        case FolderListed() as listed:
+            return [listed]
         case GroundTruth() as truth:
             return [TruthRead(truth)]
         case SavedMap(sentence, edits):

@@ -22,6 +22,7 @@ from iibr_core.runtime.machine import memory_bytes
 from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
+from viewer.background.photo_folder import first_photo
 from viewer.model.state.app_state import Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.optics import CENTRE
@@ -34,7 +35,8 @@ UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 class SceneRequest:
     """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says.
 
-    takes_drafts: views may come twice, so that there is something to look at soon; else each comes once, final.
+    plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something to
+    look at soon; else each comes once, final.
     """
 
     generation: int
@@ -43,6 +45,7 @@ class SceneRequest:
     loaded: LoadedPhoto | None = None
     depth_settings: DepthSettings | None = None
     takes_drafts: bool = True
+    plan: ScenePlan | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,15 @@ class ViewReady:
     progress: Progress
 
 
-SceneResult = SceneReady | ViewReady | ProgressReport[int] | Failed[int]
+@dataclass(frozen=True)
+class PhotosFound:
+    """The folder asked for is none of views but of photos; path: of the first."""
+
+    generation: int
+    path: str
+
+
+SceneResult = SceneReady | ViewReady | PhotosFound | ProgressReport[int] | Failed[int]
 SceneWork = Callable[[SceneRequest, Callable[[], bool], Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
 """What a job does: (request, should_stop, where the user looks) -> its results, in order. See `results_of`."""
 
@@ -85,6 +96,9 @@ class SceneWorker(JobThread[SceneRequest, SceneResult]):
         def report_progress(progress: Progress) -> None:
             job.post(ProgressReport(job.request.generation, progress))
 
+        source = Path(job.request.source.path)
+        if is_folder(source) and (photo := first_photo(source)) is not None:
+            return iter((PhotosFound(job.request.generation, str(photo)),))
         if self._scene_work is not None:
             return iter(self._scene_work(job.request, job.should_stop, lambda: self.eye))
         return results_of(job.request, job.should_stop, lambda: self.eye, report_progress)
@@ -165,7 +179,7 @@ def _results_of_photo(
         if request.loaded is None
         else apply_depth_settings(request.loaded, depth_settings, should_stop)
     )
-    plan = make_plan(source, loaded, request.depth_strength)
+    plan = request.plan or make_plan(source, loaded, request.depth_strength)
     disparity = plan.field_disparity(loaded.disparity)
     colors = stored_from_encoded(loaded.photo.pixels, loaded.photo.is_hdr)
     centre = ViewUpdate(*plan.grid.centre, colors, disparity.values)

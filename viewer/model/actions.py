@@ -22,6 +22,7 @@ from viewer.model.state.app_state import (
     Theme,
 )
 from viewer.model.state.depth_editing import DepthAction
+from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.optics import LensAction
 from viewer.model.state.saving import SavingChanged
@@ -276,6 +277,7 @@ Action = (
     | PreferencesAction
     | InspectionAction
     | DepthAction
+    | FolderAction
     | ShowTiltHandles
     | SetDepthStrength
     | TakeSettings

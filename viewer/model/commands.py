@@ -41,6 +41,7 @@ from viewer.model.state.app_state import (
     source_with_map,
 )
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
+from viewer.model.state.folder import SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import (
     COMPARISONS,
     OVERLAYS,
@@ -55,6 +56,15 @@ from viewer.model.state.inspection import (
 from viewer.model.state.optics import ApplyPreset, ResetOptics
 
 FONT_STEP = 1.1
+KEY_WORDS = {
+    "equal": "+",
+    "minus": "−",
+    "_0": "0",
+    "space": "Space",
+    "page_down": "Page down",
+    "page_up": "Page up",
+}
+"""Of ImGui's names for keys, those that people write otherwise."""
 COMPARE_WORDS: dict[Comparison, str] = {
     "photo": "Compare photo and picture",
     "quality": "Compare fast and exact",
@@ -75,7 +85,7 @@ class Chord:
     @property
     def words(self) -> str:
         """As people write it: "Ctrl+Shift+Z"."""
-        key = {"equal": "+", "minus": "−", "_0": "0", "space": "Space"}.get(self.key, self.key.upper())
+        key = KEY_WORDS.get(self.key, self.key.upper())
         return "Ctrl+" * self.ctrl + "Shift+" * self.shift + key
 
 
@@ -129,6 +139,11 @@ COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
     Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
     Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
+    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),)),
+    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),)),
+    Command("Filmstrip", lambda state: ShowFilmstrip(not state.preferences.shows_filmstrip), (Chord("f"),)),
+    Command("Photos by name", _always(SetFolderOrder("name"))),
+    Command("Photos by time", _always(SetFolderOrder("time"))),
     Command("Undo", _always(Undo()), (Chord("z", ctrl=True),)),
     Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True))),
     Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.layout import NOTHING_BESIDE, Beside, Rect
+from viewer.model.layout import Beside, Rect
 from viewer.model.state.app_state import AppState, Scene
 from viewer.model.state.inspection import Comparison, GroundTruth, ViewIndex
 
@@ -49,10 +49,12 @@ NO_INSPECTION_TEXTURES = InspectionTextures()
 def beside_of(state: AppState) -> Beside:
     """What is shown beside the picture."""
     scene, inspection = state.scene, state.inspection
+    has_filmstrip = state.preferences.shows_filmstrip and state.folder is not None and len(state.folder.photos) > 1
     if scene is None:
-        return NOTHING_BESIDE
+        return Beside(has_filmstrip=has_filmstrip)
     has_epis = inspection.shows_epis and max(scene.grid) > 1
-    return Beside((scene.grid.rows, scene.grid.columns) if has_epis else None, inspection.shows_values)
+    views = (scene.grid.rows, scene.grid.columns) if has_epis else None
+    return Beside(views, inspection.shows_values, has_filmstrip)
 
 
 def view_near(eye: ViewOffset, grid: GridShape) -> ViewIndex:

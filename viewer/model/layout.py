@@ -57,6 +57,7 @@ LEAST_STRIP, MOST_STRIP = 45.0, 130.0
 
 STRIP_GAP = 6.0
 STATUS_HEIGHT = 26.0
+FILMSTRIP_HEIGHT = 84.0
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ class Beside:
 
     epi_views: tuple[int, int] | None = None
     has_status: bool = False
+    has_filmstrip: bool = False
 
 
 NOTHING_BESIDE = Beside()
@@ -75,7 +77,8 @@ class Layout:
     """Rectangles in window units; pixel_ratio: framebuffer pixels per window unit; ui_scale: size of text and widgets.
 
     picture is None where no picture is open or no room is left for it. strip_across, strip_down: the EPIs, as wide and
-    as high as the picture; status: a line below. None where they are not shown.
+    as high as the picture; status: a line below; filmstrip: a row of small pictures at the bottom. None where they are
+    not shown.
     """
 
     window: Rect
@@ -86,6 +89,7 @@ class Layout:
     strip_across: Rect | None = None
     strip_down: Rect | None = None
     status: Rect | None = None
+    filmstrip: Rect | None = None
 
     @property
     def picture_px(self) -> PixelRect | None:
@@ -107,7 +111,9 @@ def layout_of(
     beside: Beside = NOTHING_BESIDE,
 ) -> Layout:
     """Panel at the right, picture as large as it fits beside it and what is beside it. Sizes are (width, height)."""
-    width, height = window_size
+    width, window_height = window_size
+    filmstrip_height = FILMSTRIP_HEIGHT * ui_scale if beside.has_filmstrip else 0.0
+    height = max(window_height - filmstrip_height, 0)
     panel_width = min(PANEL_WIDTH * ui_scale, width)
     margin, gap = MARGIN * ui_scale, STRIP_GAP * ui_scale
     down, across = (_thickness(views, ui_scale) for views in beside.epi_views or (0, 0))
@@ -116,11 +122,12 @@ def layout_of(
     room = Rect(margin, margin, width - panel_width - 2 * margin - (down + gap if down else 0), room_height)
     picture = letterbox(room, picture_size) if picture_size else None
     layout = Layout(
-        window=Rect(0, 0, width, height),
-        panel=Rect(width - panel_width, 0, panel_width, height),
+        window=Rect(0, 0, width, window_height),
+        panel=Rect(width - panel_width, 0, panel_width, window_height),
         picture=picture,
         pixel_ratio=pixel_ratio,
         ui_scale=ui_scale,
+        filmstrip=Rect(0, height, width - panel_width, filmstrip_height) if filmstrip_height else None,
     )
     if picture is None:
         return layout

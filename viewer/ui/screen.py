@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action
 from viewer.model.inspection_request import NO_INSPECTION_TEXTURES, InspectionTextures
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
+from viewer.model.state.folder import Thumbnail
+from viewer.ui.overlays.filmstrip import filmstrip
 from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
 from viewer.ui.overlays.notices import notices
 from viewer.ui.overlays.prompts import prompts
@@ -15,12 +20,18 @@ from viewer.ui.overlays.reticle import overlays
 from viewer.ui.panel import panel
 from viewer.ui.style import pack_color, palette_of
 
+NO_THUMBNAILS: Mapping[str, Thumbnail] = MappingProxyType({})
+
 
 def build_screen(
-    state: AppState, layout: Layout, picture_texture: int | None, textures: InspectionTextures = NO_INSPECTION_TEXTURES
+    state: AppState,
+    layout: Layout,
+    picture_texture: int | None,
+    textures: InspectionTextures = NO_INSPECTION_TEXTURES,
+    thumbnails: Mapping[str, Thumbnail] = NO_THUMBNAILS,
 ) -> list[Action]:
     """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up. textures:
-    what inspection shows.
+    what inspection shows. thumbnails: of the filmstrip, by path.
     """
     window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
@@ -31,7 +42,8 @@ def build_screen(
         draw_beside_picture(state, layout, textures)
         if not state.inspection.shows_grid:
             overlays(state, layout)
-    return panel(state, layout) + notices(state, layout) + prompts(state, layout)
+    actions = filmstrip(state, layout, thumbnails)
+    return actions + panel(state, layout) + notices(state, layout) + prompts(state, layout)
 
 
 def _picture(layout: Layout, texture: int) -> None:

@@ -53,6 +53,7 @@ from viewer.model.lens.limits import (
 )
 from viewer.model.reducers.camera_motion import advance_motion, glide_home, start_motion
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
+from viewer.model.reducers.folder import list_folder, photo_after, scroll_filmstrip
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
 from viewer.model.reducers.lens import reduce_lens
@@ -73,6 +74,7 @@ from viewer.model.state.app_state import (
     TiltHandles,
 )
 from viewer.model.state.depth_editing import DepthAction
+from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
 from viewer.model.state.saving import SavingChanged
@@ -120,6 +122,17 @@ def reduce(state: AppState, action: Action) -> AppState:
 
 def _file_or_prompt(state: AppState, action: Action) -> AppState:
     match action:
+        case FolderListed(path, photos):
+            return list_folder(state, path, photos)
+        case StepPhoto(steps):
+            return _step_photo(state, steps)
+        case ScrollFilmstrip(photos_on):
+            return scroll_filmstrip(state, photos_on)
+        case ShowFilmstrip(is_shown):
+            return replace(state, preferences=replace(state.preferences, shows_filmstrip=is_shown))
+        case SetFolderOrder(order):
+            state = replace(state, preferences=replace(state.preferences, folder_order=order))
+            return list_folder(state, state.folder.path, state.folder.photos) if state.folder is not None else state
         case OpenPath(source):
             progress = Progress(doing=f"reading {PurePath(source.path).name}")
             generation, left = state.next_generation, _leave_field(state)
@@ -157,6 +170,14 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state
+
+
+def _step_photo(state: AppState, steps: int) -> AppState:
+    source = photo_after(state, steps)
+    if source is None or state.folder is None:
+        return state
+    folder = replace(state.folder, step=1 if steps > 0 else -1, scrolled=0)
+    return _file_or_prompt(replace(state, folder=folder), OpenPath(source))
 
 
 def _leave_field(state: AppState) -> FinishedField | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import PurePath
 
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.types import InputError
@@ -12,6 +13,7 @@ from viewer.model.reducers.lens import carry_optics
 from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
 from viewer.model.state.app_state import AppState, History, Motion, Notice, Progress, Scene
 from viewer.model.state.depth_editing import DepthSettings
+from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.inspection import of_next_scene
 from viewer.model.window_words import notice_in_window
 
@@ -71,6 +73,8 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
     depth = DepthSettings(scene.source.depth.refine)
+    if scene.plan is not None:  # a photo: it may have neighbours
+        opened = replace(opened, tasks=(*opened.tasks, ListFolderTask(str(PurePath(scene.source.path).parent))))
     return replace(
         opened,
         notices=notices,

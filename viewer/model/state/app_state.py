@@ -15,6 +15,7 @@ from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ViewOffset
 from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Brush, DepthSettings
+from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.optics import CENTRE, Optics
 from viewer.model.state.saving import CancelSaveTask, Saving
@@ -307,7 +308,7 @@ class ReadTruthTask:
     path: str
 
 
-Task = ChooseTask | ChoosePlaceTask | SaveTask | CancelSaveTask | ReadMaskTask | ReadTruthTask
+Task = ChooseTask | ChoosePlaceTask | SaveTask | CancelSaveTask | ReadMaskTask | ReadTruthTask | ListFolderTask
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
 Theme = Literal["dark", "light"]
@@ -326,6 +327,8 @@ class Preferences:
     open_sections: tuple[Section, ...] = ("view", "focus", "aperture", "light")
     window: tuple[int, int, int, int] | None = None
     is_maximized: bool = False
+    shows_filmstrip: bool = False
+    folder_order: FolderOrder = "name"
 
 
 @dataclass(frozen=True)
@@ -361,7 +364,8 @@ class AppState:
     file has them. saving: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this scene what
     is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs: whether the
     system has file dialogs. left_field: None where the open scene was left unfinished, or not at all. shown_generation:
-    whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a number.
+    whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a number. folder: the
+    photos beside the one that is open, None before they are known.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -396,6 +400,7 @@ class AppState:
     left_field: FinishedField | None = None
     shown_generation: int = 0
     given_up: int = 0
+    folder: PhotoFolder | None = None
 
     @property
     def next_generation(self) -> int:

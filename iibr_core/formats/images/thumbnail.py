@@ -1,0 +1,58 @@
+"""Small pictures of photos for a filmstrip: JPEG decoders skip most of the work where little is wanted."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
+from iibr_core.formats.images.header import read_photo_header
+from iibr_core.types import ImageSize, InputError
+
+JPEG_START = b"\xff\xd8"
+
+
+def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
+    """The photo, upright, as large as fits within (height, width): (h, w, 3), sRGB bytes; colours are not exact.
+
+    Raises InputError where it is no photo, or claims more pixels than any file may.
+    """
+    require_file(path)
+    with path.open("rb") as file:
+        is_jpeg = file.read(2) == JPEG_START
+    pixels = _jpeg_thumbnail(path, within) if is_jpeg else None
+    return _any_thumbnail(path, within) if pixels is None else pixels
+
+
+def _jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
+    """By the decoder's own reduction to an eighth or so; None where Pillow does not take the file."""
+    from PIL import Image, ImageOps
+
+    try:
+        with warnings.catch_warnings(), Image.open(path) as image:
+            warnings.simplefilter("ignore")
+            if image.width * image.height > MAX_FILE_PIXELS:
+                return None
+            longest = max(within)
+            image.draft("RGB", (longest, longest))
+            upright = ImageOps.exif_transpose(image).convert("RGB")
+            upright.thumbnail((within.width, within.height), Image.Resampling.BOX)
+            return np.asarray(upright)
+    except (OSError, ValueError, SyntaxError, TypeError, Image.DecompressionBombError):
+        return None
+
+
+def _any_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
+    from iibr_core.formats.images.photo import read_photo
+
+    size = read_photo_header(path).size
+    if math.prod(size) > MAX_FILE_PIXELS:
+        raise InputError(f"{path}: {size} is more than any photo has")
+    pixels = read_photo(path, max(math.prod(within) * 4, 1)).pixels
+    step = max(math.ceil(pixels.shape[0] / within.height), math.ceil(pixels.shape[1] / within.width), 1)
+    small = pixels[::step, ::step]
+    return np.round(np.nan_to_num(small).clip(0.0, 1.0) * 255).astype(np.uint8)

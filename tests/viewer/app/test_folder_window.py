@@ -1,0 +1,76 @@
+"""A folder of photos in a real window: keys and clicks go on, neighbours are read ahead, small pictures appear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from imgui_bundle import imgui
+
+from iibr_core.types import GridShape
+from tests.viewer.conftest import Driver, write_scene
+
+Opener = Callable[..., Driver]
+
+
+@pytest.fixture
+def viewer(open_window: Opener, tmp_path: Path) -> Driver:
+    for i in range(3):
+        write_scene(tmp_path, f"photo{i}", seed=i)
+    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver.until(lambda app: app.state.folder is not None)
+    driver.until_idle()
+    return driver
+
+
+def shows(driver: Driver, name: str) -> None:
+    driver.until(lambda app: app.state.scene is not None and app.state.scene.name == name)
+    driver.until_idle()
+
+
+def test_a_folder_opens_at_its_first_photo_with_all_of_them_in_small(viewer: Driver) -> None:
+    shows(viewer, "photo0")
+    names = [photo.name for photo in viewer.app.state.folder.photos]  # type: ignore[union-attr]
+    assert names == ["photo0.png", "photo1.png", "photo2.png"]
+    folder = Path(viewer.app.state.folder.path)  # type: ignore[union-attr]
+    paths = tuple(str(folder / name) for name in names)
+    viewer.until(lambda app: len(app._filmstrip.thumbnails(paths)) == 3)
+    assert viewer.app.layout().filmstrip is not None
+
+
+def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Driver, tmp_path: Path) -> None:
+    viewer.until(lambda app: any(source.path.endswith("photo1.png") for source in app._ahead.ready))
+    (tmp_path / "photo1.png").write_bytes(b"no photo any more")  # so that what is shown now was read before
+    viewer.send("key", "Page_Down")
+    shows(viewer, "photo1")
+    viewer.send("key", "Page_Up")
+    shows(viewer, "photo0")
+    viewer.send("key", "Page_Up")
+    viewer.until_idle()
+    assert viewer.app.state.scene.name == "photo0"  # type: ignore[union-attr]
+
+
+def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:
+    viewer.press("photo photo2.png", "filmstrip")
+    shows(viewer, "photo2")
+
+
+def test_a_key_hides_the_filmstrip_and_the_picture_takes_its_room(viewer: Driver) -> None:
+    before = viewer.app.layout().picture
+    viewer.send("key", "f")
+    viewer.until(lambda app: app.layout().filmstrip is None)
+    after = viewer.app.layout().picture
+    assert before is not None
+    assert after is not None
+    assert after.y > before.y or after.height > before.height
+    assert not imgui.get_io().want_text_input
+
+
+def test_no_thread_is_left_when_the_window_closes(viewer: Driver) -> None:
+    import threading
+
+    viewer.send("key", "Page_Down")
+    viewer.app.step()
+    viewer.close()
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("iibr-")]

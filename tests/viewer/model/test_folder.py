@@ -1,0 +1,79 @@
+"""Going from photo to photo in the state: order, ends, what is read ahead, what the filmstrip shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from viewer.model.reducers.folder import filmstrip_range, in_order, photos_ahead
+from viewer.model.reducers.root import reduce
+from viewer.model.state.app_state import AppState, Source
+from viewer.model.state.folder import FolderListed, FolderPhoto, ScrollFilmstrip, SetFolderOrder, StepPhoto
+
+NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
+
+
+def state_at(name: str, names: tuple[str, ...] = NAMES) -> AppState:
+    photos = tuple(FolderPhoto(name, float(-i)) for i, name in enumerate(names))
+    return reduce(AppState(source=Source(f"/photos/{name}", max_pixels=7)), FolderListed("/photos", photos))
+
+
+def open_name(state: AppState) -> str:
+    assert state.source is not None
+    return state.source.path.removeprefix("/photos/")
+
+
+def test_numbers_in_names_are_counted_and_times_go_first_where_that_is_wanted() -> None:
+    state = state_at("img_9.jpg")
+    assert state.folder is not None
+    assert [photo.name for photo in state.folder.photos] == ["img_9.jpg", "IMG_10.jpg", "IMG_11.jpg", "Ä.png"]
+    state = reduce(state, SetFolderOrder("time"))
+    assert state.folder is not None
+    assert [photo.name for photo in state.folder.photos] == list(reversed(NAMES))
+    assert in_order((), "name") == ()
+
+
+def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends() -> None:
+    state = reduce(state_at("img_9.jpg"), StepPhoto(1))
+    assert (open_name(state), state.generation) == ("IMG_10.jpg", 1)
+    assert state.source is not None
+    assert state.source.max_pixels == 7
+    state = reduce(reduce(state, StepPhoto(1)), StepPhoto(1))
+    assert open_name(state) == "Ä.png"
+    assert reduce(state, StepPhoto(1)) is state
+    assert open_name(reduce(state, StepPhoto(-9))) == "img_9.jpg"
+
+
+def test_steps_do_nothing_where_no_photo_of_the_folder_is_open() -> None:
+    elsewhere = replace(state_at("img_9.jpg"), source=Source("/other/img_9.jpg"))
+    for state in (AppState(), elsewhere, state_at("gone.jpg")):
+        assert reduce(state, StepPhoto(1)) is state
+
+
+def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step() -> None:
+    state = state_at("IMG_10.jpg")
+    assert [source.path[8:] for source in photos_ahead(state)] == ["IMG_11.jpg", "img_9.jpg", "Ä.png"]
+    back = reduce(reduce(state, StepPhoto(1)), StepPhoto(-1))
+    assert [source.path[8:] for source in photos_ahead(back)] == ["img_9.jpg", "IMG_11.jpg"]
+    assert photos_ahead(AppState()) == ()
+
+
+@pytest.mark.parametrize(
+    ("place", "scrolled", "most", "shown"),
+    [
+        (0, 0, 3, range(0, 3)),
+        (5, 0, 3, range(4, 7)),
+        (9, 0, 3, range(7, 10)),
+        (5, 2, 4, range(5, 9)),
+        (0, 0, 0, range(0)),
+        (3, -99, 3, range(0, 3)),
+        (3, 99, 99, range(0, 10)),
+    ],
+)
+def test_the_filmstrip_shows_what_lies_around_the_open_photo(
+    place: int, scrolled: int, most: int, shown: range
+) -> None:
+    names = tuple(f"{i}.jpg" for i in range(10))
+    state = reduce(state_at(f"{place}.jpg", names), ScrollFilmstrip(scrolled))
+    assert filmstrip_range(state, most) == shown

@@ -1,0 +1,85 @@
+"""Going from photo to photo: which lies next, which are likely to be wanted soon, which the filmstrip shows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import PurePath
+
+from viewer.model.state.app_state import AppState, Source, source_beside
+from viewer.model.state.folder import FolderOrder, FolderPhoto, PhotoFolder
+
+AHEAD = (1, -1, 2)
+"""Photos read ahead, in steps on in the direction of the last step, the likeliest first."""
+
+
+def list_folder(state: AppState, path: str, photos: Iterable[FolderPhoto]) -> AppState:
+    """The state that knows what lies in the folder of what is open."""
+    ordered = in_order(photos, state.preferences.folder_order)
+    if state.folder is not None and (state.folder.path, state.folder.photos) == (path, ordered):
+        return state
+    return replace(state, folder=PhotoFolder(path, ordered))
+
+
+def in_order(photos: Iterable[FolderPhoto], order: FolderOrder) -> tuple[FolderPhoto, ...]:
+    """By name as people count, IMG_9 before IMG_10, or by time."""
+    by_name = sorted(photos, key=lambda photo: _counted(photo.name))
+    return tuple(by_name if order == "name" else sorted(by_name, key=lambda photo: photo.modified_s))
+
+
+def place_of_photo(folder: PhotoFolder, source: Source | None) -> int | None:
+    """Index of what is asked for among the folder's photos; None where it lies elsewhere."""
+    path = PurePath(source.path) if source is not None else None
+    if path is None or str(path.parent) != folder.path:
+        return None
+    names = [photo.name for photo in folder.photos]
+    return names.index(path.name) if path.name in names else None
+
+
+def photo_after(state: AppState, steps: int) -> Source | None:
+    """What to open so many photos on; None at the folder's ends, and where no photo is open."""
+    folder = state.folder
+    place = None if folder is None else place_of_photo(folder, state.source)
+    if folder is None or place is None:
+        return None
+    wanted = min(max(place + steps, 0), len(folder.photos) - 1)
+    if wanted == place:
+        return None
+    return source_beside(state.source, str(PurePath(folder.path) / folder.photos[wanted].name))
+
+
+def photos_ahead(state: AppState) -> tuple[Source, ...]:
+    """What will be wanted soon, the likeliest first."""
+    step = state.folder.step if state.folder is not None else 1
+    found = (photo_after(state, step * steps) for steps in AHEAD)
+    return tuple(dict.fromkeys(source for source in found if source is not None))
+
+
+def filmstrip_range(state: AppState, most: int) -> range:
+    """Indices of the photos that a filmstrip of so many shows: the open one in its middle, as far as it was not
+    scrolled.
+    """
+    folder = state.folder
+    if folder is None or most < 1:
+        return range(0)
+    middle = (place_of_photo(folder, state.source) or 0) + folder.scrolled
+    count = min(most, len(folder.photos))
+    first = min(max(middle - count // 2, 0), len(folder.photos) - count)
+    return range(first, first + count)
+
+
+def scroll_filmstrip(state: AppState, photos: int) -> AppState:
+    """The state with the filmstrip moved on, no farther than there are photos."""
+    folder = state.folder
+    if folder is None:
+        return state
+    place = place_of_photo(folder, state.source) or 0
+    scrolled = min(max(folder.scrolled + photos, -place), len(folder.photos) - 1 - place)
+    return replace(state, folder=replace(folder, scrolled=scrolled))
+
+
+def _counted(name: str) -> tuple[tuple[int, int, str], ...]:
+    """A key that sorts numbers in names by their value."""
+    parts = re.split(r"(\d+)", name.casefold())
+    return tuple((0, int(part[:18]), "") if part.isdecimal() else (1, 0, part) for part in parts)
