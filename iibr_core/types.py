@@ -60,6 +60,19 @@ class ImageSize(NamedTuple):
         return f"{self.width}x{self.height}"
 
 
+class Margins(NamedTuple):
+    """So many pixels beyond each side of an image."""
+
+    top: int = 0
+    bottom: int = 0
+    left: int = 0
+    right: int = 0
+
+    def around(self, size: ImageSize) -> ImageSize:
+        """Of an image with its margins."""
+        return ImageSize(size.height + self.top + self.bottom, size.width + self.left + self.right)
+
+
 class GridShape(NamedTuple):
     """Numbers of view rows (V) and view columns (U)."""
 

@@ -6,6 +6,7 @@ photo's frame. The constants were measured; `python -m benchmarks.prediction` fi
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,10 +15,10 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.generation.outer_views import outer_views_of_grid
+from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
 from iibr_core.rendering.ambiguity import AMBIGUOUS_PX, EVERY_COST, SOFT
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
-from iibr_core.types import FloatImage, GridShape, Quality
+from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 
 CORES = THREADS
 STILL_PX = 0.5
@@ -93,7 +94,8 @@ NO_COST = CostEstimates(*3 * [CostEstimate(0.0, 0)])
 class ParallaxStatistics:
     """How content moves in the outermost view, px. step (H, W): the largest difference between neighbours near each
     pixel. softness, soft (H, W): see `DisparityStatistics`. most_px: of all content. frame_px: of what lies at the
-    frame. hole_share: of the pixels, those it shows and the photo hides, at most.
+    frame. hole_share: of the pixels, those it shows and the photo hides, at most. canvas: the photo with what the outer
+    views see beyond its frame.
     """
 
     step: FloatImage
@@ -102,6 +104,7 @@ class ParallaxStatistics:
     most_px: float
     frame_px: float
     hole_share: float
+    canvas: ImageSize
 
     @property
     def edge_share(self) -> float:
@@ -145,6 +148,7 @@ def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatist
         float(np.abs(moved).max()),
         float(np.abs(frame).max()),
         _hole_share(moved),
+        margins_beyond_frame(moved, [ViewOffset(-1.0, -1.0), ViewOffset(1.0, 1.0)]).around(image_size(moved)),
     )
 
 
@@ -210,7 +214,9 @@ def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Qualit
     ray = RAY_BYTES + (STATISTICS_BYTES if quality != "fast" else 0)
     in_flight = pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + asked * AMBIGUOUS_BYTES)
     filling = pixels * (NUMBER_BYTES + statistics.hole_share * HOLE_BYTES) if statistics.has_disocclusion else 0.0
-    return round(pixels * ray * (2 + _inpainted_views(statistics, grid)) + CORES * in_flight + filling)
+    return round(
+        math.prod(statistics.canvas) * ray * (2 + _inpainted_views(statistics, grid)) + CORES * in_flight + filling
+    )
 
 
 def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:

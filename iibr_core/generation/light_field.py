@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from iibr_core.generation.outer_views import farthest_views, outer_views_of_grid
+from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views_of_grid
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.stored_views import Draft, StoredViews, encode_for_storage
 from iibr_core.generation.update_loop import render_outer_views
@@ -95,7 +95,7 @@ def _generate_views(
             inner.remove(offset)
             if transformer is not None:
                 # What joined the set is kept there.
-                before = view.colors if len(rays) == images else rays.arrays[1][images]
+                before = view.colors if len(rays) == images else rays.in_view(rays.arrays[1][images])
                 unfinished[offset] = partial(views.make, offset, ShownBefore(before, images))
             images = len(rays)
             if transformer is None or draft_bytes is not None:
@@ -132,7 +132,8 @@ def ray_set(
     farthest = farthest_views(outer)
     if not plan.has_disocclusion:
         outer = []
-    rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(outer), should_stop)
+    margins = margins_beyond_frame(disparity.values, outer)
+    rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(outer), should_stop, margins)
     return rays, render_outer_views(rays, outer, should_stop, inpainter)
 
 

@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import ceil
 
-from iibr_core.types import GridShape, ViewOffset
+import numpy as np
+
+from iibr_core.types import FloatImage, GridShape, Margins, ViewOffset
+
+MOST_MARGIN = 0.25
+"""Of the photo's height or width: what views see farther beyond its frame they fill themselves."""
+NEARLY_ALL = 0.99
+"""So much of a side of the frame counts: a few wild pixels do not make the canvas larger."""
+AROUND_PX = 2
+"""So much more of a margin, that look-ups at its end find their neighbours."""
 
 
 def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
@@ -29,3 +39,23 @@ def outer_views_of_grid(grid: GridShape) -> list[ViewOffset]:
 def farthest_views(outer: Iterable[ViewOffset]) -> float:
     """The largest view offset among these, 1 at least: what a ray set is made for."""
     return max([1.0, *(abs(part) for at in outer for part in at)])
+
+
+def margins_beyond_frame(disparity: FloatImage, outer: Iterable[ViewOffset]) -> Margins:
+    """How far beyond the frame of a photo with this disparity (H, W) the outer views see; 0 where they do not."""
+    every = [ViewOffset(0.0, 0.0), *outer]
+    top, bottom = min(at.t for at in every), max(at.t for at in every)
+    left, right = min(at.s for at in every), max(at.s for at in every)
+    height, width = disparity.shape
+    return Margins(
+        _margin(-disparity[0], top, bottom, height),
+        _margin(disparity[-1], top, bottom, height),
+        _margin(-disparity[:, 0], left, right, width),
+        _margin(disparity[:, -1], left, right, width),
+    )
+
+
+def _margin(outwards: FloatImage, first: float, last: float, length: int) -> int:
+    """Of one side, whose pixels look outwards so many pixels per view step, in views from first to last."""
+    reach = float(np.quantile(np.maximum(outwards * first, outwards * last), NEARLY_ALL))
+    return min(ceil(reach) + AROUND_PX, int(MOST_MARGIN * length)) if reach > 0 else 0

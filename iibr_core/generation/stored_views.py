@@ -59,7 +59,7 @@ class StoredViews:
         colors, disparity, inpainted = drafted.colors.copy(), drafted.disparity.copy(), drafted.inpainted.copy()
         for part in draft.undecided:
             decided = self._synthesis.decide(self._rays, part)
-            at = np.unravel_index(decided.pixel, self._rays.size)
+            at = np.unravel_index(decided.pixel, self._rays.view_size)
             colors[at] = stored_from_encoded(decided.colors, self._is_hdr)
             disparity[at], inpainted[at] = decided.disparity, decided.inpainted
         return replace(drafted, colors=colors, disparity=disparity, inpainted=inpainted, is_final=True)

@@ -8,7 +8,7 @@ from types import TracebackType
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.generation.light_field import transformer_for
-from iibr_core.generation.outer_views import farthest_views, outer_views
+from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
@@ -37,7 +37,8 @@ class ViewMaker:
         """
         self._should_stop, self._slots = should_stop, slots
         self.outer = outer_views(offsets)
-        self._rays = rays_of_photo(photo, disparity, farthest_views(self.outer), len(self.outer))
+        margins = margins_beyond_frame(disparity, self.outer)
+        self._rays = rays_of_photo(photo, disparity, farthest_views(self.outer), len(self.outer), should_stop, margins)
         self._first: dict[ViewOffset, tuple[RenderedView, float]] = {}
         self._syntheses = {
             quality: ViewSynthesis(

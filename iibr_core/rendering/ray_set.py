@@ -1,6 +1,7 @@
 """The ray set. Every pixel of a source image is a ray with a colour and a disparity; the set is a stack of such images.
 
-The photo comes first; the fringe (what mixed pixels hold of the surface in front) and inpainted views join it.
+The photo comes first; the fringe (what mixed pixels hold of the surface in front) and inpainted views join it. Images
+may be larger than the views made of them: so rays beyond the photo's frame belong to the set as well.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +19,11 @@ from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, Disparity
 from iibr_core.rendering.joined_rays import BELOW, RIGHT, join_rays, joined_either_way
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
+from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
 CELL_PX = 4
 """Side of the cells that rays are summarised by."""
+NO_MARGINS = Margins()
 HIGHEST_LEVEL = 255
 SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
@@ -40,7 +43,7 @@ class Cells:
 
 
 class RaySet:
-    """Source images of one size (height, width), at most `capacity` of them.
+    """Source images of one size (height, width), at most `capacity` of them. Views show what lies within their margins.
 
     All arrays are (S, ...) for the S images added so far. offsets (S, 2): the view (t, s) each is seen from. colors
     (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN where there is no surface. coverage (S, H, W): how much of
@@ -48,12 +51,19 @@ class RaySet:
     steps between surfaces, rounded up, 0 below one; see `edge_limits`.
     """
 
-    def __init__(self, capacity: int, size: ImageSize, surface_step: float, farthest_views: float = 1.0) -> None:
-        """surface_step: disparities closer than this are one surface for look-ups.
-
-        farthest_views: the largest view offset that will be rendered.
+    def __init__(
+        self,
+        capacity: int,
+        size: ImageSize,
+        surface_step: float,
+        farthest_views: float = 1.0,
+        margins: Margins = NO_MARGINS,
+    ) -> None:
+        """size: of the images, margins: of them around every view. surface_step: disparities closer than this are one
+        surface for look-ups. farthest_views: the largest view offset that will be rendered.
         """
         self._count = 0
+        self._margins = margins
         self._surface_step = surface_step
         self._farthest_views = farthest_views
         self._statistics: DisparityStatistics | None = None
@@ -79,7 +89,13 @@ class RaySet:
         coverage: FloatImage,
         should_stop: ShouldStop = never,
     ) -> None:
-        """Add the rays of one image (H, W). Raises Cancelled once should_stop is true; then nothing is added."""
+        """Add the rays of one image (H, W), or of one view. Raises Cancelled once should_stop is true; then nothing is
+        added.
+        """
+        if image_size(disparity) != self.size:
+            colors, disparity, coverage = (
+                self._with_margins(part, none) for part, none in ((colors, 0.0), (disparity, np.nan), (coverage, 0.0))
+            )
         k, joined = self._count, np.zeros(self.size, np.uint8)
         if k == 0:
             least_edge = EDGE_PARALLAX_PX / max(self._farthest_views, 1e-9)
@@ -120,6 +136,21 @@ class RaySet:
     def size(self) -> ImageSize:
         """Of every image."""
         return image_size(self._disparity[0])
+
+    @property
+    def view_size(self) -> ImageSize:
+        """Of every view."""
+        return image_size(self.in_view(self._disparity[0]))
+
+    @property
+    def margins(self) -> Margins:
+        """Of the images around every view."""
+        return self._margins
+
+    def in_view(self, image: NDArray[Any]) -> NDArray[Any]:
+        """The part of an image (H, W, ...) that its view shows."""
+        top, bottom, left, right = self._margins
+        return image[top : len(image) - bottom, left : image.shape[1] - right]
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
@@ -176,8 +207,14 @@ class RaySet:
 
     @property
     def photo_disparity(self) -> FloatImage:
-        """(H, W) disparity of the first image."""
-        return np.asarray(self._disparity[0])
+        """(H, W) disparity of the photo, as large as views."""
+        return np.ascontiguousarray(self.in_view(self._disparity[0]))
+
+    def _with_margins(self, view: FloatImage, around: float) -> FloatImage:
+        """A view (H, W, ...) as large as the images."""
+        image = np.full((*self.size, *view.shape[2:]), around, np.float32)
+        self.in_view(image)[:] = view
+        return image
 
 
 def _any_in_cells(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:

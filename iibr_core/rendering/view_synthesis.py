@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ambiguity import EVERY_COST
 from iibr_core.rendering.ambiguous_rays import (
@@ -31,12 +32,13 @@ from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import MOSTLY_COVERED, WHOLE, covered_share, entropy, occlusion_mask
-from iibr_core.rendering.ray_set import CELL_PX, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
+from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
+from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
 EDGE_PX = 2.0
 """A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
@@ -113,16 +115,22 @@ class ShownBefore:
 
 
 def rays_of_photo(
-    colors: FloatImage, disparity: FloatImage, farthest_views: float, more: int, should_stop: ShouldStop = never
+    colors: FloatImage,
+    disparity: FloatImage,
+    farthest_views: float,
+    more: int,
+    should_stop: ShouldStop = never,
+    margins: Margins = NO_MARGINS,
 ) -> RaySet:
     """The ray set of a photo: its own rays, and the fringe of its mixed pixels, with room for `more` images.
 
     farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
-    Raises Cancelled once should_stop is true.
+    margins: so far beyond its frame the photo is continued. Raises Cancelled once should_stop is true.
     """
+    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop)
     centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
-    rays = RaySet(2 + more, image_size(disparity), OWN_SURFACE_PX / farthest_views, farthest_views)
+    rays = RaySet(2 + more, image_size(disparity), OWN_SURFACE_PX / farthest_views, farthest_views, margins)
     rays.add(centre, own, disparity, np.ones_like(disparity), should_stop)
     if coverage.any():
         rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
@@ -185,7 +193,7 @@ class ViewSynthesis:
         view, covered = self._begin_view(rays, offset)
         undecided = in_bands(
             lambda first, last: self._render_rows(rays, offset, (first, last), view, covered),
-            rays.size, self._should_stop, 1, self._most_band_pixels,
+            rays.view_size, self._should_stop, 1, self._most_band_pixels,
         )  # fmt: skip
         view = self._fill(rays, offset, view, covered, 1)
         return view, [part for part in undecided if part is not None and len(part.pixel)]
@@ -201,7 +209,10 @@ class ViewSynthesis:
             chosen = bound_weights(ambiguous, chosen)
         raise_if_stopped(self._should_stop)
         colors, disparity, source = blend_hypotheses(rays, ambiguous, chosen)
-        return DecidedRays(undecided.pixel, colors, disparity, source >= rays.photo_images)
+        y, x = np.divmod(undecided.pixel, rays.size.width)
+        y, x = y - rays.margins.top, x - rays.margins.left
+        inpainted = (source >= rays.photo_images) | _beyond_frame(y, x, disparity, *undecided.offset, *rays.view_size)
+        return DecidedRays(y * rays.view_size.width + x, colors, disparity, inpainted)
 
     def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """The results of work on all items, in their order. An item is only taken when a thread is free for it."""
@@ -222,10 +233,10 @@ class ViewSynthesis:
             return self.decide(rays, undecided) if undecided is not None else None
 
         view, covered = self._begin_view(rays, offset)
-        decided = in_bands(band, rays.size, self._should_stop, threads, self._most_band_pixels)
+        decided = in_bands(band, rays.view_size, self._should_stop, threads, self._most_band_pixels)
         view = self._fill(rays, offset, view, covered, threads)
         for part in filter(None, decided):
-            at = np.unravel_index(part.pixel, rays.size)
+            at = np.unravel_index(part.pixel, rays.view_size)
             view.colors[at], view.disparity[at], view.inpainted[at] = part.colors, part.disparity, part.inpainted
         return view
 
@@ -235,7 +246,7 @@ class ViewSynthesis:
             raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
         if self._transformer:
             rays.survey(self._should_stop)
-        return _blank_view(rays.size, self._keeps_entropy), np.empty(rays.size, np.float32)
+        return _blank_view(rays.view_size, self._keeps_entropy), np.empty(rays.view_size, np.float32)
 
     def _fill(
         self, rays: RaySet, offset: ViewOffset, view: RenderedView, covered: FloatImage, threads: int
@@ -245,7 +256,7 @@ class ViewSynthesis:
         """
         colors, disparity = view.colors.reshape(-1, 3), view.disparity.reshape(-1)
         part = np.flatnonzero((covered < WHOLE) & (covered > 0))
-        part = part[_is_within_frame(rays.size, part, disparity[part], offset) | view.occluded.reshape(-1)[part]]
+        part = part[_is_within_margins(rays, part, disparity[part], offset) | view.occluded.reshape(-1)[part]]
         hole = view.occluded.copy()
         hole.reshape(-1)[part] = True
         if not hole.any():
@@ -276,24 +287,29 @@ class ViewSynthesis:
         covered; the rays that are the transformer's to decide, if there is one.
         """
         around = REACH_PX if self._transformer else 0
-        above = min(rows[0], around)
-        candidates = find_candidates(
-            rays, offset, (rows[0] - above, min(rows[1] + around, rays.size.height)), self._slots
-        )
+        # The images are larger than the view: their rows and columns count here.
+        first, last = rows[0] + rays.margins.top, rows[1] + rays.margins.top
+        left, right = rays.margins.left, rays.size.width - rays.margins.right
+        above = min(first, around)
+        candidates = find_candidates(rays, offset, (first - above, min(last + around, rays.size.height)), self._slots)
         raise_if_stopped(self._should_stop)
         weights = visibility_weights(candidates)
         occluded, share = occlusion_mask(weights), covered_share(weights)
-        inner = slice(above, above + rows[1] - rows[0])
+        inner = slice(above, above + last - first), slice(left, right)
         raise_if_stopped(self._should_stop)
         wanted = np.zeros(occluded.shape, np.bool_)
-        wanted[inner] = True if known is None else _changed_pixels(rays, offset, rows, known.images)
+        wanted[inner] = (
+            True if known is None else _changed_pixels(rays, offset, (first, last), known.images)[:, left:right]
+        )
         colors, disparity, source = resample_colors(rays, candidates, weights, wanted)
         raise_if_stopped(self._should_stop)
         undecided = None
         if self._transformer:
+            decided = occluded | (share < WHOLE)
+            decided[:, :left] = decided[:, right:] = True
             undecided = find_undecided_rays(
-                rays, candidates, weights, (disparity, source), (inner.start, inner.stop), self._every,
-                self._hypotheses, occluded | (share < WHOLE),
+                rays, candidates, weights, (disparity, source), (above, above + last - first), self._every,
+                self._hypotheses, decided,
             )  # fmt: skip
         shown = slice(*rows)
         view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
@@ -301,6 +317,9 @@ class ViewSynthesis:
             np.copyto(view.colors[shown], known.colors[shown], where=~wanted[inner][..., None])
         view.occluded[shown], covered[shown] = occluded[inner], share[inner]
         view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
+        if any(rays.margins):
+            y, x = np.ogrid[rows[0] : rows[1], : rays.view_size.width]
+            view.inpainted[shown] |= _beyond_frame(y, x, view.disparity[shown], *offset, *rays.view_size)
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
         return undecided
@@ -317,13 +336,20 @@ def _changed_pixels(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], kno
     return np.asarray(pixels[above : above + rows[1] - rows[0], : rays.size.width])
 
 
-def _is_within_frame(
-    size: ImageSize, pixel: NDArray[np.int64], disparity: FloatImage, offset: ViewOffset
+def _is_within_margins(
+    rays: RaySet, pixel: NDArray[np.int64], disparity: FloatImage, offset: ViewOffset
 ) -> NDArray[np.bool_]:
-    """Which of these pixels (N) of a view look between the centres of the photo's outermost ones."""
-    y, x = np.divmod(pixel, size.width)
-    y, x = y + disparity * offset.t, x + disparity * offset.s
-    return np.asarray((y >= 0) & (y <= size.height - 1) & (x >= 0) & (x <= size.width - 1))
+    """Which of these pixels (N) of a view look between the centres of the outermost rays."""
+    y, x = np.divmod(pixel, rays.view_size.width)
+    y, x = y + rays.margins.top + disparity * offset.t, x + rays.margins.left + disparity * offset.s
+    return np.asarray((y >= 0) & (y <= rays.size.height - 1) & (x >= 0) & (x <= rays.size.width - 1))
+
+
+@kernel
+def _beyond_frame(y, x, disparity, t, s, height, width):
+    """Which of the rays at (y, x) of a view look beyond the photo's frame; arrays of shapes that go together."""
+    v, u = y + disparity * t, x + disparity * s
+    return (v < -0.5) | (v > height - 0.5) | (u < -0.5) | (u > width - 0.5)
 
 
 def _composite(front: FloatImage, back: FloatImage, share: FloatImage) -> FloatImage:

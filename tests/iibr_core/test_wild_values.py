@@ -24,9 +24,9 @@ from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverse
 from iibr_core.formats.images import photo
 from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
-from iibr_core.generation import cost_model, plan, relief
+from iibr_core.generation import cost_model, outer_views, plan, relief
 from iibr_core.generation import light_field as generating
-from iibr_core.inpainting import disparity_by_color, disparity_holes
+from iibr_core.inpainting import beyond_frame, disparity_by_color, disparity_holes
 from iibr_core.rendering import (
     ambiguous_rays,
     candidates,
@@ -39,7 +39,7 @@ from iibr_core.rendering import (
 )
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
-from iibr_core.types import DISPLAY_P3, Disparity, GridShape, ImageSize, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import DISPLAY_P3, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
@@ -235,6 +235,13 @@ FINITE = {
         field(scene()[0], depths(v)),
         field(Photo(image(v), 9.0, "wild"), depths(1.0)),
     ],
+    "generation.outer_views.margins_beyond_frame": lambda v, _: [
+        outer_views.margins_beyond_frame(depths(v), [ViewOffset(1.0, -1.0)]),
+        outer_views.margins_beyond_frame(depths(1.0), [ViewOffset(v, 1.0)]),
+    ],
+    "inpainting.beyond_frame.extend_beyond_frame": lambda v, _: beyond_frame.extend_beyond_frame(
+        np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2)
+    )[0],
     "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
     "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0, 1)),
     "rendering.resampling.heaviest_candidate": lambda v, _: resampling.heaviest_candidate(
@@ -387,7 +394,7 @@ READS_OR_TELLS = {
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "rendering.view_synthesis": "ViewSynthesis",
-    "types": "ColorSpace ViewOffset GridShape ImageSize image_size ignore_progress InputError",
+    "types": "ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 

@@ -1,0 +1,111 @@
+"""The photo continued beyond its frame, once, so that all views show the same there.
+
+Surfaces go on as they leave the frame. Colours are those of the frame's nearest pixels, averaged along the frame ever
+wider the farther out: who can tell which of them goes on. They get the fine texture of what lies as far inside.
+"""
+
+from __future__ import annotations
+
+from math import hypot, log2
+
+import numpy as np
+
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import FloatImage, Margins, image_size
+
+SPREAD = 1.6
+"""Colours at distance r are a mean with a standard deviation of 0.41 px times 2 to the power of this, times r."""
+TEXTURE_SHARE = 0.6
+"""So much of the photo's texture is seen beyond its frame: its place there is a guess, and errors weigh twice."""
+BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
+"""Texture is what differs from a mean with these weights, each way."""
+
+
+def extend_beyond_frame(
+    colors: FloatImage, disparity: FloatImage, margins: Margins, should_stop: ShouldStop = never
+) -> tuple[FloatImage, FloatImage]:
+    """The photo's colors (H, W, 3) and disparity (H, W) in the middle of larger ones, which are filled around it.
+
+    margins: so many pixels on each side. Raises Cancelled once should_stop is true.
+    """
+    size = image_size(disparity)
+    if not any(margins):
+        return colors, disparity
+    larger = margins.around(size)
+    grown, surfaces = np.empty((*larger, 3), np.float32), np.empty(larger, np.float32)
+    means = _means_along_frame(colors, max(margins))
+
+    def band(first: int, last: int) -> None:
+        _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
+
+    in_bands(band, larger, should_stop)
+    return grown, surfaces
+
+
+def _means_along_frame(colors: FloatImage, farthest: int) -> FloatImage:
+    """(K, N, 3): the colours of the frame's N pixels, clockwise from the upper left, then ever wider means of them.
+
+    The standard deviation of mean k is 0.41 sqrt(4**k - 1) px (weights 1 2 1; each step doubles the distances).
+    """
+    frame = [colors[0], colors[1:, -1], colors[-1, :-1][::-1], colors[1:-1, 0][::-1]]
+    mean = np.concatenate([side.astype(np.float64) for side in frame])
+    means = [mean]
+    for k in range(_level(hypot(farthest, farthest)).__ceil__()):
+        mean = 0.5 * mean + 0.25 * (np.roll(mean, 2**k, axis=0) + np.roll(mean, -(2**k), axis=0))
+        means.append(mean)
+    return np.stack(means).astype(np.float32)
+
+
+@kernel
+def _level(distance):
+    """Which of `_means_along_frame` counts so far from the frame, a fraction between two."""
+    return max(SPREAD + log2(distance), 0.0)
+
+
+@kernel
+def _place_on_frame(height, width, y, x):
+    """The number of a pixel of the frame among `_means_along_frame`."""
+    if y == 0:
+        return x
+    if x == width - 1:
+        return width - 1 + y
+    if y == height - 1:
+        return 2 * (width - 1) + height - 1 - x
+    return 2 * (width - 1) + 2 * (height - 1) - y
+
+
+@kernel
+def _texture(colors, y, x, c):
+    """How a pixel differs from its surroundings; at the border its neighbours there count for those beyond."""
+    height, width, _ = colors.shape
+    mean = np.float32(0.0)
+    for j in range(-2, 3):
+        v = min(max(y + j, 0), height - 1)
+        for i in range(-2, 3):
+            mean += BINOMIAL[j + 2] * BINOMIAL[i + 2] * colors[v, min(max(x + i, 0), width - 1), c]
+    return colors[y, x, c] - mean
+
+
+@kernel
+def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfaces):
+    height, width = disparity.shape
+    for row in range(first, last):
+        for column in range(grown.shape[1]):
+            # The nearest pixel of the photo: its surface goes on.
+            y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
+            surfaces[row, column] = disparity[y, x]
+            away = hypot(row - top - y, column - left - x)
+            if away == 0.0:
+                for c in range(3):
+                    grown[row, column, c] = colors[y, x, c]
+                continue
+            level, place = _level(away), _place_on_frame(height, width, y, x)
+            k = min(int(level), len(means) - 2)
+            part = np.float32(level - k)
+            # What lies as far inside gives the texture.
+            v = min(max(2 * y - row + top, 0), height - 1)
+            u = min(max(2 * x - column + left, 0), width - 1)
+            for c in range(3):
+                mean = means[k, place, c] + part * (means[k + 1, place, c] - means[k, place, c])
+                grown[row, column, c] = max(mean + TEXTURE_SHARE * _texture(colors, v, u, c), 0.0)
