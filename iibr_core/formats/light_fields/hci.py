@@ -9,15 +9,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from threading import Semaphore
-from types import TracebackType
 
-import numpy as np
-
-from iibr_core.formats.files import entries_of, is_folder
+from iibr_core.formats.light_fields.folder_writer import FolderWriter
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_grid, write_parameters
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.formats.light_fields.view_grid import (
@@ -27,116 +21,31 @@ from iibr_core.formats.light_fields.view_grid import (
     require_fitting,
     set_view,
 )
-from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.formats.outputs import UnfinishedFolder, remove_leftovers, require_folder_place
-from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
+from iibr_core.types import GridShape, InputError
 
 CAM_NAME = re.compile(r"input_cam(\d{1,9})$", re.IGNORECASE)
-OWN_FILE = re.compile(r"input_Cam\d+\.(png|exr)|disp_Cam\d+\.pfm|gt_disp_lowres\.pfm|parameters\.cfg")
-WRITING_THREADS = 2
-PENDING_VIEWS = 4
 
 
-class HciWriter:
-    """Writes the views of a light field as they come; the folder appears, whole, when the `with` block ends well.
+class HciWriter(FolderWriter):
+    """Writes views as the benchmark has them."""
 
-    Nothing is left behind if the block ends with an exception or before every view was added. Raises InputError where
-    `folder` may not be written or holds anything but a light field written before; such a one is replaced.
-    """
+    own_file = re.compile(r"input_Cam\d+\.(png|exr)|disp_Cam\d+\.pfm|gt_disp_lowres\.pfm|parameters\.cfg")
 
-    def __init__(self, folder: Path, grid: GridShape, focal_px: float, name: str, with_disparity: bool = False) -> None:
-        self.folder = Path(folder).absolute()
-        self.grid = grid
-        self.focal_px = focal_px
-        self.name = name
-        self.with_disparity = with_disparity
-        self._added: set[tuple[int, int]] = set()
-        self._size = ImageSize(0, 0)
-        self._range = (math.inf, -math.inf)
-        self._pending: list[Future[None]] = []
-        self._writing = Semaphore(WRITING_THREADS)
-        self._is_over = False
+    def view_name(self, row: int, column: int, extension: str) -> str:
+        """Numbered row by row."""
+        return f"input_Cam{self._number(row, column):03d}{extension}"
 
-    @staticmethod
-    def require_place(folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
-        """Raise InputError as `require_folder_place` does, and where the folder holds anything but a light field."""
-        if is_folder(folder):
-            remove_leftovers(folder)
-            foreign = next((file.name for file in entries_of(folder) if not OWN_FILE.fullmatch(file.name)), None)
-            if foreign is not None:
-                raise InputError(f"{folder}: holds other files ({foreign}); choose an empty or new folder with --out")
-        require_folder_place(folder, inputs, may_replace, is_whole=True)
+    def map_names(self, row: int, column: int, is_wanted: bool, is_centre: bool) -> tuple[str, ...]:
+        """The centre view's always, by the name that the benchmark has for it."""
+        every = (f"disp_Cam{self._number(row, column):03d}.pfm",) if is_wanted else ()
+        return (*every, "gt_disp_lowres.pfm") if is_centre else every
 
-    def __enter__(self) -> HciWriter:
-        """Make the temporary folder."""
-        self.require_place(self.folder, may_replace=True)
-        self._unfinished = UnfinishedFolder(self.folder)
-        self._pool = ThreadPoolExecutor(WRITING_THREADS, thread_name_prefix="hci-writer")
-        return self
+    def finish_folder(self, folder: Path) -> None:
+        """The cameras' parameters."""
+        write_parameters(folder, self.name, self.grid, self.size, self.focal_px, self.range_px)
 
-    def add(self, update: ViewUpdate) -> None:
-        """Write one view; returns once at most PENDING_VIEWS wait. Raises InputError if an earlier one failed."""
-        size = image_size(update.colors)
-        if self._added and size != self._size:
-            raise ValueError(f"view ({update.row}, {update.column}) is {size}, the others are {self._size}")
-        if (update.row, update.column) in self._added:
-            raise ValueError(f"view ({update.row}, {update.column}) was added before")
-        self._size = size
-        self._added.add((update.row, update.column))
-        if update.disparity is not None:
-            low, high = float(update.disparity.min()), float(update.disparity.max())
-            self._range = (min(self._range[0], low), max(self._range[1], high))
-        self._pending.append(self._pool.submit(self._write, update))
-        while len(self._pending) > PENDING_VIEWS:
-            self._pending.pop(0).result()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Put the folder in its place, or remove it."""
-        try:
-            self._pool.shutdown(wait=True, cancel_futures=kind is not None)
-            if kind is None:
-                self._finish()
-        finally:
-            self._end_writing()
-            self._unfinished.discard()
-
-    def _end_writing(self) -> None:
-        """Wait for what is being written: the pool knows no thread that an interruption struck while it began."""
-        self._is_over = True
-        for _ in range(WRITING_THREADS):
-            self._writing.acquire()
-
-    def _finish(self) -> None:
-        for pending in self._pending:
-            pending.result()
-        total = self.grid.rows * self.grid.columns
-        if len(self._added) != total:
-            raise InputError(f"{self.folder}: only {len(self._added)} of {total} views were made; nothing was written")
-        write_parameters(self._unfinished.path, self.name, self.grid, self._size, self.focal_px, self._range)
-        self._unfinished.put_in_place()
-
-    def _write(self, update: ViewUpdate) -> None:
-        try:
-            with self._writing:
-                if not self._is_over:
-                    self._write_view(update)
-        except InputError as error:  # the temporary folder's name says nothing to people
-            raise InputError(str(error).replace(str(self._unfinished.path), str(self.folder))) from error
-
-    def _write_view(self, update: ViewUpdate) -> None:
-        from iibr_core.formats.images.photo import write_image  # brings numba, for which no refusal should wait
-
-        index = update.row * self.grid.columns + update.column
-        extension = ".png" if update.colors.dtype == np.uint8 else ".exr"
-        write_image(self._unfinished.path / f"input_Cam{index:03d}{extension}", update.colors)
-        if update.disparity is None:
-            return
-        if self.with_disparity:
-            write_pfm(self._unfinished.path / f"disp_Cam{index:03d}.pfm", update.disparity)
-        if (update.row, update.column) == self.grid.centre:
-            write_pfm(self._unfinished.path / "gt_disp_lowres.pfm", update.disparity)
+    def _number(self, row: int, column: int) -> int:
+        return row * self.grid.columns + column
 
 
 def read_hci(folder: Path) -> MultiView | None:

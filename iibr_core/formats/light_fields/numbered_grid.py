@@ -10,6 +10,7 @@ import math
 import re
 from pathlib import Path
 
+from iibr_core.formats.light_fields.folder_writer import FolderWriter
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_grid
 from iibr_core.formats.light_fields.scene import GridIndex, MultiView, numbers_in
 from iibr_core.formats.light_fields.view_grid import (
@@ -25,6 +26,20 @@ from iibr_core.types import GridShape, InputError
 MAP_WORDS = re.compile(r"disp|depth|mask|label|normal|edge|reliable", re.IGNORECASE)
 V_U = re.compile(r"v(\d{1,9})_u(\d{1,9})$")
 HEBER_GRID = GridShape(11, 11)
+
+
+class NumberedGridWriter(FolderWriter):
+    """Writes v00_u00.png and so on; disparity beside them as an estimate."""
+
+    own_file = re.compile(r"v\d+_u\d+\.(png|exr)|disp_est_u\d+_v\d+\.pfm")
+
+    def view_name(self, row: int, column: int, extension: str) -> str:
+        """By row and column."""
+        return f"v{row:02d}_u{column:02d}{extension}"
+
+    def map_names(self, row: int, column: int, is_wanted: bool, is_centre: bool) -> tuple[str, ...]:
+        """Column first, as the readers of such folders have it."""
+        return (f"disp_est_u{column:02d}_v{row:02d}.pfm",) if is_wanted or is_centre else ()
 
 
 def read_numbered_grid(folder: Path) -> MultiView | None:

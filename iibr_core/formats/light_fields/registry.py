@@ -27,7 +27,13 @@ READERS = (
 )
 """In the order in which they are asked: `Reader`s."""
 
-WRITERS = {"hci": "hci:HciWriter"}
+WRITERS = {
+    "hci": "hci:HciWriter",
+    "numbered-grid": "numbered_grid:NumberedGridWriter",
+    "stanford": "stanford:StanfordWriter",
+    "eslf": "whole_field:EslfWriter",
+    "exr": "whole_field:ExrWriter",
+}
 """By the name that people type: `WriterFactory`s."""
 
 LAYOUTS = "HCI, Stanford archive, Heber, LLFF, Middlebury, or views/v00_u00.png ..."

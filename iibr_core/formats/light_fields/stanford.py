@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.formats.files import is_folder, shown_name
+from iibr_core.formats.light_fields.folder_writer import FolderWriter
 from iibr_core.formats.light_fields.scene import KnownView, MultiView, on_grid, pictures_in
 from iibr_core.types import InputError, ViewOffset
 
@@ -20,6 +21,26 @@ NUMBER = r"[-+]?\d{1,9}(?:\.\d{0,12})?"
 NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_(\d{{1,3}})_({NUMBER})_({NUMBER})_?$")
 MOST_STRAY = 0.5
 """A camera farther off its place in the grid than this, in view steps: the positions mean something else."""
+
+
+class StanfordWriter(FolderWriter):
+    """Writes out_RR_CC_Y_X_.png, rows counted upwards, positions in view steps. The layout has no place for disparity:
+    every view's lies beside it as disp_RR_CC.pfm.
+    """
+
+    own_file = re.compile(r"out_\d+_\d+_[-\d.]+_[-\d.]+_\.(png|exr)|disp_\d+_\d+\.pfm")
+
+    def view_name(self, row: int, column: int, extension: str) -> str:
+        """With the camera's place, up and to the right."""
+        t, s = self.grid.offset(row, column)
+        return f"out_{self._upwards(row):02d}_{column:02d}_{-t:.6f}_{s:.6f}_{extension}"
+
+    def map_names(self, row: int, column: int, is_wanted: bool, is_centre: bool) -> tuple[str, ...]:
+        """As the views are counted."""
+        return (f"disp_{self._upwards(row):02d}_{column:02d}.pfm",) if is_wanted else ()
+
+    def _upwards(self, row: int) -> int:
+        return self.grid.rows - 1 - row
 
 
 def read_stanford(folder: Path) -> MultiView | None:

@@ -10,7 +10,7 @@ import pytest
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.photo import write_image
-from iibr_core.formats.light_fields import hci
+from iibr_core.formats.light_fields import folder_writer
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.formats.light_fields.registry import find_light_field, open_light_field
 from iibr_core.formats.light_fields.views import read_views
@@ -114,12 +114,12 @@ def test_views_without_any_disparity(tmp_path):
 def test_an_interruption_while_a_thread_starts_leaves_nothing(tmp_path, monkeypatch):
     """The pool does not wait for such a thread, and what it writes must not come after all was removed."""
     has_begun, pool_is_down = threading.Event(), threading.Event()
-    start, shutdown, write_map = threading.Thread.start, ThreadPoolExecutor.shutdown, hci.write_pfm
+    start, shutdown, write_map = threading.Thread.start, ThreadPoolExecutor.shutdown, folder_writer.write_pfm
     files = []
 
     def interrupted_start(thread):
         start(thread)
-        if thread.name == "hci-writer_0":
+        if thread.name == "view-writer_0":
             assert has_begun.wait(60)
             raise KeyboardInterrupt
 
@@ -135,7 +135,7 @@ def test_an_interruption_while_a_thread_starts_leaves_nothing(tmp_path, monkeypa
 
     monkeypatch.setattr(threading.Thread, "start", interrupted_start)
     monkeypatch.setattr(ThreadPoolExecutor, "shutdown", told_shutdown)
-    monkeypatch.setattr(hci, "write_pfm", late_map)
+    monkeypatch.setattr(folder_writer, "write_pfm", late_map)
     with pytest.raises(KeyboardInterrupt):
         write(tmp_path / "field", updates())
     assert files == [True]

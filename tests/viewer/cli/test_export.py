@@ -44,3 +44,20 @@ def test_what_is_read_as_keys_is_not_written_onto(
     assert run(monkeypatch, *words) == 2
     assert "keys.gif" in capsys.readouterr().err
     assert keys.read_text() == "0 0\n0 1\n"
+
+
+def test_a_light_field_of_disparity_as_given(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "field"
+    words = ("export", photo_path, "--to", "numbered-grid", "-o", out, "--literal")
+    assert run(monkeypatch, *words) == 2
+    assert "--grid" in capsys.readouterr().err
+    assert run(monkeypatch, *words, "--grid", 5) == 0
+    shown = capsys.readouterr()
+    assert shown.out.splitlines() == [str(out)]
+    assert "Without --literal" in shown.err
+    assert len(list(out.glob("v??_u??.png"))) == 25
+    assert run(monkeypatch, "export", out, "--to", "eslf", "-o", tmp_path / "a_eslf.png") == 0
+    with Image.open(tmp_path / "a_eslf.png") as image:
+        assert image.size == (5 * 96, 5 * 64)

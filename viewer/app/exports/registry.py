@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
+from iibr_core.formats.light_fields.registry import writer_for
 from iibr_core.formats.outputs import require_file_place, require_folder_place
 from iibr_core.types import InputError
 
@@ -20,8 +22,10 @@ if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
     from viewer.model.state.app_state import Scene
 
+LIGHT_FIELD = ("light_field:write_light_field",)
 PICTURE = (".png",)
 MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
+STACK = ("view", "focus", "aperture", "size", "frames")
 EYES = ("focus", "aperture", "size", "eyes")
 
 
@@ -29,7 +33,7 @@ EYES = ("focus", "aperture", "size", "eyes")
 class ExportKind:
     """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
     names of the options about exports and the lens that mean something to it. path: makes the file's name what players
-    expect. needs: packages, of the extra `export`.
+    expect. layout: of a light field, among `WRITERS`. needs: packages, of the extra `export`.
     """
 
     words: str
@@ -37,6 +41,7 @@ class ExportKind:
     write: str
     heeds: tuple[str, ...] = ()
     path: str = ""
+    layout: str = ""
     needs: tuple[str, ...] = ()
 
     @property
@@ -62,6 +67,15 @@ EXPORTS = {
     "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING),
     "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING),
     "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING),
+    "focal-stack": ExportKind("Focal stack, PNGs", (), "stack:write_focal_stack", STACK),
+    "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK),
+    "aperture-sweep": ExportKind("Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK),
+    "aperture-sweep-exr": ExportKind("Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK),
+    "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci"),
+    "numbered-grid": ExportKind("Light field, numbered views", (), *LIGHT_FIELD, layout="numbered-grid"),
+    "stanford": ExportKind("Light field, Stanford archive", (), *LIGHT_FIELD, layout="stanford"),
+    "eslf": ExportKind("Light field, lenslet image", ("_eslf.png",), *LIGHT_FIELD, layout="eslf"),
+    "exr": ExportKind("Light field, one OpenEXR file", (".exr",), *LIGHT_FIELD, layout="exr"),
 }  # fmt: skip
 """By the name that people type."""
 
@@ -75,7 +89,7 @@ def export_kind(name: str) -> ExportKind:
 
 def require_ending(kind: ExportKind, path: Path) -> None:
     """Raise InputError where a file's name does not say that it is of this kind."""
-    if kind.endings and path.suffix.lower() not in kind.endings:
+    if kind.endings and not path.name.lower().endswith(kind.endings):
         raise InputError(f"{path}: is to end in {' or '.join(kind.endings)}")
 
 
@@ -90,7 +104,9 @@ def export_path(kind: ExportKind, path: Path, scene: Scene, options: ExportOptio
 def require_export_place(kind: ExportKind, path: Path, inputs: Sequence[Path], may_replace: bool) -> None:
     """Raise InputError where that may not be written, AlreadyThereError where something is. inputs: what is read."""
     require_ending(kind, path)
-    if kind.endings:
+    if kind.layout:
+        writer_for(kind.layout).require_place(path, inputs, may_replace)
+    elif kind.endings:
         require_file_place(path, inputs, may_replace)
     else:
         require_folder_place(path, inputs, may_replace, is_whole=True)
@@ -98,8 +114,8 @@ def require_export_place(kind: ExportKind, path: Path, inputs: Sequence[Path], m
 
 def writer_of(kind: ExportKind) -> Callable[[Path, ExportSource, ExportOptions], None]:
     """What writes it; raises InputError where that cannot be, Cancelled once it should stop."""
-    writer: Callable[[Path, ExportSource, ExportOptions], None] = _resolve(kind.write)
-    return writer
+    writer: Callable[..., None] = _resolve(kind.write)
+    return partial(writer, kind.layout) if kind.layout else writer
 
 
 def _resolve(entry: str) -> Any:

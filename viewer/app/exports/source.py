@@ -5,7 +5,7 @@ A kind of export is a function that writes one file or folder of this, in whatev
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
-from iibr_core.types import Disparity, ReportProgress, ViewUpdate
+from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Scene
-from viewer.model.state.optics import Optics
+from viewer.model.state.optics import CENTRE, Optics
 
 Item = TypeVar("Item")
 
@@ -65,7 +65,7 @@ class ExportSource:
             yield item
         self.report_progress(total, total, doing)
 
-    def views(self, zero: float | None = None) -> Iterator[ViewUpdate]:
+    def views(self, zero: float | None = None) -> Generator[ViewUpdate]:
         """Every view of the scene's grid once, the centre first, none of them kept.
 
         zero: the disparity (as given) that stays still, where it is to be another than the plan's; for photos only.
@@ -97,9 +97,14 @@ class ExportSource:
         low, high = (value + (plan.disparity_zero - zero) * plan.disparity_scale for value in plan.disparity_range_px)
         return replace(plan, disparity_zero=zero, disparity_range_px=(low, high))
 
-    def centre_disparity(self) -> Disparity | None:
-        """Of the centre view, px per view step; None where the scene has none."""
-        if self.loaded is not None:
-            return self.plan().field_disparity(self.loaded.disparity)
-        centre = next(self.views())
-        return None if centre.disparity is None else Disparity(centre.disparity, self.scene.name)
+    def centre_view(self) -> ViewUpdate:
+        """The centre view with its disparity, px per view step."""
+        views = self.views()
+        try:
+            return next(views)
+        finally:
+            views.close()
+
+    def disparity_seen(self) -> FloatImage | None:
+        """Disparity (H, W) of the centre view where that is the viewpoint; else None, as where there is none."""
+        return self.centre_view().disparity if self.optics.eye == CENTRE else None

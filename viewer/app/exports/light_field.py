@@ -1,0 +1,23 @@
+"""The whole light field, in the layouts that `WRITERS` knows."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+from iibr_core.formats.light_fields.registry import writer_for
+from viewer.app.exports.options import ExportOptions
+from viewer.app.exports.source import ExportSource
+
+
+def write_light_field(layout: str, path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """With every view's disparity, where there is one and the layout has a place for it.
+
+    Raises InputError where it cannot be written, Cancelled once the export should stop.
+    """
+    scene = source.scene
+    focal_px = source.loaded.photo.focal_px if source.loaded is not None else scene.focal_px or float(scene.width)
+    views = source.views()
+    with writer_for(layout)(path, scene.grid, focal_px, scene.name, True) as writer, closing(views):
+        for view in views:
+            writer.add(view)

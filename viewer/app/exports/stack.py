@@ -1,0 +1,105 @@
+"""Stacks of pictures: one focus after the other from far to near, or the aperture from a pinhole to its widest; beside
+them what is sharp everywhere, and the disparity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.formats.outputs import UnfinishedFolder
+from iibr_core.types import FloatImage, ImageSize
+from viewer.app.exports.options import ExportOptions
+from viewer.app.exports.source import ExportSource
+from viewer.model.layout import ScreenSize
+from viewer.model.lens.limits import aperture_limit
+from viewer.model.state.app_state import Scene
+from viewer.model.state.optics import Optics
+
+USUAL_FOCUSES, USUAL_APERTURES = 16, 9
+OPENED = 0.8
+"""Of the widest aperture, where it is closed."""
+
+Stack = Sequence[tuple[str, Optics]]
+"""Pictures by name."""
+ALL_IN_FOCUS = "all_in_focus"
+
+
+def focal_stack(scene: Scene, optics: Optics, count: int | None) -> Stack:
+    """Focus by focus, from far to near."""
+    far, near = scene.disparity_range_px
+    opened = optics.aperture_diameter or OPENED * aperture_limit(scene.grid)
+    focuses = np.linspace(far, near, count or USUAL_FOCUSES)
+    return [
+        (f"focus_{k:03d}", replace(optics, focus_disparity=float(focus), aperture_diameter=opened))
+        for k, focus in enumerate(focuses)
+    ]
+
+
+def aperture_sweep(scene: Scene, optics: Optics, count: int | None) -> Stack:
+    """Aperture by aperture, from a pinhole."""
+    diameters = np.linspace(0.0, aperture_limit(scene.grid), count or USUAL_APERTURES)
+    return [
+        (f"aperture_{k:03d}", replace(optics, aperture_diameter=float(diameter)))
+        for k, diameter in enumerate(diameters)
+    ]
+
+
+def write_focal_stack(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """A folder of PNGs, or an OpenEXR file; so do the others."""
+    _write(path, source, options, focal_stack(source.scene, source.optics, options.frames))
+
+
+def write_aperture_sweep(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """See `aperture_sweep`. Raises InputError where it cannot be written, Cancelled once the export should stop."""
+    _write(path, source, options, aperture_sweep(source.scene, source.optics, options.frames))
+
+
+def _write(path: Path, source: ExportSource, options: ExportOptions, stack: Stack) -> None:
+    stack = [*stack, (ALL_IN_FOCUS, replace(source.optics, aperture_diameter=0.0))]
+    size = options.size or source.scene.size
+    disparity = source.disparity_seen()
+    if path.suffix.lower() == ".exr":
+        _write_parts(path, source, size, stack, disparity)
+    else:
+        _write_folder(path, source, size, stack, disparity)
+
+
+def _write_folder(
+    path: Path, source: ExportSource, size: ScreenSize, stack: Stack, disparity: FloatImage | None
+) -> None:
+    from iibr_core.formats.images.photo import write_image
+
+    unfinished = UnfinishedFolder(path)
+    try:
+        for name, optics in source.watched(stack, len(stack), "drawing"):
+            write_image(unfinished.path / f"{name}.png", source.draw(optics, size))
+        if disparity is not None:
+            write_pfm(unfinished.path / "disparity.pfm", disparity)
+        unfinished.put_in_place()
+    finally:
+        unfinished.discard()
+
+
+def _write_parts(
+    path: Path, source: ExportSource, size: ScreenSize, stack: Stack, disparity: FloatImage | None
+) -> None:
+    """A part a picture, linear light; the one that is sharp everywhere has the disparity where their sizes agree."""
+    from iibr_core.formats.images.exr_parts import COLORS, DISPARITY, ExrPart, write_exr_parts
+
+    known = disparity if disparity is not None and disparity.shape == (size.height, size.width) else None
+
+    def has_disparity(name: str) -> bool:
+        return known is not None and name == ALL_IN_FOCUS
+
+    def draw(name: str, optics: Optics) -> FloatImage:
+        light = source.draw(optics, size, is_linear=True)
+        return light if known is None or not has_disparity(name) else np.dstack([light, known])
+
+    parts = [ExrPart(name, COLORS | (DISPARITY if has_disparity(name) else {})) for name, _ in stack]
+    drawn = (draw(name, optics) for name, optics in source.watched(stack, len(stack), "drawing"))
+    write_exr_parts(path, ImageSize(size.height, size.width), parts, drawn)
