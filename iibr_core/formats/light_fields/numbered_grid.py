@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 from iibr_core.formats.light_fields.folder_writer import FolderWriter
-from iibr_core.formats.light_fields.parameters import read_parameters, stated_grid
+from iibr_core.formats.light_fields.parameters import read_parameters, stated_grid, write_parameters
 from iibr_core.formats.light_fields.scene import GridIndex, MultiView, numbers_in
 from iibr_core.formats.light_fields.view_grid import (
     candidate_views,
@@ -29,9 +29,9 @@ HEBER_GRID = GridShape(11, 11)
 
 
 class NumberedGridWriter(FolderWriter):
-    """Writes v00_u00.png and so on; disparity beside them as an estimate."""
+    """Writes v00_u00.png and so on; disparity beside them as an estimate, and parameters.cfg."""
 
-    own_file = re.compile(r"v\d+_u\d+\.(png|exr)|disp_est_u\d+_v\d+\.pfm")
+    own_file = re.compile(r"parameters\.cfg|v\d+_u\d+\.(png|exr)|disp_est_u\d+_v\d+\.pfm")
 
     def view_name(self, row: int, column: int, extension: str) -> str:
         """By row and column."""
@@ -40,6 +40,10 @@ class NumberedGridWriter(FolderWriter):
     def map_names(self, row: int, column: int, is_wanted: bool, is_centre: bool) -> tuple[str, ...]:
         """Column first, as the readers of such folders have it."""
         return (f"disp_est_u{column:02d}_v{row:02d}.pfm",) if is_wanted or is_centre else ()
+
+    def finish_folder(self, folder: Path) -> None:
+        """Focal length and range of disparities."""
+        write_parameters(folder, self.name, self.grid, self.size, self.focal_px, self.range_px)
 
 
 def read_numbered_grid(folder: Path) -> MultiView | None:

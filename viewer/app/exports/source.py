@@ -78,12 +78,18 @@ class ExportSource:
 
             made = read_views(open_light_field(Path(self.scene.source.path)))[1]
         else:
+            from iibr_core.color import photo_in_srgb
             from iibr_core.generation.light_field import generate
 
             source, plan = self.scene.source, self.plan(zero)
             disparity = plan.field_disparity(self.loaded.disparity)
             made = generate(
-                self.loaded.photo, disparity, plan, self.should_stop, quality=source.quality, inpaint=source.inpaint
+                photo_in_srgb(self.loaded.photo),
+                disparity,
+                plan,
+                self.should_stop,
+                quality=source.quality,
+                inpaint=source.inpaint,
             )
         yield from self.watched(made, total, "making views")
         raise_if_stopped(self.should_stop)
