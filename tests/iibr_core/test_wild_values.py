@@ -376,7 +376,6 @@ READS_OR_TELLS = {
     "complaint_of full_scale",
     "formats.images.header": "PhotoHeader read_photo_header",
     "formats.images.thumbnail": "read_thumbnail",
-    "formats.light_fields.stanford": "read_stanford",
     "formats.light_fields.stanford": "read_stanford StanfordWriter",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
     "generation.light_field": "transformer_for",
