@@ -102,6 +102,18 @@ def open_with_depth(
     return _flat(photo, failures)
 
 
+def read_shown_photo(path: Path, max_pixels: int, kind: DepthKind) -> Photo:
+    """The photo that `open_with_depth` shows, max_pixels large at most; kind: where it found the depth.
+
+    Raises InputError as that does.
+    """
+    photo = read_photo(path, max_pixels)
+    embedded = read_embedded(path) if kind == "embedded" else None
+    if embedded is None or embedded.all_in_focus is None:
+        return photo
+    return _all_in_focus_photo(photo, embedded.all_in_focus, read_orientation(path), max_pixels)
+
+
 @dataclass(frozen=True, eq=False)
 class _DepthSearch:
     """One photo on its way to its depth. The methods give None where there is nothing to read."""

@@ -40,6 +40,8 @@ TARGET_BYTES, MOST_TARGET_PIXELS = 24, 8_000_000
 """Of one pixel of what a picture is drawn into; larger ones are drawn in parts."""
 PICTURE_BYTES, FLOAT_PICTURE_BYTES = 9, 64
 """Of one pixel of a picture on its way to a file: 8 bits a channel, or linear light."""
+OWN_SIZE_BYTES, TILE_BYTES = 45, 350 * MIB
+"""Of one pixel of a photo that is drawn at its own size; and of a tile of it, whatever its size."""
 USUAL_RAY_IMAGES, USUAL_HOLE_BYTES, USUAL_AMBIGUOUS_SHARE = 10, 20, 0.2
 """What scenes take while their views are made, before anything is known of them."""
 USUAL_GRID = GridShape(5, 5)
@@ -172,6 +174,15 @@ def require_picture(budget: Budget, size: ImageSize, is_float: bool) -> None:
     drawing = min(pixels, MOST_TARGET_PIXELS) * TARGET_BYTES
     needed = VIEWER_BYTES + drawing + pixels * (FLOAT_PICTURE_BYTES if is_float else PICTURE_BYTES)
     budget.require(needed, f"a picture of {size}", "give a smaller --size or raise --memory")
+
+
+def require_own_size(budget: Budget, size: ImageSize, view: ImageSize, field_bytes: int) -> None:
+    """Raise InputError where a picture at the photo's own (height, width) takes more than there is. view: the size of
+    the light field's views; field_bytes: of those that stay there meanwhile.
+    """
+    fills = math.prod(view) * (KEPT_BYTES + USUAL_RAY_IMAGES * RAY_BYTES)
+    needed = VIEWER_BYTES + field_bytes + fills + TILE_BYTES + math.prod(size) * OWN_SIZE_BYTES
+    budget.require(needed, f"a picture at the photo's own size, {size},", "raise --memory, or save a smaller picture")
 
 
 def mebibytes(count: float) -> str:

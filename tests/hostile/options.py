@@ -61,6 +61,14 @@ _screenshot = [
     )
     for value in values
 ]
+_screenshot += [
+    Case(
+        "screenshot --full and a size",
+        ("screenshot", "photo.png", "-o", "new.png", "--full", "--size", "8x8"),
+        says="--full",
+    ),
+    Case("screenshot --full of a photo", ("screenshot", "photo.png", "-o", "new.png", "--full"), 0, "", ("new.png",)),
+]
 
 _export = [
     Case(f"export {' '.join(words)}", ("export", "photo.png", *words), says=says)

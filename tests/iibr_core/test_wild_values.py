@@ -33,6 +33,8 @@ from iibr_core.rendering import (
     coherent_cells,
     disparity_statistics,
     joined_rays,
+    large_views,
+    lens_light,
     mixed_pixels,
     occlusion,
     resampling,
@@ -130,6 +132,26 @@ def completed(values):
 def rendered(offset, value=0.5):
     with ViewSynthesis(keeps_entropy=True) as synthesis:
         return synthesis.render(rays(value), offset)
+
+
+def large_picture(value):
+    """Through a lens, of a photo with a wild disparity, and with a wild number of the lens."""
+    photos = [large_views.LargePhoto(image(0.5), np.nan_to_num(depths(v))) for v in (value, 1.0)]
+    samples = (lens_light.LensSample(ViewOffset(0.5, -0.5), 1.0),)
+    lenses = [lens_light.LargeLens(ViewOffset(0.5, -1.0), samples, 0.5, 1.5, focus) for focus in (0.5, value)]
+    part, smaller = large_views.Part(1, 11, 2, 12), np.full((6, 7, 3), 0.5, np.float32)
+    with ViewSynthesis() as synthesis:
+        return [lens_light.draw_large(photo, lens, part, synthesis, smaller) for photo, lens in zip(photos, lenses)]
+
+
+def tile_views(value):
+    tile = large_views.Part(2, 9, 3, 12)
+    with ViewSynthesis() as synthesis:
+        return list(
+            large_views.views_of_tile(
+                large_views.LargePhoto(image(0.5), np.nan_to_num(depths(value))), tile, [ViewOffset(0.5, 1)], synthesis
+            )
+        )
 
 
 def shares(value):
@@ -251,6 +273,8 @@ FINITE = {
     "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
         image(0.5), known(v), 0.5
     )[:2],
+    "rendering.lens_light.draw_large": lambda v, _: large_picture(v),
+    "rendering.large_views.views_of_tile": lambda v, _: tile_views(v),
     "rendering.occlusion.covered_share": lambda v, _: occlusion.covered_share(np.nan_to_num(shares(v))),
     "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),
     "rendering.occlusion.occlusion_mask": lambda v, _: occlusion.occlusion_mask(shares(v)),
@@ -327,6 +351,8 @@ FINITE_BY_CONTRACT = {
     "formats.weights.save_weights": "training stops before, tests/iibr_core/training",
     "ray_transformer.inference.TrainedWeights": "huge features: rendering/test_ambiguous_rays.py, test_hard_cases.py",
     "ray_transformer.model.RayTransformer": "huge features: rendering/test_ambiguous_rays.py",
+    "rendering.lens_light.bring_to": "of light that `draw_large` made, and of a drawn picture",
+    "rendering.lens_light.mean_of_areas": "of light that `draw_large` made",
     "rendering.ray_set.RaySet": "NaN is no surface; infinity is refused by Disparity",
     "depth.models.estimate_cache.store": "an Estimate, in which NaN is unknown",
 }
@@ -393,9 +419,12 @@ READS_OR_TELLS = {
     "runtime.resources": "resource_folder",
     "runtime.extras": "is_installed require_extra",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
-    "largest_side require_reading require_decoding require_map require_views require_field require_picture mebibytes",
+    "largest_side require_reading require_decoding require_map require_views require_field require_picture "
+    "require_own_size mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
+    "depth.search": "read_shown_photo",
+    "rendering.large_views": "Part tiles_of whole",
     "rendering.view_synthesis": "ViewSynthesis",
     "types": "ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import TracebackType
 from typing import Any
@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.types import ReportProgress, ignore_progress
+from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
 from viewer.app.image_export import render_pixels
 from viewer.app.save_places import require_size
 from viewer.background.comparison_worker import ComparisonJob
 from viewer.background.loaded_photo import LoadedPhoto
-from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
+from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
@@ -48,6 +50,7 @@ class HeadlessViewer:
         self._scene_view = SceneView(self._gl)
         self._inspection_view = InspectionView(self._gl, self._scene_view)
         self._comparison_job = ComparisonJob()
+        self._results: Iterator[SceneReady | ViewReady] = iter(())
 
     def __enter__(self) -> HeadlessViewer:
         """Nothing more to do."""
@@ -76,6 +79,18 @@ class HeadlessViewer:
 
         on_ready: is told the scene before any of its views is made; what it raises ends the opening. Raises InputError.
         """
+        self.open_scene(source, depth_strength, on_progress, edits, on_ready)
+        self.make_views(on_progress)
+
+    def open_scene(
+        self,
+        source: Source,
+        depth_strength: float,
+        on_progress: Callable[[Progress], None],
+        edits: DepthEdits = UNEDITED,
+        on_ready: Callable[[Scene], None] = lambda scene: None,
+    ) -> None:
+        """The first part of `open`: there is one view, the photo."""
         self.state = AppState(depth_strength=depth_strength)
         self.do(OpenPath(source))
         on_progress(self.state.progress)
@@ -83,18 +98,24 @@ class HeadlessViewer:
         request = SceneRequest(
             self.state.generation, source, depth_strength, depth_settings=depth_settings, takes_drafts=False
         )
-        for result in results_of(request, lambda: False, lambda: CENTRE, on_progress):
-            if isinstance(result, SceneReady):
-                on_ready(result.scene)
-                self._scene_view.open(result)
-                self._inspection_view.open()
-                self.do(SceneOpened(result.generation, result.scene))
-                self.state = replace(self.state, depth=depth_settings)
-            else:
-                self._scene_view.add(result.view)
-                self._inspection_view.add(result.view)
-                self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
-                on_progress(result.progress)
+        self._results = results_of(request, lambda: False, lambda: CENTRE, on_progress)
+        ready = next(self._results)
+        assert isinstance(ready, SceneReady)
+        on_ready(ready.scene)
+        self._scene_view.open(ready)
+        self._inspection_view.open()
+        self.do(SceneOpened(ready.generation, ready.scene))
+        self.state = replace(self.state, depth=depth_settings)
+        self._scene_view.upload_all()
+
+    def make_views(self, on_progress: Callable[[Progress], None]) -> None:
+        """The second part of `open`."""
+        for result in self._results:
+            assert isinstance(result, ViewReady)
+            self._scene_view.add(result.view)
+            self._inspection_view.add(result.view)
+            self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
+            on_progress(result.progress)
             self._scene_view.upload_all()
 
     def pick(self, x_px: float, y_px: float) -> float | None:
@@ -106,10 +127,16 @@ class HeadlessViewer:
         for action in actions:
             self.state = reduce(self.state, action)
 
-    def picture(self, size: ScreenSize | None = None, as_float: bool = False) -> NDArray[Any]:
+    def picture(
+        self,
+        size: ScreenSize | None = None,
+        as_float: bool = False,
+        report_progress: ReportProgress = ignore_progress,
+    ) -> NDArray[Any]:
         """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3).
 
-        sRGB-encoded, uint8 or float32 with 1 = white. Raises InputError for absurd sizes.
+        sRGB-encoded, uint8 or float32 with 1 = white. Raises InputError for absurd sizes, and where the photo is no
+        longer there to be read at its own size.
         """
         scene = self.state.scene
         assert scene is not None
@@ -117,13 +144,47 @@ class HeadlessViewer:
         box = letterbox(Rect(0, 0, width, height), scene.size)
         assert box is not None
         layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
-        image = np.empty((height, width, 3), np.float32 if as_float else np.uint8)
-        image[:] = BACKGROUND[:3] if as_float else np.round(np.array(BACKGROUND[:3]) * 255)
         assert layout.picture_px is not None
         x, y, box_width, box_height = layout.picture_px
-        pixels = render_pixels(self._scene_view, self.state, layout.picture_px.size, as_float)
+        box_size = layout.picture_px.size
+        if is_full(scene, self.state.optics, box_size):
+            pixels = self._full_picture(scene, box_size, as_float, report_progress)
+        else:
+            pixels = render_pixels(self._scene_view, self.state, box_size, as_float)
+        if box_size == (width, height):
+            return pixels
+        image = np.empty((height, width, 3), np.float32 if as_float else np.uint8)
+        image[:] = BACKGROUND[:3] if as_float else np.round(np.array(BACKGROUND[:3]) * 255)
         image[y : y + box_height, x : x + box_width] = pixels
         return image
+
+    def _full_picture(
+        self, scene: Scene, size: ScreenSize, as_float: bool, report_progress: ReportProgress
+    ) -> NDArray[Any]:
+        loaded, optics = self._scene_view.loaded, self.state.optics
+        assert loaded is not None
+        assert scene.plan is not None
+        smaller = None
+        if needs_smaller(optics):
+            smaller = self._scene_view.picture(optics, scene.size, is_linear=True, color_space=scene.color_space)
+        full = FullPicture(scene, scene.plan, loaded, optics, size, smaller)
+        return encode_light(full.draw(report_progress=report_progress), as_float, scene.color_space)
+
+    @property
+    def scene(self) -> Scene:
+        """What is open."""
+        assert self.state.scene is not None
+        return self.state.scene
+
+    @property
+    def own_size(self) -> ScreenSize:
+        """Of the photo in its file; of a view where there is none."""
+        return self.scene.own_size or self.scene.size
+
+    def needs_views(self, size: ScreenSize | None) -> bool:
+        """Whether `picture` at this size shows views other than the photo."""
+        scene, optics = self.scene, self.state.optics
+        return needs_smaller(optics) or not is_full(scene, optics, size or scene.size)
 
     def draw(
         self, optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE, is_linear: bool = False

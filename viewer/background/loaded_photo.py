@@ -13,6 +13,7 @@ import numpy as np
 
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import UNEDITED, Levels, levels_of
+from iibr_core.formats.files import require_file
 from iibr_core.generation.memory_model import (
     Budget,
     budget_of,
@@ -28,7 +29,7 @@ from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, p
 from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
-from iibr_core.types import Disparity, FloatImage, InputError, Photo
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo
 from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.depth_editing import DepthSettings
 
@@ -48,6 +49,7 @@ class LoadedPhoto:
     disparity: what `depth_settings` made of what was `found`, by way of what was `refined`. origin: where it was found.
     settings: text of the settings the photo was saved with by this program, "" without. models: names of the depth
     models on this machine. levels: of what was refined. canvas: what the worker edits on; nobody else touches it.
+    own_size: of the photo as its file has it, upright. stamp: of that file, see `stamp_of`.
     """
 
     photo: Photo
@@ -60,6 +62,15 @@ class LoadedPhoto:
     refined: Disparity
     levels: Levels
     canvas: DepthCanvas
+    own_size: ImageSize
+    stamp: tuple[int, ...]
+
+
+def stamp_of(path: Path) -> tuple[int, ...]:
+    """What tells a file from one that came in its place. Raises InputError where there is none."""
+    require_file(path)
+    status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def load_photo(
@@ -90,7 +101,8 @@ def load_photo(
             report_progress(Progress(doing=f"{doing}, {done / total:.0%}" if done and total else doing))
 
     path = Path(source.path)
-    max_pixels, notes = _pixels_to_read(source, keeps_views)
+    max_pixels, stored_size, notes = _pixels_to_read(source, keeps_views)
+    stamp = stamp_of(path)
     found = open_with_depth(
         path,
         replace(source.depth, refine=NOT_YET),
@@ -103,7 +115,9 @@ def load_photo(
     give_back_memory()
     # This program saves neither.
     settings = "" if is_heic(path) or is_avif(path) else settings_text_in(path)
-    return _prepare(found, settings, _models_here(), depth_settings or DepthSettings(source.depth.refine), should_stop)
+    settings_wanted = depth_settings or DepthSettings(source.depth.refine)
+    own_size = _turned_like(stored_size, found.photo.size)
+    return _prepare(found, settings, _models_here(), settings_wanted, (own_size, stamp), should_stop)
 
 
 def apply_depth_settings(
@@ -121,9 +135,16 @@ def apply_depth_settings(
     return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
 
 
-def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, tuple[str, ...]]:
-    """How large a photo is read, and a note where that is less than was asked for. Raises InputError where memory does
-    not allow it, before any of it is taken.
+def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
+    """The size of a stored picture as it is upright."""
+    is_turned = (size.height < size.width) != (upright.height < upright.width) and size.height != size.width
+    return ImageSize(size.width, size.height) if is_turned else size
+
+
+def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, ImageSize, tuple[str, ...]]:
+    """How large a photo is read, how large it is stored, and a note where that is less than was asked for.
+
+    Raises InputError where memory does not allow it, before any of it is taken.
     """
     from iibr_core.formats.images.header import read_photo_header
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, size_within
@@ -136,14 +157,14 @@ def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, tuple[str, 
     size = size_within(header.size, wanted)
     if not keeps_views:
         require_reading(budget, size)
-        return wanted, ()
+        return wanted, header.size, ()
     fitting = pixels_within(budget, source.grid)
     is_less = fitting < size.height * size.width
     size = size_within(size, fitting) if is_less else size
     if source.grid is not None:
         require_views(budget, path.name, size, source.grid)
     note = f"{budget.said} {mebibytes(budget.bytes)}: no room for more than {fitting:,} pixels of the photo."
-    return (fitting, (note,)) if is_less else (wanted, ())
+    return (fitting, header.size, (note,)) if is_less else (wanted, header.size, ())
 
 
 def _require_map(source: Source, budget: Budget, keeps_views: bool) -> None:
@@ -203,6 +224,7 @@ def _prepare(
     settings: str,
     models: tuple[str, ...],
     depth_settings: DepthSettings,
+    file: tuple[ImageSize, tuple[int, ...]],
     should_stop: ShouldStop,
 ) -> LoadedPhoto:
     from iibr_core.depth.editing.brush import DepthCanvas
@@ -211,7 +233,9 @@ def _prepare(
     canvas = DepthCanvas(found.photo.pixels, values.values)
     as_found = DepthSettings(NOT_YET)
     levels = levels_of(values.values)
-    loaded = LoadedPhoto(found.photo, values, found.origin, settings, models, as_found, values, values, levels, canvas)
+    loaded = LoadedPhoto(
+        found.photo, values, found.origin, settings, models, as_found, values, values, levels, canvas, *file
+    )
     return apply_depth_settings(loaded, depth_settings, should_stop)
 
 

@@ -23,6 +23,7 @@ from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
 from viewer.background.photo_folder import first_photo
+from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.optics import CENTRE
@@ -149,6 +150,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         levels=loaded.levels,
         depth_models=loaded.models,
         color_space=loaded.photo.color_space,
+        own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
     )
 
 

@@ -63,8 +63,8 @@ class Backend(StrEnum):
 
 @dataclass(frozen=True)
 class _Shot:
-    """What is opened, and what is done to it before the picture is taken. size: None for the usual one. notes: to be
-    said with it.
+    """What is opened, and what is done to it before the picture is taken. size: None for the usual one. is_full: at
+    the photo's own size. notes: to be said with it.
     """
 
     source: Source
@@ -73,6 +73,7 @@ class _Shot:
     edits: DepthEdits = UNEDITED
     actions: tuple[Action, ...] = ()
     notes: tuple[str, ...] = ()
+    is_full: bool = False
     lens: LensOptions = NO_LENS_OPTIONS
 
 
@@ -105,6 +106,7 @@ def screenshot(
         ScreenSize | None,
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
     ] = None,
+    full: Annotated[bool, typer.Option("--full", help="At the photo's own size, from all its pixels.")] = False,
     ui: Annotated[bool, typer.Option("--ui", help="With the panels, as in the window.")] = False,
     backend: Annotated[Backend, typer.Option(help="Where OpenGL comes from.")] = Backend.auto,
     disparity: DisparityFile = None,
@@ -123,6 +125,8 @@ def screenshot(
 ) -> None:
     """Render one picture without a display; its settings are saved in it.
 
+    Up to the photo's own size (--size, --full) all of its pixels count, however small the views are (--max-pixels).
+
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
     from viewer.app.save_places import require_picture_place
@@ -133,6 +137,8 @@ def screenshot(
     require_heeded(context, path)
     require_memory(memory, keeps_views=True)
     require_existing(shot.source)
+    if full and (ui or size is not None):
+        raise InputError(f"--full: gives the picture its size, leave {'--ui' if ui else '--size'} away")
     if ui:
         require_utf8(path, disparity, depth_model)
     if like is not None:
@@ -140,7 +146,7 @@ def screenshot(
     require_picture_memory(shot.size, shot.source.depth.memory_bytes, output.suffix.lower() == ".exr")
     require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)
     require_model(choice)
-    shot = replace(shot, lens=LensOptions(view, focus, aperture))
+    shot = replace(shot, lens=LensOptions(view, focus, aperture), is_full=full)
     notes, origin = _write(shot, output, ui, backend)
     print(output)
     print_depth(origin)
@@ -167,6 +173,7 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
 
 def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple[str, ...], DepthOrigin | None]:
     """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
+    from viewer.app.full_picture import require_full
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image, is_float, settings_of
 
@@ -174,15 +181,24 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
         with show_progress("reading") as show:
-            viewer.open(
+            viewer.open_scene(
                 shot.source,
                 shot.depth_strength,
                 lambda made: show(made.done, made.total, made.doing),
                 shot.edits,
                 on_ready=shot.lens.require_within,
             )
-        viewer.do(*shot.actions, *shot.lens.actions())
-        pixels = viewer.screen(shot.size or SCREEN_SIZE) if ui else viewer.picture(shot.size, is_float(output))
+            viewer.do(*shot.actions, *shot.lens.actions())
+            size = shot.size
+            if shot.is_full:
+                size = viewer.own_size
+                require_full(viewer.scene, viewer.state.optics)
+            if ui or viewer.needs_views(size):
+                viewer.make_views(lambda made: show(made.done, made.total, made.doing))
+            if not ui:
+                pixels = viewer.picture(size, is_float(output), show)
+        if ui:
+            pixels = viewer.screen(shot.size or SCREEN_SIZE)
     export_image(
         output, pixels, None if ui else settings_of(viewer.state, ScreenSize(pixels.shape[1], pixels.shape[0]))
     )

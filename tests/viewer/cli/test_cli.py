@@ -191,6 +191,43 @@ def test_screenshot_writes_an_image_of_the_size_asked_for(
     assert read_photo(out).size == (500, 700)
 
 
+@pytest.mark.parametrize("options", [(), ("--view", "0.5,-0.7"), ("--aperture", 3, "--focus", "-0.2")], ids=str)
+def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, options: tuple[object, ...]
+) -> None:
+    from iibr_core.color import linear_from_srgb, srgb_from_linear
+    from iibr_core.formats.images.photo import read_photo
+    from iibr_core.rendering.lens_light import mean_of_areas
+    from iibr_core.types import ImageSize
+
+    full, usual, half = (tmp_path / f"{name}.png" for name in ("full", "usual", "half"))
+    words = ("--max-pixels", 32 * 48, "--grid", 3, *options)
+    assert run(monkeypatch, "screenshot", photo_path, "--full", *words, "-o", full) == 0
+    assert run(monkeypatch, "screenshot", photo_path, *words, "-o", usual) == 0
+    assert read_photo(full).size == (HEIGHT, WIDTH)
+    expected = read_photo(usual).pixels
+    assert expected.shape == (HEIGHT // 2, WIDTH // 2, 3)
+    smaller = srgb_from_linear(mean_of_areas(linear_from_srgb(read_photo(full).pixels), ImageSize(32, 48)))
+    error = np.abs(smaller - expected)[2:-2, 2:-2]
+    assert error.mean() < 0.01
+    if not options:
+        np.testing.assert_allclose(read_photo(full).pixels, read_photo(photo_path).pixels, atol=1.01 / 255)
+    # Any size up to it is made of the same.
+    assert run(monkeypatch, "screenshot", photo_path, "--size", "80x60", *words, "-o", half) == 0
+    assert read_photo(half).size == (60, 80)
+
+
+def test_full_gives_the_size_and_needs_memory(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "o.png"
+    assert run(monkeypatch, "screenshot", photo_path, "--full", "--size", "8x8", "-o", out) == 2
+    assert "--full" in capsys.readouterr().err
+    assert run(monkeypatch, "screenshot", photo_path, "--full", "--memory", "500M", "-o", out) == 2
+    assert "own size" in capsys.readouterr().err
+    assert not out.exists()
+
+
 @pytest.mark.parametrize("suffix", [".png", ".exr"])
 def test_like_repeats_a_saved_picture_exactly_but_for_what_is_given(
     monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, suffix: str

@@ -71,7 +71,8 @@ class Scene:
     has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
     not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
     file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
-    view step as given. depth_models: names of those on this machine. color_space: of its views.
+    view step as given. depth_models: names of those on this machine. color_space: of its views. own_size: of the photo
+    in its file, which a view may be smaller than; None for light fields.
     """
 
     source: Source
@@ -92,6 +93,7 @@ class Scene:
     levels: Levels | None = None
     depth_models: tuple[str, ...] = ()
     color_space: ColorSpace = SRGB
+    own_size: ScreenSize | None = None
 
     @property
     def size(self) -> ScreenSize:

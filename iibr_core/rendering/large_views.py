@@ -1,0 +1,192 @@
+"""Views of a photo at its own size, a tile at a time: memory stays flat however large it is.
+
+The rays of a tile are those of the photo's part around it; what the photo hides comes from the ray set of the light
+field, which is smaller: so a hole shows the same in both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.resampling import OWN_SURFACE_PX
+from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
+
+TILE_PX = 1024
+"""Side of a tile, what lies around it not counted."""
+AROUND_PX = 8
+"""What lies around a tile beside the parallax: filters and edges reach so far."""
+
+NO_RAY = np.float32(-1e6)
+"""The disparity where an inpainted image has no ray, far from any there is: where it were NaN, as it is elsewhere, each
+pixel would count as an edge, and take as long.
+"""
+
+
+class Part(NamedTuple):
+    """Rows [top, bottom) and columns [left, right) of an image."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    @property
+    def size(self) -> ImageSize:
+        """Of the part."""
+        return ImageSize(self.bottom - self.top, self.right - self.left)
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """To take it out of an array (H, W, ...)."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+    def grown(self, by_px: int, within: ImageSize) -> Part:
+        """With so much around it, as far as the image (height, width) goes."""
+        return Part(
+            max(self.top - by_px, 0),
+            min(self.bottom + by_px, within.height),
+            max(self.left - by_px, 0),
+            min(self.right + by_px, within.width),
+        )
+
+    def inside(self, other: Part) -> Part:
+        """The same part, counted from the corner of another."""
+        return Part(self.top - other.top, self.bottom - other.top, self.left - other.left, self.right - other.left)
+
+
+def whole(size: ImageSize) -> Part:
+    """All of an image (height, width)."""
+    return Part(0, size.height, 0, size.width)
+
+
+def tiles_of(part: Part, side: int = TILE_PX) -> list[Part]:
+    """A part of an image in tiles of at most side x side pixels, row by row."""
+    return [
+        Part(top, min(top + side, part.bottom), left, min(left + side, part.right))
+        for top in range(part.top, part.bottom, side)
+        for left in range(part.left, part.right, side)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class LargePhoto:
+    """A photo at its own size. pixels: (H, W, 3) sRGB-encoded. disparity: (H, W), px of it per view step. fills: the
+    complete ray set of a light field of the same scene, of whatever size: its inpainted images are taken over.
+    """
+
+    pixels: FloatImage
+    disparity: FloatImage
+    fills: RaySet | None = None
+
+    @property
+    def size(self) -> ImageSize:
+        """Of the photo."""
+        return image_size(self.disparity)
+
+    def with_fills(self, fills: RaySet | None) -> LargePhoto:
+        """The same with what was inpainted."""
+        return replace(self, fills=fills)
+
+    def rays(self, part: Part, offsets: Sequence[ViewOffset], should_stop: ShouldStop = never) -> RaySet:
+        """The rays of a part of it that may show from these offsets. Raises Cancelled once should_stop is true."""
+        farthest_views = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
+        colors, disparity = (np.ascontiguousarray(image[part.slices]) for image in (self.pixels, self.disparity))
+        fills = [] if self.fills is None else _fills_in(self.fills, self.size, part, offsets)
+        rays = rays_of_photo(colors, disparity, farthest_views, len(fills), should_stop)
+        for k in fills:
+            assert self.fills is not None
+            seen_from, fill_colors, fill_disparity, fill_coverage, _ = self.fills.arrays
+            enlarged = _enlarge(fill_colors[k], fill_disparity[k], fill_coverage[k], self.size, part)
+            rays.add(ViewOffset(*seen_from[k]), *enlarged, should_stop)
+        return rays
+
+
+def views_of_tile(
+    photo: LargePhoto, tile: Part, offsets: list[ViewOffset], synthesis: ViewSynthesis, should_stop: ShouldStop = never
+) -> Iterator[RenderedView]:
+    """What a tile of the photo shows from these offsets, one view after the other.
+
+    Raises Cancelled once should_stop is true, ValueError for offsets that are not finite.
+    """
+    farthest = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
+    parallax_px = farthest * float(np.abs(photo.disparity).max(initial=0.0))
+    around = tile.grown(AROUND_PX + math.ceil(min(parallax_px, max(photo.size))), photo.size)
+    rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
+    for offset in offsets:
+        view = synthesis.render(rays, offset)
+        yield RenderedView(view.colors[shown], view.disparity[shown], view.occluded[shown], view.inpainted[shown])
+
+
+def _fills_in(fills: RaySet, size: ImageSize, part: Part, offsets: Sequence[ViewOffset]) -> list[int]:
+    """Indices of the inpainted images that have rays in this part of a photo of (height, width), and that lie on the
+    side of one of these offsets: from the other side other things are disclosed.
+    """
+    rows, columns = (slice(low, high) for low, high in _under(part, size, fills.size))
+    inpainted_from, _, _, coverage, _ = fills.arrays
+    alike = (inpainted_from[:, None] * np.array(offsets).reshape(1, -1, 2) > 0).any(axis=(1, 2))
+    return [k for k in range(fills.photo_images, len(fills)) if alike[k] and coverage[k, rows, columns].any()]
+
+
+def _under(part: Part, size: ImageSize, smaller: ImageSize) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Rows and columns of the same picture at another (height, width) that a part covers."""
+    ratio_y, ratio_x = smaller.height / size.height, smaller.width / size.width
+    return (
+        (int(part.top * ratio_y), math.ceil(part.bottom * ratio_y)),
+        (int(part.left * ratio_x), math.ceil(part.right * ratio_x)),
+    )
+
+
+def _enlarge(
+    colors: FloatImage, disparity: FloatImage, coverage: FloatImage, size: ImageSize, part: Part
+) -> tuple[FloatImage, FloatImage, FloatImage]:
+    """A part of an image of rays as it is at another (height, width): interpolated between rays of one surface."""
+    shape = part.size
+    found = np.zeros((*shape, 3), np.float32), np.full(shape, NO_RAY, np.float32), np.zeros(shape, np.float32)
+    _enlarge_rays(colors, disparity, coverage, size.height, size.width, part.top, part.left, *found)
+    return found
+
+
+@kernel
+def _enlarge_rays(
+    colors, disparity, coverage, height, width, top, left, large_colors, large_disparity, large_coverage
+):  # fmt: skip
+    """Fill the last three, a part from (top, left) of an image of height x width, from the first three, all of it."""
+    step_y, step_x = disparity.shape[0] / height, disparity.shape[1] / width
+    for row in range(large_disparity.shape[0]):
+        # Pixel areas are aligned at the borders, hence the halves.
+        y = (top + row + 0.5) * step_y - 0.5
+        for column in range(large_disparity.shape[1]):
+            x = (left + column + 0.5) * step_x - 0.5
+            near_y = min(max(math.floor(y + 0.5), 0), disparity.shape[0] - 1)
+            near_x = min(max(math.floor(x + 0.5), 0), disparity.shape[1] - 1)
+            if not coverage[near_y, near_x] > 0:
+                continue
+            own = disparity[near_y, near_x]
+            total, depth, red, green, blue = 0.0, 0.0, 0.0, 0.0, 0.0
+            for v in range(max(math.floor(y), 0), min(math.floor(y) + 2, disparity.shape[0])):
+                for u in range(max(math.floor(x), 0), min(math.floor(x) + 2, disparity.shape[1])):
+                    # Of the nearest ray's surface only; NaN, no surface, fails the comparison.
+                    if not (coverage[v, u] > 0 and abs(disparity[v, u] - own) <= OWN_SURFACE_PX):
+                        continue
+                    weight = (1.0 - abs(v - y)) * (1.0 - abs(u - x))
+                    total += weight
+                    depth += weight * disparity[v, u]
+                    red += weight * colors[v, u, 0]
+                    green += weight * colors[v, u, 1]
+                    blue += weight * colors[v, u, 2]
+            if not total > 0:
+                continue
+            large_coverage[row, column] = coverage[near_y, near_x]
+            large_disparity[row, column] = depth / total / step_x
+            large_colors[row, column, 0] = red / total
+            large_colors[row, column, 1] = green / total
+            large_colors[row, column, 2] = blue / total

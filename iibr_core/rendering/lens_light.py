@@ -1,0 +1,325 @@
+"""A picture through a lens at the photo's own size: what is in focus from views of that size, summed in linear light;
+all else, which is too blurred to need more, from the same picture at the size of the light field.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile
+from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.runtime.jit import kernel, linear_scalar
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import FloatImage, ImageSize, ReportProgress, ViewOffset, ignore_progress, image_size
+
+ENLARGED_BY = -0.5
+"""Of Keys' cubic kernels (1981) the one that slopes come through unchanged."""
+ROUNDS = 2
+"""Of bringing the picture, made smaller, to the one it is made of: an enlarged one, made smaller, is a bit softer."""
+TAPS = 2
+"""Pixels that the kernel reaches to each side."""
+DRAWING = "drawing at the photo's own size"
+ON_SURFACE_ROUNDS = 3
+"""Of following a ray to what it shows, where a range of disparities is in focus."""
+
+
+CENTRE = ViewOffset(0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class LensSample:
+    """A point of the lens. offset: from the eye, view steps. weight: of its light; all weights sum to 1."""
+
+    offset: ViewOffset
+    weight: float
+
+
+@dataclass(frozen=True)
+class LargeLens:
+    """A lens for pictures of a `LargePhoto`.
+
+    samples: none: a pinhole. share: of what they see in the picture, the rest is the pinhole's. diameter: in view
+    steps. focus: the sharp disparity, px of the large photo per view step, in the picture's middle; tilt: how much it
+    grows to its right and lower border; focus_range: so much to both sides is sharp too. sharp_up_to_px: width of the
+    whole blur at which light begins to be left to the smaller picture, and at which all is. highlight_gain: what
+    clipped light counts for beyond white. exposure: factor.
+    """
+
+    eye: ViewOffset = CENTRE
+    samples: tuple[LensSample, ...] = ()
+    share: float = 0.0
+    diameter: float = 0.0
+    focus: float = 0.0
+    tilt: tuple[float, float] = (0.0, 0.0)
+    focus_range: float = 0.0
+    sharp_up_to_px: tuple[float, float] = (1.0, 2.0)
+    highlight_gain: float = 0.0
+    exposure: float = 1.0
+
+    @property
+    def offsets(self) -> list[ViewOffset]:
+        """Of the views it needs: the eye's first, where it has a share, then those of the samples."""
+        seen = [self.eye] if self.share < 1 else []
+        if self.share > 0:
+            seen += [ViewOffset(self.eye.t + at.offset.t, self.eye.s + at.offset.s) for at in self.samples]
+        return seen
+
+
+def draw_large(
+    photo: LargePhoto,
+    lens: LargeLens,
+    part: Part,
+    synthesis: ViewSynthesis,
+    smaller: FloatImage | None = None,
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+) -> FloatImage:
+    """Linear light (h, w, 3), not cut off at white, of a part of the photo through a lens.
+
+    smaller: (H', W', 3) linear light of the whole picture at the light field's size: where something is blurred, the
+    result, made smaller, equals it. A lens with samples needs it. Raises Cancelled once should_stop is true.
+    """
+    light, tiles = np.zeros((*part.size, 3), np.float32), tiles_of(part)
+    done, total = 0, len(tiles) * max(len(lens.offsets), 1)
+    for tile in tiles:
+        for _ in _draw_tile(photo, lens, tile, synthesis, should_stop, light[tile.inside(part).slices]):
+            report_progress(done, total, DRAWING)
+            done += 1
+    if smaller is not None:
+        bring_to(light, smaller, part, photo.size, should_stop)
+    return light
+
+
+def _draw_tile(
+    photo: LargePhoto, lens: LargeLens, tile: Part, synthesis: ViewSynthesis, should_stop: ShouldStop, light: FloatImage
+) -> Iterator[None]:
+    """Add what a tile shows in focus to its light, one view of the lens after the other."""
+    if lens.share < 1:
+        (view,) = views_of_tile(photo, tile, [lens.eye], synthesis, should_stop)
+        light += np.float32(1 - lens.share) * _linear(view.colors, lens, should_stop)
+        yield
+    if not _has_sharp(photo, lens, tile):
+        return
+    in_focus, weights = np.zeros_like(light), np.zeros(tile.size, np.float32)
+    steepest = abs(lens.focus) + sum(map(abs, lens.tilt)) + lens.focus_range
+    moved_px = max((steepest * abs(axis) for at in lens.samples for axis in at.offset), default=0.0)
+    around = tile.grown(math.ceil(min(moved_px, max(photo.size))) + TAPS, photo.size)
+    views = views_of_tile(photo, around, lens.offsets[lens.share < 1 :], synthesis, should_stop)
+    for sample, view in zip(lens.samples, views):
+        shown = _linear(view.colors, lens, should_stop)
+        _add_in_bands(shown, view.disparity, around, lens, sample, tile, photo.size, in_focus, weights, should_stop)
+        yield
+    light += in_focus * (np.float32(lens.share) / np.maximum(weights, np.float32(1e-6)))[..., None]
+
+
+def bring_to(
+    light: FloatImage, smaller: FloatImage, part: Part, size: ImageSize, should_stop: ShouldStop = never
+) -> None:
+    """Change light (h, w, 3), a part of a picture of (height, width), by as little as makes it equal `smaller`, the
+    whole picture (H', W', 3), where it is made as small. Raises Cancelled once should_stop is true.
+
+    What it holds that is finer than the pixels of `smaller` stays.
+    """
+    step_y, step_x = size.height / smaller.shape[0], size.width / smaller.shape[1]
+    top, left = int(part.top / step_y), int(part.left / step_x)
+    bottom, right = (min(math.ceil(a), n) for a, n in zip((part.bottom / step_y, part.right / step_x), smaller.shape))
+    missing = np.empty((bottom - top, right - left, 3), np.float32)
+    for _ in range(ROUNDS):
+
+        def lack(first: int, last: int) -> None:
+            _mean_of_areas(light, part.top, part.left, step_y, step_x, top, left, first, last, missing)
+            missing[first:last] = smaller[top + first : top + last, left:right] - missing[first:last]
+
+        def give(first: int, last: int) -> None:
+            _add_enlarged(missing, top, left, step_y, step_x, part.top, part.left, first, last, light)
+
+        in_bands(lack, image_size(missing), should_stop)
+        in_bands(give, part.size, should_stop)
+
+
+def mean_of_areas(light: FloatImage, size: ImageSize, should_stop: ShouldStop = never) -> FloatImage:
+    """Light (h, w, 3) at another (height, width): the mean over each pixel's area; the same array where it has that
+    size. Raises Cancelled once should_stop is true.
+    """
+    if image_size(light) == size:
+        return light
+    means = np.empty((*size, 3), np.float32)
+    step_y, step_x = light.shape[0] / size.height, light.shape[1] / size.width
+    in_bands(
+        lambda first, last: _mean_of_areas(light, 0, 0, step_y, step_x, 0, 0, first, last, means), size, should_stop
+    )
+    return means
+
+
+def _has_sharp(photo: LargePhoto, lens: LargeLens, tile: Part) -> bool:
+    """Whether anything that may show in a tile is in focus."""
+    if not lens.share > 0:
+        return False
+    reach = math.ceil(max(map(abs, lens.eye)) * float(np.abs(photo.disparity).max(initial=0.0)))
+    around = tile.grown(min(reach, max(photo.size)) + math.ceil(lens.sharp_up_to_px[1]), photo.size)
+    disparity = photo.disparity[around.slices]
+    slack = lens.focus_range + sum(map(abs, lens.tilt)) + lens.sharp_up_to_px[1] / max(lens.diameter, 1e-9)
+    return bool((np.abs(disparity - np.float32(lens.focus)) <= slack).any())
+
+
+def _linear(encoded: FloatImage, lens: LargeLens, should_stop: ShouldStop) -> FloatImage:
+    light = np.empty(encoded.shape, np.float32)
+
+    def band(first: int, last: int) -> None:
+        _linear_rows(encoded, lens.highlight_gain, lens.exposure, first, last, light)
+
+    in_bands(band, image_size(encoded), should_stop)
+    return light
+
+
+def _add_in_bands(
+    shown: FloatImage,
+    disparity: FloatImage,
+    around: Part,
+    lens: LargeLens,
+    sample: LensSample,
+    tile: Part,
+    size: ImageSize,
+    light: FloatImage,
+    weights: FloatImage,
+    should_stop: ShouldStop,
+) -> None:
+    """Add what one sample sees in focus. around: what of the photo its view (shown, disparity) is of."""
+
+    def band(first: int, last: int) -> None:
+        _add_sharp(
+            shown, disparity, around.top, around.left, tile.top, tile.left, size.height, size.width,
+            sample.offset.t, sample.offset.s, sample.weight, lens.focus, *lens.tilt, lens.focus_range, lens.diameter,
+            *lens.sharp_up_to_px, first, last, light, weights,
+        )  # fmt: skip
+
+    in_bands(band, tile.size, should_stop)
+
+
+@kernel
+def _linear_rows(encoded, gain, exposure, first, last, light):
+    """Linear light of rows [first, last), clipped colours brightened: see shaders/include/field.glsl."""
+    for y in range(first, last):
+        for x in range(encoded.shape[1]):
+            r, g, b = (
+                linear_scalar(encoded[y, x, 0]),
+                linear_scalar(encoded[y, x, 1]),
+                linear_scalar(encoded[y, x, 2]),
+            )
+            factor = exposure
+            if gain > 0:
+                clipped = min(max(20.0 * math.sqrt(max(r, g, b)) - 19.0, 0.0), 1.0)
+                factor *= 1.0 + gain * clipped * clipped
+            light[y, x, 0], light[y, x, 1], light[y, x, 2] = factor * r, factor * g, factor * b
+
+
+@kernel
+def _keys(f, a):
+    """Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1)."""
+    g = 1.0 - f
+    return (
+        a * f * g * g,
+        1.0 - f * f * (a + 3.0 - (a + 2.0) * f),
+        1.0 - g * g * (a + 3.0 - (a + 2.0) * g),
+        a * g * f * f,
+    )
+
+
+@kernel
+def _add_sharp(
+    shown, disparity, view_top, view_left, tile_top, tile_left, height, width,
+    t, s, weight, focus, tilt_x, tilt_y, focus_range, diameter, from_px, to_px, first, last, light, weights,
+):  # fmt: skip
+    """Add to rows [first, last) of a tile what a view t, s from the eye shows in focus, times weight."""
+    rows, columns = disparity.shape
+    for row in range(first, last):
+        for column in range(light.shape[1]):
+            y, x = tile_top + row, tile_left + column
+            focus_here = focus + tilt_x * (2.0 * (x + 0.5) / width - 1.0) + tilt_y * (2.0 * (y + 0.5) / height - 1.0)
+            # Sheared to the focus; within a range that is in focus, to the disparity of what shows.
+            sheared, d = focus_here, focus_here
+            for _ in range(ON_SURFACE_ROUNDS if focus_range > 0 else 1):
+                v = min(max(math.floor(y - sheared * t + 0.5) - view_top, 0), rows - 1)
+                u = min(max(math.floor(x - sheared * s + 0.5) - view_left, 0), columns - 1)
+                d = disparity[v, u]
+                sheared = min(max(d, focus_here - focus_range), focus_here + focus_range)
+            at_y, at_x = y - sheared * t, x - sheared * s
+            # Beyond the view's border others know better.
+            if not (-0.5 <= at_y <= height - 0.5 and -0.5 <= at_x <= width - 0.5):
+                continue
+            weights[row, column] += weight
+            blur_px = diameter * max(abs(d - focus_here) - focus_range, 0.0)
+            if not blur_px < to_px:
+                continue
+            share = weight * min((to_px - blur_px) / (to_px - from_px), 1.0)
+            top, left = math.floor(at_y), math.floor(at_x)
+            weights_x = _keys(at_x - left, ENLARGED_BY)
+            weights_y = _keys(at_y - top, ENLARGED_BY)
+            red = green = blue = 0.0
+            for j in range(4):
+                v = min(max(top + j - 1 - view_top, 0), rows - 1)
+                for i in range(4):
+                    u = min(max(left + i - 1 - view_left, 0), columns - 1)
+                    w = weights_y[j] * weights_x[i]
+                    red += w * shown[v, u, 0]
+                    green += w * shown[v, u, 1]
+                    blue += w * shown[v, u, 2]
+            light[row, column, 0] += share * red
+            light[row, column, 1] += share * green
+            light[row, column, 2] += share * blue
+
+
+@kernel
+def _mean_of_areas(light, top, left, step_y, step_x, first_row, first_column, first, last, means):
+    """Fill rows [first, last) of means: of light, a part from (top, left) of a picture, over pixels of another that are
+    step_y x step_x large, from (first_row, first_column) on. What lies outside the part does not count.
+    """
+    for row in range(first, last):
+        y0 = max((first_row + row) * step_y - top, 0.0)
+        y1 = min((first_row + row + 1) * step_y - top, float(light.shape[0]))
+        for column in range(means.shape[1]):
+            x0 = max((first_column + column) * step_x - left, 0.0)
+            x1 = min((first_column + column + 1) * step_x - left, float(light.shape[1]))
+            red = green = blue = area = 0.0
+            # Exact areas: pixels on the border count by the share that lies inside.
+            for v in range(int(y0), math.ceil(y1)):
+                covered = min(y1, v + 1.0) - max(y0, float(v))
+                for u in range(int(x0), math.ceil(x1)):
+                    w = covered * (min(x1, u + 1.0) - max(x0, float(u)))
+                    red += w * light[v, u, 0]
+                    green += w * light[v, u, 1]
+                    blue += w * light[v, u, 2]
+                    area += w
+            means[row, column, 0] = red / area if area > 0 else 0.0
+            means[row, column, 1] = green / area if area > 0 else 0.0
+            means[row, column, 2] = blue / area if area > 0 else 0.0
+
+
+@kernel
+def _add_enlarged(missing, first_row, first_column, step_y, step_x, top, left, first, last, light):
+    """Add missing, interpolated, to rows [first, last) of light; where both lie: see `_mean_of_areas`."""
+    rows, columns = missing.shape[0], missing.shape[1]
+    for row in range(first, last):
+        y = (top + row + 0.5) / step_y - 0.5 - first_row
+        above = math.floor(y)
+        weights_y = _keys(y - above, ENLARGED_BY)
+        for column in range(light.shape[1]):
+            x = (left + column + 0.5) / step_x - 0.5 - first_column
+            before = math.floor(x)
+            weights_x = _keys(x - before, ENLARGED_BY)
+            red = green = blue = 0.0
+            for j in range(4):
+                v = min(max(above + j - 1, 0), rows - 1)
+                for i in range(4):
+                    u = min(max(before + i - 1, 0), columns - 1)
+                    w = weights_y[j] * weights_x[i]
+                    red += w * missing[v, u, 0]
+                    green += w * missing[v, u, 1]
+                    blue += w * missing[v, u, 2]
+            light[row, column, 0] = max(light[row, column, 0] + red, 0.0)
+            light[row, column, 1] = max(light[row, column, 1] + green, 0.0)
+            light[row, column, 2] = max(light[row, column, 2] + blue, 0.0)

@@ -1,0 +1,113 @@
+"""A picture of a photo at its own size, or any up to it: drawn beside the window, from the photo on the disk."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear
+from iibr_core.generation.memory_model import budget_of, require_own_size
+from iibr_core.generation.plan import ScenePlan
+from iibr_core.rendering.large_views import whole
+from iibr_core.rendering.lens_light import CENTRE, draw_large, mean_of_areas
+from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import (
+    SRGB,
+    ColorSpace,
+    FloatImage,
+    ImageSize,
+    InputError,
+    ReportProgress,
+    ignore_progress,
+    image_size,
+)
+from viewer.background.large_photo import complete_fills, load_large
+from viewer.background.loaded_photo import LoadedPhoto
+from viewer.display.large_lens import large_lens
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import Scene
+from viewer.model.state.optics import Optics
+
+MOST_PIXELS = 100_000_000
+"""Of the photo; a larger one is read that large."""
+
+
+@dataclass(frozen=True, eq=False)
+class FullPicture:
+    """A picture as it was asked for. size: of what comes out. smaller: (H, W, 3) linear light of the same picture at
+    the scene's size, needed where `needs_smaller`.
+    """
+
+    scene: Scene
+    plan: ScenePlan
+    loaded: LoadedPhoto
+    optics: Optics
+    size: ScreenSize
+    smaller: FloatImage | None = None
+
+    def draw(self, should_stop: ShouldStop = never, report_progress: ReportProgress = ignore_progress) -> FloatImage:
+        """Linear light (height, width, 3). Raises InputError where the file is gone or another one by now, Cancelled
+        once should_stop is true.
+        """
+        report_progress(0, 0, "reading the photo at its own size")
+        photo = load_large(self.scene.source, self.loaded, self.plan, MOST_PIXELS, should_stop)
+        lens = large_lens(self.optics, self.scene, photo.size.width / self.scene.width)
+        if any(offset != CENTRE for offset in lens.offsets):
+            photo = photo.with_fills(complete_fills(self.scene.source, self.loaded, self.plan, should_stop))
+        with ViewSynthesis(should_stop) as synthesis:
+            light = draw_large(photo, lens, whole(photo.size), synthesis, self.smaller, should_stop, report_progress)
+        return mean_of_areas(light, ImageSize(self.size.height, self.size.width), should_stop)
+
+
+def encode_light(
+    light: FloatImage, as_float: bool, color_space: ColorSpace, should_stop: ShouldStop = never
+) -> NDArray[Any]:
+    """sRGB-encoded colours of light (H, W, 3) in a colour space: uint8, or float32 with 1 = white.
+
+    Raises Cancelled once should_stop is true.
+    """
+    encoded = np.empty(light.shape, np.float32 if as_float else np.uint8)
+    matrix = primaries_matrix(SRGB, color_space)
+
+    def band(first: int, last: int) -> None:
+        rows = light[first:last]
+        colors = srgb_from_linear(rows if color_space == SRGB else rows @ matrix.T)
+        encoded[first:last] = colors if as_float else bytes_from_encoded(colors)
+
+    in_bands(band, image_size(light), should_stop)
+    return encoded
+
+
+def needs_smaller(optics: Optics) -> bool:
+    """Whether the picture at the scene's size is part of the one at the photo's own: where anything is blurred."""
+    return optics.aperture_diameter > 1
+
+
+def is_full(scene: Scene, optics: Optics, size: ScreenSize) -> bool:
+    """Whether a picture of this size is drawn from the photo at its own size: it shows more than the scene's views
+    hold, and there is memory for that. With a dolly it is drawn from the views, whatever its size.
+    """
+    if scene.plan is None or scene.own_size is None or optics.dolly != 0 or math.prod(size) <= math.prod(scene.size):
+        return False
+    if math.prod(scene.own_size) <= math.prod(scene.size):
+        return False
+    try:
+        require_full(scene, optics)
+    except InputError:
+        return False
+    return True
+
+
+def require_full(scene: Scene, optics: Optics) -> None:
+    """Raise InputError where there is no memory for a picture at the photo's own size."""
+    if scene.plan is None or scene.own_size is None:
+        return
+    (width, height), (own_width, own_height) = scene.size, scene.own_size
+    field_bytes = scene.plan.field_bytes if needs_smaller(optics) else 0
+    budget = budget_of(scene.source.depth.memory_bytes)
+    require_own_size(budget, ImageSize(own_height, own_width), ImageSize(height, width), field_bytes)
