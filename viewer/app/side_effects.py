@@ -14,6 +14,7 @@ from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import FloatImage, InputError
 from viewer.app.dialogs import Dialog, SaveDialog, has_dialogs
+from viewer.app.exporter import Exporter
 from viewer.app.image_export import export_map
 from viewer.app.picture_saver import PictureSaver, refusal
 from viewer.app.save_places import inputs_of_scene, map_path
@@ -34,6 +35,7 @@ from viewer.model.state.app_state import (
     SaveTask,
     Task,
 )
+from viewer.model.state.exporting import CancelExportTask, ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
 from viewer.model.state.optics import ApertureMask, SetApertureShape
@@ -47,6 +49,7 @@ class SideEffects:
         """wake: called, in another thread, when something came of a task."""
         self._scene_view = scene_view
         self._saver = PictureSaver(scene_view, wake)
+        self._exporter = Exporter(scene_view, wake)
         self._files = FileWorker("iibr-files", wake)
         self._ids = count(1)
         self._under_way: set[int] = set()
@@ -60,8 +63,8 @@ class SideEffects:
 
     @property
     def is_drawing(self) -> bool:
-        """Whether a picture is being drawn to be saved."""
-        return self._saver.is_drawing
+        """Whether a picture is being drawn to be saved or exported."""
+        return self._saver.is_drawing or self._exporter.is_drawing
 
     def run(self, state: AppState) -> list[Action]:
         """Take up the state's tasks and say what came of earlier ones, and of a dialog that was closed."""
@@ -73,12 +76,14 @@ class SideEffects:
         return actions
 
     def draw(self, budget_s: float) -> list[Action]:
-        """Go on with the picture that is being saved, for about that long."""
-        return self._saver.advance(budget_s)
+        """Go on with the picture that is being saved, else with what is being exported, for about that long."""
+        is_saving = self._saver.is_drawing
+        return self._saver.advance(budget_s) + ([] if is_saving else self._exporter.advance(budget_s))
 
     def close(self) -> None:
         """Finish the files that are being written; give up everything else."""
         self._saver.close()
+        self._exporter.close()
         self._files.close(cancels=False)
 
     def _begin(self, task: Task, state: AppState) -> list[Action]:
@@ -100,6 +105,10 @@ class SideEffects:
                 return self._save_map(task, state)
             case SaveTask():
                 return self._saver.add(task, state, self._inputs(state))
+            case ExportTask():
+                return self._exporter.add(task, state, self._inputs(state))
+            case CancelExportTask():
+                self._exporter.cancel()
             case CancelSaveTask():
                 self._saver.cancel()
         return []

@@ -13,16 +13,7 @@ from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import never
 from iibr_core.types import InputError, ViewOffset
-from viewer.app.exports.options import ANIMATIONS, AnimationKind, ExportOptions
-from viewer.app.exports.registry import (
-    EXPORTS,
-    ExportKind,
-    export_kind,
-    export_path,
-    require_ending,
-    require_export_place,
-    writer_of,
-)
+from viewer.app.exports.registry import export_path, require_export_place, writer_of
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.options import (
     DepthFrom,
@@ -53,7 +44,9 @@ from viewer.cli.options import (
     view_from_text,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.model.export_kinds import EXPORTS, ExportKind, export_kind, require_ending
 from viewer.model.layout import ScreenSize
+from viewer.model.state.exporting import ANIMATIONS, AnimationKind, ExportOptions
 
 if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource

@@ -22,6 +22,7 @@ from viewer.model.state.app_state import (
     Theme,
 )
 from viewer.model.state.depth_editing import DepthAction
+from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.optics import LensAction
@@ -295,6 +296,8 @@ Action = (
     | ShowPrompt
     | AskForPath
     | AskToSave
+    | AskToExport
+    | ExportingChanged
     | SetHover
     | Notify
     | DismissNotice

@@ -41,6 +41,7 @@ from viewer.model.state.app_state import (
     source_with_map,
 )
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
+from viewer.model.state.exporting import AskToExport
 from viewer.model.state.folder import SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import (
     COMPARISONS,
@@ -144,6 +145,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Filmstrip", lambda state: ShowFilmstrip(not state.preferences.shows_filmstrip), (Chord("f"),)),
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),
+    Command("Export…", _always(AskToExport()), (Chord("e", ctrl=True),)),
     Command("Undo", _always(Undo()), (Chord("z", ctrl=True),)),
     Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True))),
     Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),

@@ -27,6 +27,7 @@ TOOLS = (
     (icons.ICON_FA_IMAGE, "Open a photo…"),
     (icons.ICON_FA_FOLDER_OPEN, "Open a folder of views…"),
     (icons.ICON_FA_FLOPPY_DISK, "Save the picture…"),
+    (icons.ICON_FA_FILE_EXPORT, "Export…"),
     (icons.ICON_FA_ROTATE_LEFT, "Undo"),
     (icons.ICON_FA_ROTATE_RIGHT, "Redo"),
     (icons.ICON_FA_CIRCLE_HALF_STROKE, "Light or dark"),
@@ -142,6 +143,7 @@ def _is_possible(name: str, state: AppState) -> bool:
         "Undo": bool(state.history.past),
         "Redo": bool(state.history.future),
         "Save the picture…": state.scene is not None,
+        "Export…": state.scene is not None,
     }
     return needs.get(name, True)
 

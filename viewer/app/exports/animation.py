@@ -15,12 +15,12 @@ import numpy as np
 from iibr_core.formats.animations import VIDEOS, even_size, require_video_size, write_animation
 from iibr_core.formats.files import open_binary
 from iibr_core.types import ImageSize, InputError, ViewOffset
-from viewer.app.exports.options import AnimationKind, ExportOptions
 from viewer.app.exports.source import ExportSource
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit, clamp_optics
 from viewer.model.reducers.camera_motion import point_on_loop
 from viewer.model.state.app_state import Scene
+from viewer.model.state.exporting import AnimationKind, ExportOptions
 from viewer.model.state.optics import Optics
 
 USUAL_SECONDS = 4.0

@@ -6,8 +6,8 @@ from contextlib import closing
 from pathlib import Path
 
 from iibr_core.formats.light_fields.registry import writer_for
-from viewer.app.exports.options import ExportOptions
 from viewer.app.exports.source import ExportSource
+from viewer.model.state.exporting import ExportOptions
 
 
 def write_light_field(layout: str, path: Path, source: ExportSource, options: ExportOptions) -> None:

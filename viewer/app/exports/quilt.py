@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.quilts import Quilt, lay_out, quilt_for, tagged
 from iibr_core.types import ImageSize
-from viewer.app.exports.options import ExportOptions
 from viewer.app.exports.parallax import fitted, side_pictures
 from viewer.app.exports.source import ExportSource
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Scene
+from viewer.model.state.exporting import ExportOptions
 
 
 def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:

@@ -13,11 +13,11 @@ import numpy as np
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import UnfinishedFolder
 from iibr_core.types import FloatImage, ImageSize
-from viewer.app.exports.options import ExportOptions
 from viewer.app.exports.source import ExportSource
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
 from viewer.model.state.app_state import Scene
+from viewer.model.state.exporting import ExportOptions
 from viewer.model.state.optics import Optics
 
 USUAL_FOCUSES, USUAL_APERTURES = 16, 9

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.quilts import tagged
-from viewer.app.exports.options import ExportOptions
 from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.source import ExportSource
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Scene
+from viewer.model.state.exporting import ExportOptions
 
 FULL_TAG, HALF_TAG, OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB"
 """At the end of a file's name, for players: left first, side by side; top and bottom."""

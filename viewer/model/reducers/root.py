@@ -53,6 +53,7 @@ from viewer.model.lens.limits import (
 )
 from viewer.model.reducers.camera_motion import advance_motion, glide_home, start_motion
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
+from viewer.model.reducers.exporting import ask_to_export
 from viewer.model.reducers.folder import list_folder, photo_after, scroll_filmstrip
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
@@ -74,6 +75,7 @@ from viewer.model.state.app_state import (
     TiltHandles,
 )
 from viewer.model.state.depth_editing import DepthAction
+from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
@@ -157,6 +159,10 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, prompt=SavePrompt(_path_beside(state, what), state.scene.size, what=what))
         case PictureDrawn(report):
             return replace(state, report=report)
+        case AskToExport():
+            return ask_to_export(state)
+        case ExportingChanged(exporting):
+            return replace(state, exporting=exporting)
         case SavingChanged(saving):
             return replace(state, saving=saving)
         case SetHover(hover):

@@ -15,6 +15,7 @@ from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ViewOffset
 from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Brush, DepthSettings
+from viewer.model.state.exporting import CancelExportTask, Exporting, ExportPrompt, ExportTask
 from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.optics import CENTRE, Optics
@@ -268,7 +269,7 @@ class PalettePrompt:
     selected: int = 0
 
 
-Prompt = PathPrompt | SavePrompt | PalettePrompt | Literal["help", "quit"]
+Prompt = PathPrompt | SavePrompt | ExportPrompt | PalettePrompt | Literal["help", "quit"]
 """quit: whether to close although depth edits are saved nowhere."""
 
 
@@ -310,7 +311,17 @@ class ReadTruthTask:
     path: str
 
 
-Task = ChooseTask | ChoosePlaceTask | SaveTask | CancelSaveTask | ReadMaskTask | ReadTruthTask | ListFolderTask
+Task = (
+    ChooseTask
+    | ChoosePlaceTask
+    | SaveTask
+    | CancelSaveTask
+    | ExportTask
+    | CancelExportTask
+    | ReadMaskTask
+    | ReadTruthTask
+    | ListFolderTask
+)
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
 Theme = Literal["dark", "light"]
@@ -363,11 +374,11 @@ class AppState:
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
-    file has them. saving: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this scene what
-    is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs: whether the
-    system has file dialogs. left_field: None where the open scene was left unfinished, or not at all. shown_generation:
-    whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a number. folder: the
-    photos beside the one that is open, None before they are known.
+    file has them. saving, exporting: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this
+    scene what is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs:
+    whether the system has file dialogs. left_field: None where the open scene was left unfinished, or not at all.
+    shown_generation: whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a
+    number. folder: the photos beside the one that is open, None before they are known.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -395,6 +406,7 @@ class AppState:
     stroke: Stroke | None = None
     saved_edits: DepthEdits = UNEDITED
     saving: Saving | None = None
+    exporting: Exporting | None = None
     has_chosen_focus: bool = False
     has_chosen_aperture: bool = False
     told_aperture: bool = False

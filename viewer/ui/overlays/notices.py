@@ -10,6 +10,7 @@ from viewer.model.actions import Action, DismissNotice, DismissNotices, DoTask, 
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.exporting import CancelExportTask, Exporting
 from viewer.model.state.saving import CancelSaveTask, Saving
 from viewer.ui.style import palette_of
 
@@ -28,7 +29,7 @@ _FLAGS = (
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
     """Build the newest notice; what was pressed comes back as actions."""
-    if not state.notices and state.saving is None:
+    if not state.notices and state.saving is None and state.exporting is None:
         return []
     margin = MARGIN * layout.ui_scale
     right, bottom = layout.panel.x - margin, layout.window.height - margin
@@ -44,6 +45,8 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
     imgui.begin("notices", None, _FLAGS)
     actions = _saving(state.saving, layout) if state.saving is not None else []
+    if state.exporting is not None:
+        actions += _exporting(state.exporting, layout)
     if state.notices:
         actions += _notice(state.notices[-1], state)
     imgui.end()
@@ -67,6 +70,24 @@ def _saving(saving: Saving, layout: Layout) -> list[Action]:
         imgui.same_line()
     imgui.align_text_to_frame_padding()
     imgui.text_wrapped(saving_text(saving))
+    return actions
+
+
+def exporting_text(exporting: Exporting) -> str:
+    """What is being exported, and how far it is: "Exporting a.mp4: drawing frames, 23 %, 1 more to export"."""
+    words = f"Exporting {exporting.name}"
+    if exporting.doing:
+        words += f": {exporting.doing}, {exporting.done:.0%}".replace("%", " %")
+    return f"{words}, {exporting.waiting} more to export" if exporting.waiting else words
+
+
+def _exporting(exporting: Exporting, layout: Layout) -> list[Action]:
+    """A bar, and a button to give it up."""
+    imgui.progress_bar(exporting.done, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+    actions: list[Action] = [DoTask(CancelExportTask())] if imgui.button("Cancel##exporting") else []
+    imgui.same_line()
+    imgui.align_text_to_frame_padding()
+    imgui.text_wrapped(exporting_text(exporting))
     return actions
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from imgui_bundle import imgui
 
+from iibr_core.formats.quilts import DEVICES
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
 from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching
+from viewer.model.export_kinds import EXPORTS
 from viewer.model.layout import Layout, ScreenSize
+from viewer.model.reducers.exporting import export_path_beside
 from viewer.model.state.app_state import (
     AppState,
     ChoosePlaceTask,
@@ -19,9 +23,12 @@ from viewer.model.state.app_state import (
     SavePrompt,
     SaveTask,
 )
+from viewer.model.state.exporting import ANIMATIONS, ExportPrompt, ExportTask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
 
+Choice = TypeVar("Choice", bound=str)
+ANY_DISPLAY = "any"
 PROMPT_WIDTH = 460.0
 ROWS_SHOWN = 12
 LARGEST_SIDE = 65536
@@ -77,6 +84,8 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
     match prompt:
         case SavePrompt():
             return _save(prompt, state, layout)
+        case ExportPrompt():
+            return _export(prompt, state, layout)
         case PathPrompt():
             return _path(prompt, state, layout)
         case PalettePrompt():
@@ -100,10 +109,7 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     gap(layout, 2)
     quiet(MAP_ENDINGS if is_map else "The name's ending decides: .png, or .exr in linear light.")
     problem = prompt.problem or ("There is a file of this name already." if prompt.already_there else "")
-    if problem:
-        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
-        imgui.text_wrapped(problem)
-        imgui.pop_style_color()
+    _say_problem(problem, state)
     pressed, closed = _buttons("Replace" if prompt.already_there else "Save", layout)
     if state.has_dialogs:
         imgui.same_line()
@@ -126,6 +132,51 @@ def _size_rows(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePromp
     imgui.align_text_to_frame_padding()
     imgui.text(str(prompt.size_px[1]))
     return prompt
+
+
+def _export(prompt: ExportPrompt, state: AppState, layout: Layout) -> list[Action]:
+    """What, where to, and what a display or a motion asks for."""
+    imgui.text("Export")
+    gap(layout, 2)
+    label("As", layout)
+    kind = _choice("kind", prompt.kind, {name: kind.words for name, kind in EXPORTS.items()})
+    if kind != prompt.kind:
+        return [ShowPrompt(ExportPrompt(kind, export_path_beside(state, kind)))]
+    heeds, options = EXPORTS[kind].heeds, prompt.options
+    if "device" in heeds:
+        label("Display", layout, "Without one, the photo's own shape.")
+        device = _choice("device", options.device or ANY_DISPLAY, {name: name for name in (ANY_DISPLAY, *DEVICES)})
+        options = replace(options, device=None if device == ANY_DISPLAY else device)
+    if "motion" in heeds:
+        label("Motion", layout, "What moves; the end leads to the beginning.")
+        motion = _choice("motion", options.motion or ANIMATIONS[0], {name: name for name in ANIMATIONS})
+        options = replace(options, motion=motion)
+    label("File" if EXPORTS[kind].endings else "Folder", layout)
+    path, entered = _text_field("path", prompt.path)
+    edited = replace(prompt, options=options)
+    edited = edited if path == prompt.path else replace(edited, path=path, already_there=False, problem="")
+    _say_problem(prompt.problem or ("There is one of this name already." if prompt.already_there else ""), state)
+    pressed, closed = _buttons("Replace" if prompt.already_there else "Export", layout)
+    if pressed or entered:
+        return [DoTask(ExportTask(kind, edited.path, options, prompt.already_there))]
+    return _prompt_actions(closed, edited, prompt)
+
+
+def _choice(name: str, chosen: Choice, words: Mapping[Choice, str]) -> Choice:
+    """One of these, by its words."""
+    if imgui.begin_combo(f"##{name}", words[chosen]):
+        for choice, text in words.items():
+            if imgui.selectable(text, choice == chosen)[0]:
+                chosen = choice
+        imgui.end_combo()
+    return chosen
+
+
+def _say_problem(problem: str, state: AppState) -> None:
+    if problem:
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
+        imgui.text_wrapped(problem)
+        imgui.pop_style_color()
 
 
 def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:

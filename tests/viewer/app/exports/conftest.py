@@ -12,10 +12,11 @@ import pytest
 from iibr_core.runtime.tiling import never
 from iibr_core.types import ignore_progress
 from tests.viewer.conftest import headless_with_scene
-from viewer.app.exports.options import ExportOptions
-from viewer.app.exports.registry import export_kind, export_path, writer_of
+from viewer.app.exports.registry import export_path, writer_of
 from viewer.app.exports.source import ExportSource
 from viewer.app.headless import HeadlessViewer
+from viewer.model.export_kinds import export_kind
+from viewer.model.state.exporting import ExportOptions
 
 
 @pytest.fixture(scope="package")

@@ -14,10 +14,10 @@ from iibr_core.formats.animations import write_animation
 from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.animation import optics_on_path
-from viewer.app.exports.options import ANIMATIONS, ExportOptions
 from viewer.app.exports.source import ExportSource
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
+from viewer.model.state.exporting import ANIMATIONS, ExportOptions
 
 SIZE = ScreenSize(96, 64)
 COUNT = 6

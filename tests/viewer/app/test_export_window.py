@@ -1,0 +1,116 @@
+"""Exports in a real window: it lives on meanwhile; what is given up leaves nothing behind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import Driver, write_scene
+from viewer.app.image_export import render_pixels
+from viewer.app.main_loop import App
+from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import Source
+from viewer.model.state.exporting import CancelExportTask, ExportOptions, ExportPrompt, ExportTask
+from viewer.model.state.optics import MoveEye
+
+SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)
+LARGE = ExportOptions(size=ScreenSize(600, 400), frames=200)
+
+
+@pytest.fixture
+def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    for notice in driver.app.state.notices:
+        driver.app.do(DismissNotice(notice))
+    return driver
+
+
+def texts(app: App) -> list[str]:
+    return [notice.text for notice in app.state.notices]
+
+
+def start(viewer: Driver, path: Path) -> None:
+    """Ask for a long one, and wait until some of it is drawn."""
+    viewer.app.do(DoTask(ExportTask("gif", str(path), LARGE)))
+    viewer.until(lambda app: app.state.exporting is not None and app.state.exporting.done > 0)
+
+
+def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / "a.gif"
+    app = viewer.app
+    start(viewer, tmp_path / "long.gif")
+    app.do(DoTask(ExportTask("gif", str(out), SMALL)))
+    frames, turns = app.frames_shown, 0
+    while turns < 10:
+        app.do(MoveEye(ViewOffset(0.05 * turns, 0.2)))
+        app.step()
+        turns += 1
+    assert app.frames_shown - frames >= 5
+    assert app.state.exporting is not None
+    assert app.state.exporting.waiting == 1
+    app.do(DoTask(CancelExportTask()))
+    viewer.until(lambda app: bool(texts(app)))
+    assert texts(app) == [f"Exported {out}"], "what was cancelled is not spoken of"
+    viewer.until(lambda app: app.state.exporting is None)
+    with Image.open(out) as image:
+        assert (image.size, image.n_frames) == ((96, 64), 4)  # type: ignore[attr-defined]
+    assert not (tmp_path / "long.gif").exists()
+
+
+def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: Path) -> None:
+    viewer.app.do(DoTask(ExportTask("numbered-grid", str(tmp_path / "field"))))
+    viewer.until(lambda app: bool(texts(app)))
+    assert texts(viewer.app) == [f"Exported {tmp_path / 'field'}"]
+    shown = render_pixels(viewer.app.scene_view, viewer.app.state, ScreenSize(96, 64)).astype(int)
+    view = np.asarray(Image.open(tmp_path / "field" / "v01_u01.png")).astype(int)
+    assert np.abs(view - shown).max() <= 2
+
+
+@pytest.mark.parametrize("how", ["another photo", "another strength", "closing"])
+def test_what_goes_away_is_given_up_and_leaves_nothing(viewer: Driver, tmp_path: Path, how: str) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    start(viewer, folder / "a.gif")
+    if how == "closing":
+        viewer.close()
+    else:
+        other = OpenPath(Source(str(write_scene(tmp_path, "other", seed=1)), grid=GridShape(3, 3)))
+        viewer.app.do(other if how == "another photo" else SetDepthStrength(0.5, is_finished=True))
+        viewer.until(lambda app: any("changed meanwhile" in text for text in texts(app)))
+        viewer.until(lambda app: app.state.exporting is None)
+    assert list(folder.iterdir()) == []
+
+
+def test_it_is_asked_for_by_key_and_says_what_is_wrong(viewer: Driver, tmp_path: Path) -> None:
+    app = viewer.app
+    viewer.send("key", "ctrl+e")
+    viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
+    prompt = app.state.prompt
+    assert isinstance(prompt, ExportPrompt)
+    there = tmp_path / "there_LRF_Full_SBS.png"
+    there.write_text("mine")
+    for path, kind in (
+        (tmp_path / "there.png", "sbs"),
+        (tmp_path / "a.png", "gif"),
+        (tmp_path / "scene.png", "anaglyph"),
+    ):
+        app.do(DoTask(ExportTask(kind, str(path))))
+        viewer.until(lambda app: not app.state.tasks)
+        asked = app.state.prompt
+        assert isinstance(asked, ExportPrompt)
+        assert (asked.already_there, bool(asked.problem)) == (kind == "sbs", kind != "sbs")
+    assert there.read_text() == "mine"
+    app.do(DoTask(ExportTask("sbs", str(tmp_path / "there.png"), replace(SMALL, frames=None), may_replace=True)))
+    viewer.until(lambda app: bool(texts(app)))
+    assert texts(app) == [f"Exported {there}"]
+    assert app.state.prompt is None
+    with Image.open(there) as image:
+        assert image.size == (192, 64)

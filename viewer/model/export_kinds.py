@@ -1,0 +1,82 @@
+"""Every kind of export: the command line and the window's menu ask here. A new kind is a file of its own in
+`viewer.app.exports` and one line.
+
+Light, so that they can be listed before anything is loaded: functions are "module:name" there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from iibr_core.types import InputError
+
+LIGHT_FIELD = ("light_field:write_light_field",)
+PICTURE = (".png",)
+MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
+STACK = ("view", "focus", "aperture", "size", "frames")
+EYES = ("focus", "aperture", "size", "eyes")
+
+
+@dataclass(frozen=True)
+class ExportKind:
+    """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
+    names of the options about exports and the lens that mean something to it. path: makes the file's name what players
+    expect. layout: of a light field, among `WRITERS`. needs: packages, of the extra `export`.
+    """
+
+    words: str
+    endings: tuple[str, ...]
+    write: str
+    heeds: tuple[str, ...] = ()
+    path: str = ""
+    layout: str = ""
+    needs: tuple[str, ...] = ()
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the graphics card draws it; else it is made of the views themselves."""
+        return "aperture" in self.heeds
+
+
+EXPORTS = {
+    "quilt": ExportKind(
+        "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device"),
+        path="quilt:quilt_path",
+    ),
+    "sbs": ExportKind("Side by side", PICTURE, "stereo:write_side_by_side", EYES, "stereo:full_path"),
+    "half-sbs": ExportKind(
+        "Side by side, half width", PICTURE, "stereo:write_half_side_by_side", EYES, "stereo:half_path"
+    ),
+    "over-under": ExportKind("Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path"),
+    "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES),
+    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES),
+    "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",)),
+    "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",)),
+    "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING),
+    "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING),
+    "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING),
+    "focal-stack": ExportKind("Focal stack, PNGs", (), "stack:write_focal_stack", STACK),
+    "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK),
+    "aperture-sweep": ExportKind("Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK),
+    "aperture-sweep-exr": ExportKind("Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK),
+    "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci"),
+    "numbered-grid": ExportKind("Light field, numbered views", (), *LIGHT_FIELD, layout="numbered-grid"),
+    "stanford": ExportKind("Light field, Stanford archive", (), *LIGHT_FIELD, layout="stanford"),
+    "eslf": ExportKind("Light field, lenslet image", ("_eslf.png",), *LIGHT_FIELD, layout="eslf"),
+    "exr": ExportKind("Light field, one OpenEXR file", (".exr",), *LIGHT_FIELD, layout="exr"),
+}  # fmt: skip
+"""By the name that people type."""
+
+
+def export_kind(name: str) -> ExportKind:
+    """Raises InputError for a kind that nobody knows."""
+    if name not in EXPORTS:
+        raise InputError(f"{name!r} is nothing that can be exported: give {', '.join(EXPORTS)}")
+    return EXPORTS[name]
+
+
+def require_ending(kind: ExportKind, path: Path) -> None:
+    """Raise InputError where a file's name does not say that it is of this kind."""
+    if kind.endings and not path.name.lower().endswith(kind.endings):
+        raise InputError(f"{path}: is to end in {' or '.join(kind.endings)}")
