@@ -149,13 +149,15 @@ class Disparity:
     """Disparity of a photo, at the photo's size.
 
     values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
-    ("scene.pfm", "none").
+    ("scene.pfm", "none"). inverse_metres: (slope, offset) of 1 / distance in metres over the values, None where only
+    their order is known.
     Raises InputError for values that are not finite, so that no later step has to check.
     """
 
     values: FloatImage
     source: str
     notes: tuple[str, ...] = ()
+    inverse_metres: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.values).all():

@@ -46,6 +46,23 @@ def disparity_from(
             return _scale_to_viewing_range(_finite_or_nan(values), grid)
 
 
+def inverse_metres_over(estimate: Estimate, values: FloatImage) -> tuple[float, float] | None:
+    """(slope, offset) of 1 / distance in metres over the disparity (H, W) that `disparity_from` made of an estimate.
+
+    None where the estimate knows no metres, or is flat. From the quartiles: beyond them outliers were moved in.
+    """
+    if not isinstance(estimate, MetricDepth):
+        return None
+    inverse = _inverse(estimate.metres)
+    is_known = np.isfinite(inverse) & np.isfinite(values)
+    if not is_known.any():
+        return None
+    (low, high), (below, above) = (np.percentile(v[is_known], (25.0, 75.0)) for v in (values, inverse))
+    slope = (above - below) / (high - low) if high > low else np.nan
+    offset = below - slope * low
+    return (float(slope), float(offset)) if np.isfinite(slope) and np.isfinite(offset) and slope > 0 else None
+
+
 def _finite_or_nan(values: NDArray[Any]) -> DoubleImage:
     """Values, NaN where they are not finite."""
     known = np.where(np.isfinite(values), values, np.nan).astype(np.float64)

@@ -17,7 +17,7 @@ from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import refine
-from iibr_core.depth.scaling import disparity_from
+from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo, upright
@@ -190,12 +190,14 @@ class _DepthSearch:
 
 def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
     """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
-    photo, origin = found.photo, found.origin
+    photo, origin, inverse_metres = found.photo, found.origin, None
     notes = origin.failures + ((f"{origin.line} {origin.advice}",) if origin.advice else ())
     if isinstance(found.depth, Disparity):
         values, notes = found.depth.values, found.depth.notes + notes
     else:
-        values = disparity_from(resize_estimate(found.depth, photo.size), grid or USUAL_GRID)
+        estimate = resize_estimate(found.depth, photo.size)
+        values = disparity_from(estimate, grid or USUAL_GRID)
+        inverse_metres = inverse_metres_over(estimate, values)
         unknown = np.isnan(values).mean()
         if unknown == 1:
             raise InputError("it knows no depth anywhere")
@@ -204,7 +206,7 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, sho
         values = fill_disparity_by_color(photo.pixels, values, should_stop)
     if choice.refine > 0:
         values = refine(photo.pixels, values, choice.refine, should_stop)
-    return PhotoWithDepth(photo, Disparity(values, origin.words, notes), origin)
+    return PhotoWithDepth(photo, Disparity(values, origin.words, notes, inverse_metres), origin)
 
 
 def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:

@@ -207,6 +207,10 @@ FINITE = {
     "generation.cost_model.estimate_workload": lambda v, _: cost_model.estimate_workload(
         cost_model.measure_parallax(depths(v), 4.0), GRID, "exact"
     ),
+    "depth.scaling.inverse_metres_over": lambda v, _: np.array(
+        scaling.inverse_metres_over(MetricDepth(depths(v)), scaling.disparity_from(MetricDepth(depths(v)), GRID))
+        or (0.0, 0.0)
+    ),
     "depth.scaling.disparity_from": lambda v, _: [
         known_of(DisparityMap(scaling.disparity_from(kind(depths(v)), GRID)))
         for kind in (RelativeInverseDepth, MetricDepth, DisparityMap)

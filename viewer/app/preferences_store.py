@@ -17,7 +17,7 @@ from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
 from viewer.model.reducers.worker_events import RECENT_KEPT
-from viewer.model.state.app_state import SECTIONS, AppState, Notice, Preferences, Section, Theme
+from viewer.model.state.app_state import SECTIONS, AppState, Notice, Preferences, Section, Theme, Units
 from viewer.model.state.folder import FolderOrder
 
 PREFERENCES_FILE = "preferences.json"
@@ -125,6 +125,12 @@ def _place(kept: Any) -> tuple[int, int, int, int] | None:
     return (x, y, width, height) if is_possible else None
 
 
+def _units(kept: Any) -> Units:
+    if kept not in ("photographic", "light field"):
+        raise ValueError
+    return "light field" if kept == "light field" else "photographic"
+
+
 def _folder_order(kept: Any) -> FolderOrder:
     if kept not in ("name", "time"):
         raise ValueError
@@ -145,6 +151,7 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "is_maximized": _yes_or_no,
     "shows_filmstrip": _yes_or_no,
     "folder_order": _folder_order,
+    "units": _units,
 }
 
 

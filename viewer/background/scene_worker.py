@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.formats.files import is_folder
 from iibr_core.generation.memory_model import budget_of, require_field
 from iibr_core.generation.plan import ScenePlan
@@ -149,6 +150,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         depth_origin=loaded.origin,
         levels=loaded.levels,
         depth_models=loaded.models,
+        inverse_metres=loaded.disparity.inverse_metres if loaded.depth_settings.edits == UNEDITED else None,
         color_space=loaded.photo.color_space,
         own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
     )

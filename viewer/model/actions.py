@@ -20,6 +20,7 @@ from viewer.model.state.app_state import (
     Source,
     Task,
     Theme,
+    Units,
 )
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.exporting import AskToExport, ExportingChanged
@@ -240,6 +241,13 @@ class SetFontScale:
 
 
 @dataclass(frozen=True)
+class SetUnits:
+    """Show focus and aperture in these."""
+
+    units: Units
+
+
+@dataclass(frozen=True)
 class ToggleSection:
     """Open or close a section of the panel."""
 
@@ -269,7 +277,7 @@ class EditsSaved:
 
 MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
-PreferencesAction = SetTheme | SetFontScale | ToggleSection | PlaceWindow
+PreferencesAction = SetTheme | SetFontScale | SetUnits | ToggleSection | PlaceWindow
 
 Action = (
     LensAction

@@ -21,6 +21,7 @@ from viewer.model.actions import (
     SetFontScale,
     SetLoop,
     SetTheme,
+    SetUnits,
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
@@ -176,6 +177,10 @@ COMMANDS: tuple[Command, ...] = (
     Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
     Command("Stop making views", _always(StopWork())),
     Command("Light or dark", lambda s: SetTheme("dark" if s.preferences.theme == "light" else "light")),
+    Command(
+        "Units: a photographer's or a light field's",
+        lambda s: SetUnits("photographic" if s.preferences.units == "light field" else "light field"),
+    ),
     Command("Larger text", _scale_text(FONT_STEP), (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True))),
     Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),)),
     Command("Usual text size", _always(SetFontScale(1.0)), (Chord("_0", ctrl=True),)),

@@ -41,6 +41,16 @@ def slider(
     return new if changed else None
 
 
+def end_words(left: str, right: str, layout: Layout) -> None:
+    """Quiet words at the ends of the last slider."""
+    corner, far = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    padding = imgui.get_style().frame_padding
+    draw, color = imgui.get_window_draw_list(), imgui.get_color_u32(imgui.Col_.text_disabled)
+    draw.add_text(imgui.ImVec2(corner.x + padding.x, corner.y + padding.y), color, left)
+    x = far.x - padding.x - imgui.calc_text_size(right).x
+    draw.add_text(imgui.ImVec2(x, corner.y + padding.y), color, right)
+
+
 def whole_slider(text: str, value: int, limits: tuple[int, int], layout: Layout, tip: str = "") -> int | None:
     """A row with a slider over whole numbers."""
     label(text, layout, tip)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.scaling import OUTLIER_SPANS, disparity_from
+from iibr_core.depth.scaling import OUTLIER_SPANS, disparity_from, inverse_metres_over
 from iibr_core.types import TOTAL_PARALLAX, GridShape, InputError
 
 GRID = GridShape(9, 9)
@@ -132,3 +132,15 @@ def test_never_infinite(values: np.ndarray, kind: type) -> None:
     assert got.dtype == np.float32
     assert not np.isinf(got).any()
     assert not np.isnan(got).all()
+
+
+def test_metres_are_told_back_from_the_disparity_that_metric_depth_became() -> None:
+    metres = np.linspace(0.5, 8.0, 600, dtype=np.float32).reshape(20, 30)
+    values = disparity_from(MetricDepth(metres), GridShape(9, 9))
+    found = inverse_metres_over(MetricDepth(metres), values)
+    assert found is not None
+    slope, offset = found
+    np.testing.assert_allclose(1 / (slope * values + offset), metres, rtol=1e-4)
+    assert inverse_metres_over(RelativeInverseDepth(metres), values) is None
+    flat = np.full((4, 5), 2.0, np.float32)
+    assert inverse_metres_over(MetricDepth(flat), np.zeros((4, 5), np.float32)) is None

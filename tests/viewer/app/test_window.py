@@ -102,7 +102,7 @@ def test_the_wheel_changes_the_focus_and_keys_the_viewpoint(viewer: Driver) -> N
 
 def test_a_slider_changes_the_aperture_and_not_the_viewpoint(viewer: Driver) -> None:
     before = viewer.image()
-    viewer.slide("##Diameter", 0.8)
+    viewer.slide("##Aperture", 0.8)
     assert viewer.app.state.optics.aperture_diameter > 1
     assert viewer.app.state.optics.eye == ViewOffset(0, 0)
     assert np.abs(viewer.image().astype(int) - before).max() > 8

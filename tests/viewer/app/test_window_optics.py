@@ -72,7 +72,7 @@ def test_a_double_click_glides_home_and_keeps_focus_and_aperture(viewer: Driver)
 
     io = imgui.get_io()  # a busy machine may draw for longer than the usual 0.3 s between the two clicks
     io.mouse_double_click_time, io.mouse_single_click_delay = 60.0, 61.0
-    viewer.slide("##Diameter", 0.5)
+    viewer.slide("##Aperture", 0.5)
     viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", 1)
     viewer.until(lambda app: app.state.optics.focus_disparity != 0)
     kept = viewer.app.state.optics
@@ -110,7 +110,7 @@ def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer: Driver) -> No
 
 
 def test_the_aperture_takes_the_shape_that_was_chosen(viewer: Driver) -> None:
-    viewer.slide("##Diameter", 0.9)
+    viewer.slide("##Aperture", 0.9)
     viewer.press("##polygon")
     viewer.slide("##Blades", 0.0)
     viewer.slide("##Rotation", 0.5)

@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import plan_of, scene_of
+from viewer.model.lens.limits import focus_limits
 from viewer.model.lens.photographic_units import (
     ASSUMED_DISTANCE_M,
     disparity_at,
+    disparity_at_percent,
     distance_limits,
+    equivalent_f_number,
     f_number,
+    f_number_text,
+    far_percent,
+    metres,
+    metres_text,
     relative_distance,
 )
-from viewer.model.state.app_state import Scene
+from viewer.model.state.app_state import Hover, Scene
+from viewer.model.state.optics import Optics
+from viewer.ui.overlays.reticle import hover_text
 
 FOCAL_PX, STEP_M = 1000.0, 0.01
 
@@ -69,3 +81,66 @@ def test_a_pinhole_has_no_f_number_and_infinity_no_distance() -> None:
     assert f_number(scene, 0.0) is None
     assert relative_distance(scene, -FOCAL_PX * STEP_M / 4.0 * 0.5) is None
     assert disparity_at(scene, 0.0) is None
+
+
+def test_the_equivalent_is_the_f_number_of_a_portrait_lens_that_blurs_alike() -> None:
+    """With the nearest surface in focus at the assumed distance and the farthest at infinity; blur goes with the square
+    of the focal length.
+    """
+    field_at_infinity = (0 - FOCAL_PX * STEP_M / ASSUMED_DISTANCE_M) * 0.5
+    scene = replace(scene_at(still_m=ASSUMED_DISTANCE_M), disparity_range_px=(field_at_infinity, 0.0))
+    stop = f_number(scene, 3.0)
+    assert stop is not None
+    assert equivalent_f_number(scene, 3.0) == pytest.approx(stop * (85 / 36) ** 2)
+
+
+@pytest.mark.parametrize("scene", [scene_of(), scene_of(focal_px=80.0), scene_of(plan=plan_of(GridShape(9, 9)))])
+def test_there_is_always_an_f_number_that_falls_as_the_aperture_opens(scene: Scene) -> None:
+    assert f_number_text(scene, 0.0) == "pinhole"
+    stops = [equivalent_f_number(scene, diameter) or 0.0 for diameter in (1.0, 2.0, 4.0)]
+    assert stops[0] == pytest.approx(2 * stops[1]) == pytest.approx(4 * stops[2])
+    assert stops[2] > 0
+    assert f_number_text(scene, 2.0).startswith("≈ f/")
+    assert f_number_text(scene_at(still_m=2.0), 2.0).startswith("f/")
+
+
+def test_a_flat_scene_blurs_nothing_and_is_a_pinhole_whatever_the_aperture() -> None:
+    assert f_number_text(scene_of(disparity_range_px=(0.0, 0.0)), 3.0) == "pinhole"
+
+
+def test_metres_follow_from_the_disparity_that_metric_depth_became() -> None:
+    scene = replace(scene_of(plan=plan_of(GridShape(9, 9), scale=0.5, zero=2.0)), inverse_metres=(0.1, 0.05))
+    assert metres(scene, 1.0) == pytest.approx(1 / (0.1 * (1.0 / 0.5 + 2.0) + 0.05))
+    assert metres(scene, -99.0) == math.inf
+    assert metres(scene_of(), 1.0) is None
+    assert [metres_text(m) for m in (0.421, 12.3, math.inf)] == ["0.42 m", "12 m", "∞"]
+
+
+def test_near_is_0_far_is_100_and_back() -> None:
+    scene = scene_of()
+    low, high = focus_limits(scene)
+    assert (far_percent(scene, high), far_percent(scene, low)) == (0.0, 100.0)
+    for percent in (0.0, 12.5, 100.0):
+        assert far_percent(scene, disparity_at_percent(scene, percent)) == pytest.approx(percent)
+
+
+@pytest.mark.parametrize(
+    ("disparity", "inverse_metres", "words"),
+    [
+        (0.0, None, "sharp"),
+        (1.2, None, "20 % in front"),
+        (-1.2, None, "20 % behind"),
+        (0.0, (0.1, 0.5), "2.00 m  ·  sharp"),
+        (2.5, (0.2, 0.5), "1.00 m  ·  1.00 m in front"),
+        (-2.0, (0.25, 0.5), "∞  ·  far behind"),
+    ],
+)
+def test_the_pointer_says_how_far_before_or_behind_the_focus_things_are(
+    disparity: float, inverse_metres: tuple[float, float] | None, words: str
+) -> None:
+    scene = scene_of(plan=plan_of(GridShape(9, 9)), inverse_metres=inverse_metres)
+    assert hover_text(Optics(), scene, Hover(30.0, 20.0, disparity)) == words
+
+
+def test_a_researcher_reads_pixels_per_view_step() -> None:
+    assert hover_text(Optics(), scene_of(), Hover(30.0, 20.0, 1.24), "light field") == "1.24 px  ·  1.24 in front"

@@ -6,12 +6,18 @@ plane that stays still; one photo does not tell how far away that is in metres, 
 
 from __future__ import annotations
 
+import math
+
+from viewer.model.lens.limits import focus_limits
 from viewer.model.state.app_state import Scene
 
 ASSUMED_DISTANCE_M = 2.0
 """Of the plane that stays still; f-numbers are those of a lens on full frame focused there."""
 
 FULL_FRAME_WIDTH_M = 0.036
+EQUIVALENT_FOCAL_M = 0.085
+FARTHEST_M = 1000.0
+"""What is farther is as good as at infinity."""
 
 
 def relative_distance(scene: Scene, disparity: float) -> float | None:
@@ -44,6 +50,56 @@ def f_number(scene: Scene, aperture_diameter: float) -> float | None:
     view_step_m = abs(scene.plan.disparity_scale) * still * ASSUMED_DISTANCE_M / scene.focal_px
     focal_m = scene.focal_px / scene.width * FULL_FRAME_WIDTH_M
     return focal_m / (aperture_diameter * view_step_m)
+
+
+def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
+    """The f-number of a full-frame lens that blurs alike, where `f_number` is not known; None for a pinhole.
+
+    It is a portrait lens, focused at `ASSUMED_DISTANCE_M` on the nearest surface, with the farthest one at infinity.
+    """
+    far, near = scene.disparity_range_px
+    blur_px = aperture_diameter * (near - far)
+    if not blur_px > 0:
+        return None
+    return EQUIVALENT_FOCAL_M**2 / ASSUMED_DISTANCE_M * scene.width / FULL_FRAME_WIDTH_M / blur_px
+
+
+def f_number_text(scene: Scene, aperture_diameter: float) -> str:
+    """The aperture in a photographer's words: "f/2.8", "≈ f/2.8" where it is an equivalent, "pinhole"."""
+    stop = f_number(scene, aperture_diameter)
+    if stop is not None:
+        return f"f/{stop:.1f}"
+    stop = equivalent_f_number(scene, aperture_diameter)
+    return "pinhole" if stop is None else f"≈ f/{stop:.1f}"
+
+
+def metres(scene: Scene, disparity: float) -> float | None:
+    """Distance of a field disparity in metres, infinite beyond what any distance has; None where it is not known."""
+    plan = scene.plan
+    if scene.inverse_metres is None or plan is None or plan.disparity_scale == 0:
+        return None
+    slope, offset = scene.inverse_metres
+    inverse = slope * (disparity / plan.disparity_scale + plan.disparity_zero) + offset
+    return 1 / inverse if inverse > 1 / FARTHEST_M else math.inf
+
+
+def metres_text(distance_m: float) -> str:
+    """For people: "0.42 m", "12 m", "∞"."""
+    if math.isinf(distance_m):
+        return "∞"
+    return f"{distance_m:.2f} m" if distance_m < 10 else f"{distance_m:.0f} m"
+
+
+def far_percent(scene: Scene, disparity: float) -> float:
+    """How far away a field disparity is: 0 the nearest that can be focused, 100 the farthest."""
+    low, high = focus_limits(scene)
+    return 100 * (high - disparity) / (high - low)
+
+
+def disparity_at_percent(scene: Scene, percent: float) -> float:
+    """The inverse of `far_percent`."""
+    low, high = focus_limits(scene)
+    return high - percent / 100 * (high - low)
 
 
 def _disparity_as_given(scene: Scene, disparity: float) -> float | None:

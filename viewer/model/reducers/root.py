@@ -32,6 +32,7 @@ from viewer.model.actions import (
     SetLoop,
     SetSpeed,
     SetTheme,
+    SetUnits,
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
@@ -249,6 +250,8 @@ def _reduce_preferences(preferences: Preferences, action: PreferencesAction) -> 
             return replace(preferences, theme=theme)
         case SetFontScale(scale) if math.isfinite(scale):
             return replace(preferences, font_scale=clamp(scale, *FONT_SCALE_LIMITS))
+        case SetUnits(units):
+            return replace(preferences, units=units)
         case ToggleSection(section):
             is_open = preferences.open_sections
             return replace(preferences, open_sections=tuple(s for s in SECTIONS if (s in is_open) != (s == section)))

@@ -72,8 +72,9 @@ class Scene:
     has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
     not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
     file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
-    view step as given. depth_models: names of those on this machine. color_space: of its views. own_size: of the photo
-    in its file, which a view may be smaller than; None for light fields.
+    view step as given. depth_models: names of those on this machine. inverse_metres: (slope, offset) of 1 / distance
+    over the disparity as given, None where distances are not known in metres. color_space: of its views. own_size: of
+    the photo in its file, which a view may be smaller than; None for light fields.
     """
 
     source: Source
@@ -93,6 +94,7 @@ class Scene:
     depth_origin: DepthOrigin | None = None
     levels: Levels | None = None
     depth_models: tuple[str, ...] = ()
+    inverse_metres: tuple[float, float] | None = None
     color_space: ColorSpace = SRGB
     own_size: ScreenSize | None = None
 
@@ -325,6 +327,9 @@ Task = (
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
 Theme = Literal["dark", "light"]
+Units = Literal["photographic", "light field"]
+"""near to far and f-numbers, or pixels per view step and view steps."""
+
 Section = Literal["view", "focus", "aperture", "light", "depth", "inspect", "scene"]
 SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "depth", "inspect", "scene")
 
@@ -342,6 +347,7 @@ class Preferences:
     is_maximized: bool = False
     shows_filmstrip: bool = False
     folder_order: FolderOrder = "name"
+    units: Units = "photographic"
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DoTask
+from viewer.model.actions import Action, DoTask, SetUnits
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
 from viewer.model.reducers.inspection import obstacle_to_comparison, obstacle_to_overlay
@@ -23,9 +23,10 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
-from viewer.ui.widgets import button, choice, quiet, slider
+from viewer.ui.widgets import button, checkbox, choice, quiet, slider
 
 OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "Disparity", "entropy": "Entropy", "inpainted": "Inpainted"}
+EPI_SENTENCE = "Epipolar plane images: one line of the picture from every view, a surface slopes the more the nearer."
 OVERLAY_TIPS: dict[OverlayKind, str] = {
     "disparity": "How near everything is, in px per view step.",
     "entropy": "How undecided the weights of the rays are: 1 where no ray of the photo shows anything.",
@@ -42,7 +43,12 @@ COMPARISON_TIPS: dict[Comparison, str] = {
 
 def inspect_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the section."""
-    return _toggles(state, layout) + _overlays(state, scene, layout) + _comparisons(state, scene, layout)
+    return (
+        _units(state, layout)
+        + _toggles(state, layout)
+        + _overlays(state, scene, layout)
+        + _comparisons(state, scene, layout)
+    )
 
 
 def score_text(psnr_db: float | None, flip: float | None) -> str:
@@ -56,6 +62,14 @@ def score_text(psnr_db: float | None, flip: float | None) -> str:
     return f"{psnr_db:.2f} dB PSNR" + (f", {flip:.4f} FLIP" if flip is not None else "")
 
 
+def _units(state: AppState, layout: Layout) -> list[Action]:
+    """The one place where the units of the whole panel are chosen."""
+    is_on = state.preferences.units == "light field"
+    tip = "Focus as disparity in px per view step, the aperture in view steps: everywhere in the window."
+    chosen = checkbox("Units of light fields", is_on, layout, tip)
+    return [] if chosen is None else [SetUnits("light field" if chosen else "photographic")]
+
+
 def _toggles(state: AppState, layout: Layout) -> list[Action]:
     inspection = state.inspection
     row = (
@@ -64,6 +78,8 @@ def _toggles(state: AppState, layout: Layout) -> list[Action]:
         ("Values", inspection.shows_values, ShowValues, "What is under the pointer, in a line below (V)"),
     )
     pressed = _choices([(word, is_on, tip, "") for word, is_on, _, tip in row], layout)
+    if inspection.shows_epis:
+        quiet(EPI_SENTENCE)
     return [] if pressed is None else [row[pressed][2](not row[pressed][1])]
 
 
@@ -76,6 +92,7 @@ def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     if pressed is not None:
         actions.append(SetOverlay(None if chosen == OVERLAYS[pressed] else OVERLAYS[pressed]))
     if chosen is not None:
+        quiet(OVERLAY_TIPS[chosen])
         percent = slider("Opacity", 100 * state.inspection.opacity, (0.0, 100.0), "%.0f %%", layout)
         actions += [] if percent is None else [SetOpacity(percent / 100)]
     return actions
@@ -92,6 +109,8 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     if pressed is not None:
         actions.append(Compare(None if chosen == COMPARISONS[pressed] else COMPARISONS[pressed]))
+    if chosen is not None:
+        quiet(COMPARISON_TIPS[chosen])
     if inspection.truth is not None:
         if button("Folder…", layout, inspection.truth.path):
             actions.append(DoTask(ChooseTask("truth")))

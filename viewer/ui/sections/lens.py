@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 from imgui_bundle import imgui
@@ -14,8 +15,13 @@ from viewer.model.lens.limits import BLADES_LIMITS, aperture_limit, focus_limits
 from viewer.model.lens.photographic_units import (
     ASSUMED_DISTANCE_M,
     disparity_at,
+    disparity_at_percent,
     distance_limits,
     f_number,
+    f_number_text,
+    far_percent,
+    metres,
+    metres_text,
     relative_distance,
 )
 from viewer.model.state.app_state import AppState, ChooseTask, Scene
@@ -35,11 +41,17 @@ from viewer.model.state.optics import (
 )
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette
-from viewer.ui.widgets import button, checkbox, choice, quiet, slider, whole_slider
+from viewer.ui.widgets import button, checkbox, choice, end_words, quiet, slider, whole_slider
 
-FOCUS_TIP = "Disparity that is sharp, px per view step: larger is closer. Click in the picture, or turn the wheel."
+FOCUS_TIP = "What is sharp, from near to far. Click in the picture, or turn the wheel."
+FOCUS_DISPARITY_TIP = "Disparity that is sharp, px per view step: larger is closer."
 DISTANCE_TIP = "Distance that is sharp; 1 is the plane that stays still when the viewpoint moves."
-RANGE_TIP = "Everything within this much disparity around the focus is sharp."
+RANGE_TIP = "Everything so close to the focus, before and behind it, is sharp."
+APERTURE_TIP = "How wide the lens is open: wider blurs more of what is out of focus."
+F_NUMBER_TIP = " The f-number is that of a full-frame lens focused at {:.0f} m."
+EQUIVALENT_TIP = " ≈ is the 85 mm lens on full frame, focused at 2 m, that would blur the background as much."
+CLOSED_STOPS = 6.0
+"""From the widest aperture to where its slider ends: a pinhole."""
 TILT_TIP = "Shows two handles over the picture: drag them onto two things, and the plane of focus runs through both."
 HIGHLIGHT_TIP = "Lets clipped highlights count for more, so that they bloom where they are out of focus."
 KIND_TIPS: dict[ApertureKind, str] = {
@@ -54,21 +66,53 @@ KIND_TIPS: dict[ApertureKind, str] = {
 def focus_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the section: focus in disparity and distance, range, tilt."""
     optics = state.optics
-    actions: list[Action] = []
-    _add(actions, SetFocus, slider("Focus", optics.focus_disparity, focus_limits(scene), "%.2f px", layout, FOCUS_TIP))
-    actions += _distance(state, scene, layout)
-    span = focus_span(scene)
-    form = "± %.2f px" if optics.focus_range else "none"
-    _add(actions, SetFocusRange, slider("Range", optics.focus_range, (0.0, span), form, layout, RANGE_TIP))
+    actions = _focus(state, scene, layout)
+    span, unit = focus_span(scene), _unit_of_focus(state, scene)
+    form = f"± {unit.form}" if optics.focus_range else "none"
+    new = slider("Range", optics.focus_range / unit.size, (0.0, span / unit.size), form, layout, RANGE_TIP)
+    _add(actions, lambda value: SetFocusRange(value * unit.size), new)
     shown = checkbox("Tilt", state.tilt_handles is not None or any(optics.focus_tilt), layout, TILT_TIP)
     if shown is not None:
         actions += [ShowTiltHandles(shown)] if shown else [ShowTiltHandles(False), SetTilt((0.0, 0.0))]
     if state.tilt_handles is not None or any(optics.focus_tilt):
         right, down = optics.focus_tilt
-        new = slider("to the right", right, (-span, span), "%+.2f px", layout)
-        _add(actions, lambda value: SetTilt((value, down)), new)
-        new = slider("downward", down, (-span, span), "%+.2f px", layout)
-        _add(actions, lambda value: SetTilt((right, value)), new)
+        limits = (-span / unit.size, span / unit.size)
+        form = unit.form.replace("%", "%+", 1)
+        new = slider("to the right", right / unit.size, limits, form, layout)
+        _add(actions, lambda value: SetTilt((value * unit.size, down)), new)
+        new = slider("downward", down / unit.size, limits, form, layout)
+        _add(actions, lambda value: SetTilt((right, value * unit.size)), new)
+    return actions
+
+
+@dataclass(frozen=True)
+class _Unit:
+    """size: in px per view step. form: printf-like."""
+
+    size: float
+    form: str
+
+
+def _unit_of_focus(state: AppState, scene: Scene) -> _Unit:
+    """Of differences: per cent of the way from near to far, or disparity."""
+    if state.preferences.units == "light field":
+        return _Unit(1.0, "%.2f px")
+    return _Unit(focus_span(scene) / 100, "%.0f %%")
+
+
+def _focus(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Where the focus is: from near to far, in metres where they are known; or as disparity, and distance with it."""
+    actions: list[Action] = []
+    disparity = state.optics.focus_disparity
+    if state.preferences.units == "light field":
+        new = slider("Focus", disparity, focus_limits(scene), "%.2f px", layout, FOCUS_DISPARITY_TIP)
+        _add(actions, SetFocus, new)
+        return actions + _distance(state, scene, layout)
+    distance = metres(scene, disparity)
+    form = "%.0f %%" if distance is None else metres_text(distance)
+    new = slider("Focus", far_percent(scene, disparity), (0.0, 100.0), form, layout, FOCUS_TIP)
+    end_words("near", "far", layout)
+    _add(actions, lambda percent: SetFocus(disparity_at_percent(scene, percent)), new)
     return actions
 
 
@@ -87,20 +131,29 @@ def _distance(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
 def aperture_section(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
     """Build the section: diameter, shape, and what the shape asks for."""
     actions: list[Action] = []
-    diameter = state.optics.aperture_diameter
-    stop = f_number(scene, diameter)
-    form = "pinhole" if diameter == 0 else "%.1f views" + (f"  ·  f/{stop:.1f}" if stop else "")
-    tip = "How wide the lens is open: wider blurs more of what is out of focus."
-    if scene.focal_px:
-        tip += f" The f-number is that of a full-frame lens focused at {ASSUMED_DISTANCE_M:.0f} m."
-    limits = (0.0, aperture_limit(scene.grid))
-    _add(actions, SetAperture, slider("Diameter", diameter, limits, form, layout, tip))
+    diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
+    words, is_exact = f_number_text(scene, diameter), f_number(scene, widest) is not None
+    tip = APERTURE_TIP + (F_NUMBER_TIP.format(ASSUMED_DISTANCE_M) if is_exact else EQUIVALENT_TIP)
+    if state.preferences.units == "light field":
+        form = "pinhole" if diameter == 0 else f"%.1f views  ·  {words}"
+        _add(actions, SetAperture, slider("Aperture", diameter, (0.0, widest), form, layout, tip))
+    else:
+        actions += _stops(diameter, widest, f_number_text(scene, diameter), layout, tip)
     shape = state.optics.aperture_shape
     actions += _kinds(shape, layout, palette)
     actions += [SetApertureShape(new) for new in _shape_edits(shape, layout)]
     if shape.kind == "mask":
         actions += _mask_row(shape, layout)
     return actions
+
+
+def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str) -> list[Action]:
+    """The aperture in stops, as rings of lenses count: wide open at the right, a pinhole at the left."""
+    closed = CLOSED_STOPS if diameter == 0 else min(math.log2(widest / diameter), CLOSED_STOPS)
+    stops = slider("Aperture", CLOSED_STOPS - closed, (0.0, CLOSED_STOPS), words, layout, tip)
+    if stops is None:
+        return []
+    return [SetAperture(widest * 2.0 ** (stops - CLOSED_STOPS) if stops > 0 else 0.0)]
 
 
 def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Action]:
