@@ -45,7 +45,7 @@ LAMBDAS = LossWeights(entropy=ENTROPY_WEIGHT)
 HELD_OUT = 40
 LEARNING_RATE = 3e-3
 COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
-"""The features of `ambiguous_rays._describe_hypotheses` that know nothing of disparity."""
+"""The features of `hypothesis_features._describe_hypotheses` that know nothing of disparity."""
 MASK_SIZE = ImageSize(160, 192)
 MASK_SCENES = 24
 THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)

@@ -18,22 +18,16 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ambiguity import EVERY_COST
-from iibr_core.rendering.ambiguous_rays import (
-    HYPOTHESES,
-    REACH_PX,
-    AmbiguousRays,
-    UndecidedRays,
-    blend_hypotheses,
-    bound_weights,
-    describe_rays,
-    find_undecided_rays,
-)
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, AmbiguousRays, UndecidedRays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
+from iibr_core.rendering.hypothesis_colors import blend_hypotheses, bound_weights
+from iibr_core.rendering.hypothesis_features import describe_rays
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import MOSTLY_COVERED, WHOLE, covered_share, entropy, occlusion_mask
 from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
+from iibr_core.rendering.undecided_rays import find_undecided_rays
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel

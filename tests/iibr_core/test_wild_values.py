@@ -28,16 +28,18 @@ from iibr_core.generation import cost_model, outer_views, plan, relief
 from iibr_core.generation import light_field as generating
 from iibr_core.inpainting import beyond_frame, disparity_by_color, disparity_holes
 from iibr_core.rendering import (
-    ambiguous_rays,
     candidates,
     coherent_cells,
     disparity_statistics,
+    hypothesis_colors,
+    hypothesis_features,
     joined_rays,
     large_views,
     lens_light,
     mixed_pixels,
     occlusion,
     resampling,
+    undecided_rays,
 )
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
@@ -96,14 +98,14 @@ def shown(value):
 
 def contest(value):
     weights, (_, disparity, origin) = shown(value)
-    return ambiguous_rays.find_ambiguous_rays(
+    return hypothesis_features.find_ambiguous_rays(
         rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]), every=True
     )
 
 
 def undecided(value):
     weights, (_, disparity, origin) = shown(value)
-    return ambiguous_rays.find_undecided_rays(rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]))
+    return undecided_rays.find_undecided_rays(rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]))
 
 
 def in_use(asked):
@@ -112,7 +114,7 @@ def in_use(asked):
 
 
 def decided(value):
-    return ambiguous_rays.blend_hypotheses(
+    return hypothesis_colors.blend_hypotheses(
         rays(value), contest(value), generating.transformer_for("exact")(contest(value))
     )
 
@@ -189,14 +191,18 @@ def field_on_disk(folder, value):
 
 FINITE = {
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
-    "rendering.ambiguous_rays.blend_hypotheses": lambda v, _: decided(v),
-    "rendering.ambiguous_rays.bound_weights": lambda v, _: ambiguous_rays.bound_weights(
+    "rendering.hypothesis_colors.blend_hypotheses": lambda v, _: decided(v),
+    "rendering.hypothesis_colors.bound_weights": lambda v, _: hypothesis_colors.bound_weights(
         contest(v), generating.transformer_for("exact")(contest(v))
     ),
-    "rendering.ambiguous_rays.describe_rays": lambda v, _: ambiguous_rays.describe_rays(rays(v), undecided(v)),
-    "rendering.ambiguous_rays.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
-    "rendering.ambiguous_rays.find_undecided_rays": lambda v, _: undecided(v),
-    "rendering.ambiguous_rays.hypothesis_colors": lambda v, _: ambiguous_rays.hypothesis_colors(rays(v), contest(v)),
+    "rendering.hypothesis_features.describe_rays": lambda v, _: hypothesis_features.describe_rays(
+        rays(v), undecided(v)
+    ),
+    "rendering.hypothesis_features.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
+    "rendering.undecided_rays.find_undecided_rays": lambda v, _: undecided(v),
+    "rendering.hypothesis_colors.hypothesis_colors": lambda v, _: hypothesis_colors.hypothesis_colors(
+        rays(v), contest(v)
+    ),
     "generation.cost_model.estimate_costs": lambda v, _: [
         cost_model.estimate_costs(cost_model.measure_parallax(depths(values), 4.0), GRID) for values in (1.0, v)
     ],
