@@ -32,7 +32,7 @@ pixel would count as an edge, and take as long.
 
 
 class Part(NamedTuple):
-    """Rows [top, bottom) and columns [left, right) of an image."""
+    """Rows [top, bottom) and columns [left, right) of an image; below 0 they lie beyond its frame."""
 
     top: int
     bottom: int
@@ -49,13 +49,13 @@ class Part(NamedTuple):
         """To take it out of an array (H, W, ...)."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
-    def grown(self, by_px: int, within: ImageSize) -> Part:
-        """With so much around it, as far as the image (height, width) goes."""
+    def grown(self, by_px: int, within: Part) -> Part:
+        """With so much around it, as far as another part goes."""
         return Part(
-            max(self.top - by_px, 0),
-            min(self.bottom + by_px, within.height),
-            max(self.left - by_px, 0),
-            min(self.right + by_px, within.width),
+            max(self.top - by_px, within.top),
+            min(self.bottom + by_px, within.bottom),
+            max(self.left - by_px, within.left),
+            min(self.right + by_px, within.right),
         )
 
     def inside(self, other: Part) -> Part:
@@ -80,7 +80,8 @@ def tiles_of(part: Part, side: int = TILE_PX) -> list[Part]:
 @dataclass(frozen=True, eq=False)
 class LargePhoto:
     """A photo at its own size. pixels: (H, W, 3) sRGB-encoded. disparity: (H, W), px of it per view step. fills: the
-    complete ray set of a light field of the same scene, of whatever size: its inpainted images are taken over.
+    complete ray set of a light field of the same scene, of whatever size: what it inpainted, and how it continued the
+    photo beyond its frame, is taken over.
     """
 
     pixels: FloatImage
@@ -99,15 +100,33 @@ class LargePhoto:
     def rays(self, part: Part, offsets: Sequence[ViewOffset], should_stop: ShouldStop = never) -> RaySet:
         """The rays of a part of it that may show from these offsets. Raises Cancelled once should_stop is true."""
         farthest_views = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
-        colors, disparity = (np.ascontiguousarray(image[part.slices]) for image in (self.pixels, self.disparity))
         fills = [] if self.fills is None else _fills_in(self.fills, self.size, part, offsets)
-        rays = rays_of_photo(colors, disparity, farthest_views, len(fills), should_stop)
+        rays = rays_of_photo(*self._rays_of_frame(part), farthest_views, len(fills), should_stop)
         for k in fills:
             assert self.fills is not None
-            seen_from, fill_colors, fill_disparity, fill_coverage, _ = self.fills.arrays
-            enlarged = _enlarge(fill_colors[k], fill_disparity[k], fill_coverage[k], self.size, part)
-            rays.add(ViewOffset(*seen_from[k]), *enlarged, should_stop)
+            rays.add(ViewOffset(*self.fills.arrays[0][k]), *_enlarge(self.fills, k, self.size, part), should_stop)
         return rays
+
+    @property
+    def bounds(self) -> Part:
+        """As far as it is known beyond its frame."""
+        height, width = self.size
+        if self.fills is None:
+            return whole(self.size)
+        ratio_y, ratio_x = height / self.fills.view_size.height, width / self.fills.view_size.width
+        top, bottom, left, right = self.fills.margins
+        down, across = (int(top * ratio_y), int(bottom * ratio_y)), (int(left * ratio_x), int(right * ratio_x))
+        return Part(-down[0], height + down[1], -across[0], width + across[1])
+
+    def _rays_of_frame(self, part: Part) -> tuple[FloatImage, FloatImage]:
+        """Colours and disparity of a part, continued where it lies beyond the frame."""
+        inside = part.grown(0, whole(self.size))
+        if inside == part or self.fills is None:
+            return np.ascontiguousarray(self.pixels[inside.slices]), np.ascontiguousarray(self.disparity[inside.slices])
+        colors, disparity, _ = _enlarge(self.fills, 0, self.size, part)
+        at = inside.inside(part).slices
+        colors[at], disparity[at] = self.pixels[inside.slices], self.disparity[inside.slices]
+        return colors, disparity
 
 
 def views_of_tile(
@@ -119,7 +138,7 @@ def views_of_tile(
     """
     farthest = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
     parallax_px = farthest * float(np.abs(photo.disparity).max(initial=0.0))
-    around = tile.grown(AROUND_PX + math.ceil(min(parallax_px, max(photo.size))), photo.size)
+    around = tile.grown(AROUND_PX + math.ceil(min(parallax_px, max(photo.size))), photo.bounds)
     rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
     for offset in offsets:
         view = synthesis.render(rays, offset)
@@ -130,42 +149,52 @@ def _fills_in(fills: RaySet, size: ImageSize, part: Part, offsets: Sequence[View
     """Indices of the inpainted images that have rays in this part of a photo of (height, width), and that lie on the
     side of one of these offsets: from the other side other things are disclosed.
     """
-    rows, columns = (slice(low, high) for low, high in _under(part, size, fills.size))
+    rows, columns = (slice(low, high) for low, high in _under(part, size, fills))
     inpainted_from, _, _, coverage, _ = fills.arrays
     alike = (inpainted_from[:, None] * np.array(offsets).reshape(1, -1, 2) > 0).any(axis=(1, 2))
     return [k for k in range(fills.photo_images, len(fills)) if alike[k] and coverage[k, rows, columns].any()]
 
 
-def _under(part: Part, size: ImageSize, smaller: ImageSize) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Rows and columns of the same picture at another (height, width) that a part covers."""
-    ratio_y, ratio_x = smaller.height / size.height, smaller.width / size.width
+def _under(part: Part, size: ImageSize, fills: RaySet) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Rows and columns of the images of a ray set that a part of the same photo at another (height, width) covers."""
+    ratio_y, ratio_x = fills.view_size.height / size.height, fills.view_size.width / size.width
+    top, left = fills.margins.top, fills.margins.left
     return (
-        (int(part.top * ratio_y), math.ceil(part.bottom * ratio_y)),
-        (int(part.left * ratio_x), math.ceil(part.right * ratio_x)),
+        (max(math.floor(part.top * ratio_y) + top, 0), math.ceil(part.bottom * ratio_y) + top),
+        (max(math.floor(part.left * ratio_x) + left, 0), math.ceil(part.right * ratio_x) + left),
     )
 
 
-def _enlarge(
-    colors: FloatImage, disparity: FloatImage, coverage: FloatImage, size: ImageSize, part: Part
-) -> tuple[FloatImage, FloatImage, FloatImage]:
-    """A part of an image of rays as it is at another (height, width): interpolated between rays of one surface."""
-    shape = part.size
-    found = np.zeros((*shape, 3), np.float32), np.full(shape, NO_RAY, np.float32), np.zeros(shape, np.float32)
-    _enlarge_rays(colors, disparity, coverage, size.height, size.width, part.top, part.left, *found)
+def _enlarge(fills: RaySet, k: int, size: ImageSize, part: Part) -> tuple[FloatImage, FloatImage, FloatImage]:
+    """Colours, disparity and coverage of a part of image k as it is at another (height, width) of the photo:
+    interpolated between rays of one surface.
+    """
+    _, colors, disparity, coverage, _ = fills.arrays
+    found = (
+        np.zeros((*part.size, 3), np.float32),
+        np.full(part.size, NO_RAY, np.float32),
+        np.zeros(part.size, np.float32),
+    )
+    _enlarge_rays(
+        colors[k], disparity[k], coverage[k], fills.margins.top, fills.margins.left,
+        fills.view_size.height / size.height, fills.view_size.width / size.width, part.top, part.left, *found,
+    )  # fmt: skip
     return found
 
 
 @kernel
 def _enlarge_rays(
-    colors, disparity, coverage, height, width, top, left, large_colors, large_disparity, large_coverage
+    colors, disparity, coverage, margin_top, margin_left, step_y, step_x, top, left,
+    large_colors, large_disparity, large_coverage,
 ):  # fmt: skip
-    """Fill the last three, a part from (top, left) of an image of height x width, from the first three, all of it."""
-    step_y, step_x = disparity.shape[0] / height, disparity.shape[1] / width
+    """Fill the last three, a part from (top, left) of a larger image, from the first three, which have margins and of
+    which a larger pixel covers step_y x step_x.
+    """
     for row in range(large_disparity.shape[0]):
-        # Pixel areas are aligned at the borders, hence the halves.
-        y = (top + row + 0.5) * step_y - 0.5
+        # Pixel areas are aligned at the borders of the frame, hence the halves.
+        y = (top + row + 0.5) * step_y - 0.5 + margin_top
         for column in range(large_disparity.shape[1]):
-            x = (left + column + 0.5) * step_x - 0.5
+            x = (left + column + 0.5) * step_x - 0.5 + margin_left
             near_y = min(max(math.floor(y + 0.5), 0), disparity.shape[0] - 1)
             near_x = min(max(math.floor(x + 0.5), 0), disparity.shape[1] - 1)
             if not coverage[near_y, near_x] > 0:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile
+from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.jit import kernel, linear_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -107,7 +107,7 @@ def _draw_tile(
     in_focus, weights = np.zeros_like(light), np.zeros(tile.size, np.float32)
     steepest = abs(lens.focus) + sum(map(abs, lens.tilt)) + lens.focus_range
     moved_px = max((steepest * abs(axis) for at in lens.samples for axis in at.offset), default=0.0)
-    around = tile.grown(math.ceil(min(moved_px, max(photo.size))) + TAPS, photo.size)
+    around = tile.grown(math.ceil(min(moved_px, max(photo.size))) + TAPS, whole(photo.size))
     views = views_of_tile(photo, around, lens.offsets[lens.share < 1 :], synthesis, should_stop)
     for sample, view in zip(lens.samples, views):
         shown = _linear(view.colors, lens, should_stop)
@@ -160,7 +160,7 @@ def _has_sharp(photo: LargePhoto, lens: LargeLens, tile: Part) -> bool:
     if not lens.share > 0:
         return False
     reach = math.ceil(max(map(abs, lens.eye)) * float(np.abs(photo.disparity).max(initial=0.0)))
-    around = tile.grown(min(reach, max(photo.size)) + math.ceil(lens.sharp_up_to_px[1]), photo.size)
+    around = tile.grown(min(reach, max(photo.size)) + math.ceil(lens.sharp_up_to_px[1]), whole(photo.size))
     disparity = photo.disparity[around.slices]
     slack = lens.focus_range + sum(map(abs, lens.tilt)) + lens.sharp_up_to_px[1] / max(lens.diameter, 1e-9)
     return bool((np.abs(disparity - np.float32(lens.focus)) <= slack).any())
