@@ -21,6 +21,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp, parse_packet
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.multi_view import estimate, matching
 from iibr_core.formats.images import photo
 from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
@@ -50,6 +51,7 @@ from tests.iibr_core.scenes import smooth_texture, square_before_wall
 WILD = (math.nan, math.inf, -math.inf, 3e38, -3e38, 1e30, 1e-42, -1e-300, 0.0)
 SIZE = ImageSize(12, 14)
 GRID = GridShape(3, 3)
+OFFSETS = [ViewOffset(0, 0), ViewOffset(0, 1)]
 
 
 def image(value):
@@ -57,6 +59,11 @@ def image(value):
     pixels = smooth_texture(*SIZE)
     pixels[3, 4, 0] = pixels[7:9, 5:8] = np.float32(value)
     return pixels
+
+
+def pair(value):
+    """Two views of HDR colours, one of them wild."""
+    return [image(0.5).astype(np.float16), image(value).astype(np.float16)]
 
 
 def depths(value):
@@ -231,6 +238,11 @@ FINITE = {
     "inpainting.disparity_holes.fill_disparity_holes": lambda v, _: disparity_holes.fill_disparity_holes(known(v)),
     "inpainting.disparity_holes.say_filled": lambda v, _: disparity_holes.say_filled("map", v) and None,
     "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
+    "depth.multi_view.matching.luma_of": lambda v, _: matching.luma_of(image(v).astype(np.float16)),
+    "depth.multi_view.estimate.estimate_coarse": lambda v, _: estimate.estimate_coarse(pair(v), OFFSETS, 0).values,
+    "depth.multi_view.estimate.estimate_disparity": lambda v, _: estimate.estimate_disparity(
+        pair(v), OFFSETS, 0, (-1.0, 1.0)
+    ),
     "depth.pictorial_cues.estimate_from_cues": lambda v, _: pictorial_cues.estimate_from_cues(
         Photo(image(v), 20.0, "wild")
     ),
@@ -348,6 +360,12 @@ FINITE_BY_CONTRACT = {
     "geometry.pixel_of_line": "lines along the plane give infinity or NaN, as it says",
     "inpainting.background.fill_background": "of rendered views only",
     "inpainting.patch.fill_patches": "of rendered views only",
+    "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
+    "depth.multi_view.matching.sweep": "of `matching_views`, whose lumas `luma_of` made finite",
+    "depth.multi_view.semi_global.choose_disparity": "of costs in 8 bits",
+    "depth.multi_view.gradient_refinement.refine_by_gradients": "of `matching_views`, within a sweep's disparities",
+    "depth.multi_view.guided_filter.GuidedFilter": "of what `luma_of` made finite",
+    "generation.carried_disparity.carry_disparity": "of a Photo and a Disparity",
     "depth.models.transformers_models.estimate_with": "of a Photo; what a model gives is cleaned by `disparity_from`",
     "depth.models.transformers_models.input_size": "sizes only",
     "formats.images.photo.focal_px_from_fov": "of angles that options check",
@@ -377,6 +395,8 @@ READS_OR_TELLS = {
     "depth.models.catalog": "known_model model_to_use lacking_package cached_folder weight_files bytes_of fetch "
     "require_unchanged",
     "depth.models.package_models": "run_package",
+    "depth.multi_view.estimate": "sweep_bytes",
+    "depth.multi_view.matching": "choose_views",
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar sidecars_of map_to_read flat_disparity",

@@ -11,26 +11,20 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.formats.files import is_folder
-from iibr_core.generation.memory_model import budget_of, require_field
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
-from iibr_core.runtime.machine import memory_bytes
-from iibr_core.types import FloatImage, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
+from viewer.background.light_field_job import median_of_middle, showings_of_folder
 from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
 from viewer.background.photo_folder import first_photo
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.optics import CENTRE
-
-UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
-"""Where to look for the focus in a light field that says nothing about disparity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +110,14 @@ def results_of(
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Iterator[SceneReady | ViewReady]:
-    """Everything a job has to say, in order: the scene, then each of its views.
+    """Everything a job has to say, in order: the scene, then each of its views; a light field perhaps more than once.
 
-    report_progress: is told what it does until there is a scene. Raises InputError for a file that cannot be opened,
-    Cancelled where should_stop says so while it is read.
+    report_progress: is told what it does while there is nothing new to show. Raises InputError for a file that cannot
+    be opened, Cancelled where should_stop says so while it is read.
     """
     try:
         if is_folder(Path(request.source.path)):
-            yield from _results_of_folder(request, should_stop)
+            yield from _results_of_folder(request, should_stop, report_progress)
         else:
             yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
     finally:
@@ -145,7 +139,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         plan=plan,
         notes=loaded.photo.notes + loaded.disparity.notes + plan.notes,
         focal_px=_known_focal_px(loaded.photo),
-        subject_disparity_px=_median_of_middle(plan.field_disparity(loaded.disparity).values),
+        subject_disparity_px=median_of_middle(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
         depth_origin=loaded.origin,
         levels=loaded.levels,
@@ -161,13 +155,6 @@ def _known_focal_px(photo: Photo) -> float | None:
     from iibr_core.formats.images.photo import focal_px_from_fov
 
     return None if photo.focal_px == focal_px_from_fov(photo.size.width) else photo.focal_px
-
-
-def _median_of_middle(disparity: FloatImage) -> float:
-    """The median of the middle ninth of the picture."""
-    height, width = disparity.shape
-    part = disparity[height // 3 : height - height // 3, width // 3 : width - width // 3]
-    return float(np.median(part))
 
 
 def _results_of_photo(
@@ -200,31 +187,17 @@ def _results_of_photo(
         prepare_brush()
 
 
-def _results_of_folder(request: SceneRequest, should_stop: Callable[[], bool]) -> Iterator[SceneReady | ViewReady]:
-    """The light field of a folder, whatever its layout."""
-    from iibr_core.formats.light_fields.registry import open_light_field
-    from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
-
-    field = open_light_field(Path(request.source.path))
-    grid, (size, views) = grid_of(field), read_views(field)
-    require_field(budget_of(request.source.depth.memory_bytes or memory_bytes()), field.name, size, grid)
-    centre = next(views)
-    scene = Scene(
-        source=request.source,
-        name=field.name,
-        width=size.width,
-        height=size.height,
-        grid=grid,
-        disparity_range_px=disparity_range(field) or UNKNOWN_DISPARITY_RANGE_PX,
-        depth_source="light field" if centre.disparity is not None else "none",
-        is_hdr=field.is_hdr,
-        notes=field.notes,
-        has_view_disparity=len(field.disparity) == len(field.views),
-        subject_disparity_px=_median_of_middle(centre.disparity) if centre.disparity is not None else 0.0,
-    )
-    yield SceneReady(request.generation, scene, None, centre)
-    rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), views))
-    yield from _count_views(request.generation, rest, grid.rows * grid.columns)
+def _results_of_folder(
+    request: SceneRequest, should_stop: Callable[[], bool], report_progress: Callable[[Progress], None]
+) -> Iterator[SceneReady | ViewReady]:
+    """The light field of a folder, once more each time that more is known of it."""
+    for showing in showings_of_folder(request.source, should_stop, report_progress, request.takes_drafts):
+        scene, centre = showing.scene, next(showing.views)
+        yield SceneReady(request.generation, scene, None, centre)
+        rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), showing.views))
+        yield from _count_views(request.generation, rest, scene.grid.rows * scene.grid.columns)
+        if should_stop():
+            return
 
 
 def _count_views(generation: int, views: Iterator[ViewUpdate], total: int) -> Iterator[ViewReady]:

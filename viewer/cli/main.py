@@ -10,6 +10,7 @@ import typer
 from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import InputError
 from viewer.cli.demo import demo
+from viewer.cli.depth import depth
 from viewer.cli.evaluate import evaluate
 from viewer.cli.export import export
 from viewer.cli.generate import generate
@@ -35,7 +36,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (evaluate, view, generate, screenshot, export, plan, train, demo):
+for command in (evaluate, view, generate, screenshot, export, depth, plan, train, demo):
     app.command()(command)
 app.add_typer(models, name="models")
 

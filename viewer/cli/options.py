@@ -26,10 +26,9 @@ _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
 
 NOT_FOR_LIGHT_FIELDS = {
-    "disparity", "disparity_scale", "depth", "depth_model", "refine", "depth_strength", "focus_disparity", "grid",
-    "max_pixels", "quality", "inpaint",
+    "depth", "depth_model", "refine", "depth_strength", "focus_disparity", "grid", "max_pixels", "quality", "inpaint",
 }  # fmt: skip
-"""Parameters about how views are made: a light field brings its own."""
+"""Parameters about how views are made: a light field brings its own. Its centre view's disparity may be given."""
 
 SCREEN_SIZE = ScreenSize(1280, 800)
 """Of the window in pictures, unless another is asked for."""

@@ -13,9 +13,10 @@ import pytest
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanford, write_stereo_pair
+from tests.viewer.background.test_light_field_job import showings
 from viewer.background.jobs import QUEUED_RESULTS, Failed
+from viewer.background.light_field_job import UNKNOWN_DISPARITY_RANGE_PX
 from viewer.background.scene_worker import (
-    UNKNOWN_DISPARITY_RANGE_PX,
     SceneReady,
     SceneRequest,
     SceneResult,
@@ -161,8 +162,8 @@ def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path
         for result in made:
             if isinstance(result, ViewReady):
                 writer.add(result.view)
-    ready, *views = results_of(SceneRequest(2, Source(str(folder))), lambda: False, lambda: CENTRE)
-    assert isinstance(ready, SceneReady)
+    results = results_of(SceneRequest(2, Source(str(folder))), lambda: False, lambda: CENTRE)
+    ready, views = next(showings(results))
     assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
     assert ready.scene.has_view_disparity == with_disparity
     assert ready.scene.disparity_range_px[0] < ready.scene.disparity_range_px[1]
@@ -185,12 +186,11 @@ def test_what_evaluation_reads_opens_here(
     depth_source: str,
 ) -> None:
     source = Source(str(write(tmp_path / "field")))
-    ready, *views = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)
-    assert isinstance(ready, SceneReady)
+    ready, views = next(showings(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)))
     scene = ready.scene
     assert (scene.name, scene.grid, scene.disparity_range_px) == ("field", grid, range_px)
     assert (scene.depth_source, scene.has_view_disparity) == (depth_source, False)
-    assert [type(view) for view in views] == [ViewReady] * (grid[0] * grid[1])
+    assert len(views) == grid[0] * grid[1]
 
 
 def test_views_that_stand_on_no_grid_are_refused_in_one_line(tmp_path: Path) -> None:

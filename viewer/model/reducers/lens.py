@@ -114,8 +114,10 @@ def _move_handle(state: AppState, scene: Scene, action: MoveTiltHandle) -> AppSt
 
 def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
     """The optics that show a newly planned scene as it was seen before; a scene not seen before starts afresh."""
-    if old is None or old.source is not new.source or old.plan is None or new.plan is None:
+    if old is None or old.source is not new.source:
         return Optics()
+    if old.plan is None or new.plan is None:
+        return optics if old.grid == new.grid else Optics()  # a light field, of which more is known by now
     eye = ViewOffset(*(x * _steps(b) / _steps(a) for x, a, b in zip(optics.eye, old.grid, new.grid)))
     columns = _steps(new.grid.columns) / _steps(old.grid.columns)
     ratio = new.plan.disparity_scale / old.plan.disparity_scale if old.plan.disparity_scale else 0.0

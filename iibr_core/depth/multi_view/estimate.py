@@ -1,0 +1,179 @@
+"""The disparity of one view of a light field, or of a pair, from all of them: first small, to learn what there is, then
+whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import encoded_from_stored
+from iibr_core.depth.multi_view.gradient_refinement import refine_by_gradients
+from iibr_core.depth.multi_view.matching import MatchingViews, choose_views, luma_of, matching_views, sweep
+from iibr_core.depth.multi_view.semi_global import choose_disparity
+from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import FloatImage, InputError, StoredColors, ViewOffset, image_size
+
+SMALL_SIDE_PX = 160
+"""The longer side of the first, small map."""
+STEP_PX = 0.5
+"""By which the farthest view's match moves from one disparity of a sweep to the next."""
+MOST_SHIFT_SHARE = 0.4
+"""Of the longer side: by which the farthest view's match may be shifted."""
+SURE = 0.4
+"""From here on a match counts for the range of disparities."""
+RARE = 0.002
+"""Share of sure pixels at either end of the range that may be mistaken."""
+MARGIN_STEPS = 4
+"""Steps of the small sweep that are added to the range at both ends."""
+MOST_STEPS = 512
+LEAST_SIDE_PX = 8
+FEW_VIEWS = 4
+"""So few match by chance in many places: their maps are checked against each other."""
+AGREE_STEPS = 2.0
+"""By so many steps of a sweep the disparities of a place may differ, seen from two views."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseDisparity:
+    """values: (H, W) at the size of the views, from a small map. range_px: least and greatest that the whole map may
+    have, px per view step.
+    """
+
+    values: FloatImage
+    range_px: tuple[float, float]
+
+
+def estimate_coarse(
+    views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int, should_stop: ShouldStop = never
+) -> CoarseDisparity:
+    """A first map, and which disparities there are: all that shift no view by more than MOST_SHIFT_SHARE are tried.
+
+    views: (H, W, 3) each, of equal size. offsets: their viewpoints, from any origin. reference: index of the view that
+    the map is for. Raises InputError where there are fewer than two viewpoints or the views are too small, Cancelled
+    once should_stop is true.
+    """
+    size = image_size(views[reference])
+    shrink = -(-max(size) // SMALL_SIDE_PX)
+    if min(size) // shrink < LEAST_SIDE_PX:
+        raise InputError(f"views of {size} are too small or too narrow to find their disparity: 8 px at least")
+    small = _matching_views(views, offsets, reference, shrink, should_stop)
+    step = STEP_PX / small.reach
+    most = MOST_SHIFT_SHARE * max(small.luma.shape) / small.reach
+    disparities = np.arange(-most, most + step, step, dtype=np.float32)
+    values, sureness = choose_disparity(sweep(small, disparities, should_stop), small.luma, disparities, should_stop)
+    values = _median(values, should_stop)
+    is_sure = sureness >= SURE
+    if len(small.textures) <= FEW_VIEWS:
+        is_sure &= _agrees(small, values, disparities, should_stop)
+    low, high = np.quantile(values[is_sure] if is_sure.any() else values, [RARE, 1 - RARE])
+    margin = MARGIN_STEPS * step
+    whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
+    return CoarseDisparity(whole, (float(low - margin) * shrink, float(high + margin) * shrink))
+
+
+def estimate_disparity(
+    views: Sequence[StoredColors],
+    offsets: Sequence[ViewOffset],
+    reference: int,
+    range_px: tuple[float, float],
+    should_stop: ShouldStop = never,
+) -> FloatImage:
+    """The disparity (H, W) of the reference view, px per view step, within a range (px per view step).
+
+    As `estimate_coarse` otherwise, which finds the range. A range of more than MOST_STEPS steps is swept more coarsely.
+    """
+    matched = _matching_views(views, offsets, reference, 1, should_stop)
+    low, high = range_px
+    steps = int(np.clip(np.ceil((high - low) * matched.reach / STEP_PX), 2, MOST_STEPS))
+    disparities = np.linspace(low, high, steps + 1, dtype=np.float32)
+    values, _ = choose_disparity(sweep(matched, disparities, should_stop), matched.luma, disparities, should_stop)
+    values = _median(values, should_stop)
+    if len(matched.textures) <= FEW_VIEWS:
+        values = _fill_unseen(views[reference], values, _agrees(matched, values, disparities, should_stop), should_stop)
+    refined = refine_by_gradients(matched, values, should_stop)
+    result: FloatImage = np.clip(refined, low, high).astype(np.float32)
+    return result
+
+
+def sweep_bytes(size: tuple[int, int], range_px: tuple[float, float], reach: float) -> int:
+    """Memory that `estimate_disparity` takes at most beside the views. reach: view steps to the farthest of them."""
+    steps = min(max((range_px[1] - range_px[0]) * reach / STEP_PX, 2), MOST_STEPS) + 1
+    costs_and_sums, textures_and_spare = 5 * steps, 4 * (33 + 24)
+    return int(size[0] * size[1] * (costs_and_sums + textures_and_spare))
+
+
+def _matching_views(
+    views: Sequence[StoredColors],
+    offsets: Sequence[ViewOffset],
+    reference: int,
+    shrink: int,
+    should_stop: ShouldStop,
+) -> MatchingViews:
+    if len({(offset.t, offset.s) for offset in offsets}) < 2:
+        raise InputError("all views have one viewpoint: nothing tells how far things are")
+    chosen = choose_views(list(offsets), reference)
+    lumas = [luma_of(views[index], shrink) for index in chosen]
+    return matching_views(lumas, [offsets[index] for index in chosen], should_stop)
+
+
+def _agrees(
+    views: MatchingViews, values: FloatImage, disparities: NDArray[np.float32], should_stop: ShouldStop
+) -> NDArray[np.bool_]:
+    """Where the farthest view, matched in its turn, gives a place the same disparity (H, W): what both of them see."""
+    other = len(views.textures) - 1
+    order = [other, *(index for index in range(other))]
+    turned = MatchingViews(views.textures[order], views.offsets[order] - views.offsets[other], views.textures[other])
+    seen, _ = choose_disparity(sweep(turned, disparities, should_stop), turned.luma, disparities, should_stop)
+    seen = _median(seen, should_stop)
+    y, x = np.indices(values.shape)
+    t, s = views.offsets[other]
+    row, column = np.rint(y - values * t).astype(int), np.rint(x - values * s).astype(int)
+    height, width = values.shape
+    is_inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    there = seen[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+    agrees: NDArray[np.bool_] = is_inside & (np.abs(there - values) <= AGREE_STEPS * (disparities[1] - disparities[0]))
+    return agrees
+
+
+def _fill_unseen(
+    colors: StoredColors, values: FloatImage, is_seen: NDArray[np.bool_], should_stop: ShouldStop
+) -> FloatImage:
+    """What one view alone sees takes the disparity of what looks like it around."""
+    if not is_seen.any():
+        return values
+    known = np.where(is_seen, values, np.float32(np.nan))
+    photo = np.nan_to_num(encoded_from_stored(colors), posinf=1.0)
+    return fill_disparity_by_color(photo, known, should_stop)
+
+
+def _median(values: FloatImage, should_stop: ShouldStop) -> FloatImage:
+    """Of 5x5 pixels around each, so that no lone pixel stands out; cut at the borders."""
+    result = np.empty_like(values)
+    in_bands(lambda first, last: _medians(values, first, last, result), image_size(values), should_stop)
+    return result
+
+
+@kernel
+def _medians(values, first, last, result):
+    height, width = values.shape
+    ordered = np.empty(25, np.float32)
+    for y in range(first, last):
+        for x in range(width):
+            count = 0
+            for row in range(max(0, y - 2), min(height, y + 3)):
+                for column in range(max(0, x - 2), min(width, x + 3)):
+                    # Insertion: 25 values are few.
+                    value, at = values[row, column], count
+                    while at > 0 and ordered[at - 1] > value:
+                        ordered[at] = ordered[at - 1]
+                        at -= 1
+                    ordered[at] = value
+                    count += 1
+            result[y, x] = ordered[count // 2]

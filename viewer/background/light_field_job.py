@@ -1,0 +1,177 @@
+"""A light field from disk, as it is shown: as read, and once more with disparity where its views bring none, so that
+focusing, wide apertures and viewpoints between the views work as with a photo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.color import encoded_from_stored
+from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.generation.memory_model import Budget, budget_of, require_field
+from iibr_core.runtime.machine import memory_bytes
+from iibr_core.runtime.tiling import ShouldStop
+from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewUpdate
+from viewer.model.state.app_state import Progress, Scene, Source
+
+UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
+"""Where to look for the focus in a light field that says nothing about disparity."""
+FROM_VIEWS = "the views themselves"
+FINDING = "finding disparity"
+
+
+@dataclass(frozen=True, eq=False)
+class Showing:
+    """A light field with what is known of it so far. views: all of them, the centre first."""
+
+    scene: Scene
+    views: Iterator[ViewUpdate]
+
+
+def showings_of_folder(
+    source: Source, should_stop: ShouldStop, report_progress: Callable[[Progress], None], takes_drafts: bool
+) -> Iterator[Showing]:
+    """The light field of a folder, whatever its layout.
+
+    takes_drafts: views without disparity are shown as read, then with a coarse one, then with the final one; else the
+    field is shown once, when all is known. The views of a showing must be taken before the next is asked for. Raises
+    InputError for a folder or a map that cannot be read, Cancelled once should_stop is true.
+    """
+    from iibr_core.formats.light_fields.registry import open_light_field
+    from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
+
+    field = open_light_field(Path(source.path))
+    grid, (size, views) = grid_of(field), read_views(field)
+    budget = budget_of(source.depth.memory_bytes or memory_bytes())
+    require_field(budget, field.name, size, grid)
+    given = None if source.depth.file is None else _read_map(source, size)
+    read: list[ViewUpdate] = [next(views)]
+    scene = _scene_as_read(source, field, grid, read[0], disparity_range(field))
+    if (scene.has_view_disparity and given is None) or max(grid) == 1:
+        yield Showing(scene, _chain(read, views))
+        return
+    if takes_drafts:
+        yield Showing(scene, _keep(read, views))
+    else:
+        report_progress(Progress(doing="reading"))
+        read += views
+    yield from _with_disparity(_Field(scene, grid, read, budget), given, should_stop, report_progress, takes_drafts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Field:
+    """A light field as read. views: the centre first."""
+
+    scene: Scene
+    grid: GridShape
+    views: list[ViewUpdate]
+    budget: Budget
+
+    def showing(
+        self, values: FloatImage, origin: str, is_final: bool, should_stop: ShouldStop, range_px: tuple[float, float]
+    ) -> Showing:
+        """The same with the disparity of its centre view, carried to the others."""
+        scene = replace(
+            self.scene,
+            disparity_range_px=range_px,
+            depth_source=origin,
+            has_view_disparity=True,
+            subject_disparity_px=median_of_middle(values),
+        )
+        return Showing(scene, self._views_with(values, is_final, should_stop))
+
+    def _views_with(self, values: FloatImage, is_final: bool, should_stop: ShouldStop) -> Iterator[ViewUpdate]:
+        from iibr_core.generation.carried_disparity import carry_disparity
+
+        colors = {(view.row, view.column): view.colors for view in self.views}
+        centre = encoded_from_stored(self.views[0].colors)
+        for row, column, disparity in carry_disparity(centre, values, self.grid, should_stop):
+            yield ViewUpdate(row, column, colors[row, column], disparity, is_final=is_final)
+
+
+def _with_disparity(
+    field: _Field,
+    given: FloatImage | None,
+    should_stop: ShouldStop,
+    report_progress: Callable[[Progress], None],
+    takes_drafts: bool,
+) -> Iterator[Showing]:
+    """The field with the given disparity of its centre view, with the one it came with, or one found from its views."""
+    from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+
+    known = given if given is not None else field.views[0].disparity
+    if known is not None:
+        origin = field.scene.depth_source if given is None else Path(field.scene.source.depth.file or "").name
+        yield field.showing(known, origin, True, should_stop, _range_of(known))
+        return
+    colors = [view.colors for view in field.views]
+    offsets = [field.grid.offset(view.row, view.column) for view in field.views]
+    report_progress(Progress(doing=FINDING))
+    try:
+        coarse = estimate_coarse(colors, offsets, 0, should_stop)
+        needed = sweep_bytes(coarse.values.shape, coarse.range_px, max(map(max, np.abs(offsets))))
+        field.budget.require(needed, f"{field.scene.name}: finding its disparity", "raise --memory")
+    except InputError as error:
+        # The views can be looked at without.
+        yield Showing(replace(field.scene, notes=(*field.scene.notes, f"{error}.")), iter(field.views))
+        return
+    if takes_drafts:
+        yield field.showing(coarse.values, FROM_VIEWS, False, should_stop, _range_of(coarse.values))
+    report_progress(Progress(doing=FINDING))
+    values = estimate_disparity(colors, offsets, 0, coarse.range_px, should_stop)
+    yield field.showing(values, FROM_VIEWS, True, should_stop, _range_of(values))
+
+
+def _scene_as_read(
+    source: Source, field: MultiView, grid: GridShape, centre: ViewUpdate, range_px: tuple[float, float] | None
+) -> Scene:
+    height, width = centre.colors.shape[:2]
+    return Scene(
+        source=source,
+        name=field.name,
+        width=width,
+        height=height,
+        grid=grid,
+        disparity_range_px=range_px or UNKNOWN_DISPARITY_RANGE_PX,
+        depth_source="light field" if centre.disparity is not None else "none",
+        is_hdr=field.is_hdr,
+        notes=field.notes,
+        has_view_disparity=len(field.disparity) == len(field.views),
+        subject_disparity_px=median_of_middle(centre.disparity) if centre.disparity is not None else 0.0,
+    )
+
+
+def _read_map(source: Source, size: ImageSize) -> FloatImage:
+    """The map that the user named, as the disparity of the centre view."""
+    from iibr_core.formats.maps.disparity_file import read_disparity
+
+    assert source.depth.file is not None
+    return read_disparity(Path(source.depth.file), size, source.depth.file_scale).values
+
+
+def _keep(read: list[ViewUpdate], views: Iterator[ViewUpdate]) -> Iterator[ViewUpdate]:
+    """All views, those still to come kept as well."""
+    yield read[0]
+    for view in views:
+        read.append(view)
+        yield view
+
+
+def _chain(read: list[ViewUpdate], views: Iterator[ViewUpdate]) -> Iterator[ViewUpdate]:
+    yield from read
+    yield from views
+
+
+def _range_of(values: FloatImage) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
+
+
+def median_of_middle(disparity: FloatImage) -> float:
+    """The median of the middle ninth of the picture."""
+    height, width = disparity.shape
+    part = disparity[height // 3 : height - height // 3, width // 3 : width - width // 3]
+    return float(np.median(part))

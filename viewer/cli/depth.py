@@ -1,0 +1,46 @@
+"""`iibr depth`: the disparity of a light field's or stereo pair's views, found from the views."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from viewer.cli.options import Force, Memory, require_memory
+from viewer.cli.terminal import print_notes, show_progress
+
+
+def depth(
+    field: Annotated[Path, typer.Argument(metavar="FOLDER", help="A light field, or a stereo pair.")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="PFM, EXR, NPY or 16-bit PNG to write.")],
+    memory: Memory = None,
+    force: Force = False,
+) -> None:
+    """Find the disparity of the centre view from all views, in pixels per view step.
+
+    Example: iibr depth field -o field_disparity.pfm
+    """
+    require_memory(memory, keeps_views=True)
+    from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
+    from iibr_core.formats.light_fields.registry import open_light_field
+    from iibr_core.formats.light_fields.views import grid_of, read_views
+    from iibr_core.formats.maps.writer import write_map
+    from iibr_core.formats.outputs import require_file_place
+
+    require_file_place(out, [field], force)
+    scene = open_light_field(field)
+    grid, (_, views) = grid_of(scene), read_views(scene)
+    with show_progress("reading") as show:
+        read = []
+        for view in views:
+            read.append(view)
+            show(len(read), grid.rows * grid.columns)
+    colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
+    with show_progress("finding disparity") as show:
+        show(0, 0)
+        coarse = estimate_coarse(colors, offsets, 0)
+        values = estimate_disparity(colors, offsets, 0, coarse.range_px)
+    note = write_map(out, values)
+    print(f"{scene.name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")
+    print_notes((note,) if note else ())
