@@ -62,8 +62,11 @@ _places = [
 _screenshot = [
     Case(f"screenshot {words}", (*WRITING["screenshot"], place, *more), says=says)
     for words, place, more, says in (
-        ("as JPEG", "new.jpg", (), ".png or .exr"),
-        ("without a suffix", "new", (), ".png or .exr"),
+        ("as GIF", "new.gif", (), ".png, .jpg"),
+        ("with bits that JPEGs do not have", "new.jpg", ("--bits", "16"), "8 bits"),
+        ("with no quality", "new.jpg", ("--picture-quality", "0"), "picture-quality"),
+        ("in an unknown profile", "new.png", ("--profile", "cmyk"), "cmyk"),
+        ("without a suffix", "new", (), ".png, .jpg"),
         ("onto a folder", "folder", (), "folder"),
         ("onto this folder", ".", (), "."),
         ("onto an existing picture", "saved.png", (), "--force"),
@@ -89,11 +92,18 @@ _screenshot = [
     Case("screenshot over a field's view", ("screenshot", "field", "-o", "field/input_Cam004.png", "--force")),
     Case("screenshot into the field it shows", ("screenshot", "field", "-o", "field/new.png"), says="field"),
     Case("screenshot into the field through a link", ("screenshot", "field", "-o", "link-to-field/new.png")),
+    Case(
+        "screenshot as a JPEG",
+        (*WRITING["screenshot"], "new.jpg", "--profile", "p3", "--picture-quality", "50", "--gps"),
+        code=0,
+        makes=("new.jpg",),
+    ),
+    Case("screenshot as a TIFF", (*WRITING["screenshot"], "new.tif", "--bits", "16"), code=0, makes=("new.tif",)),
     Case("screenshot by force", (*WRITING["screenshot"], "saved.png", "--force"), code=0, makes=("saved.png",)),
     Case(
         "screenshot through a link",
         (*WRITING["screenshot"], "dangling-into-folder", "--force"),
-        says=".png or .exr",
+        says=".png, .jpg",
     ),
     Case("screenshot through a dangling link", (*WRITING["screenshot"], "dangling.png"), code=0, makes=("gone.png",)),
     Case(

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.types import GridShape, ViewUpdate
-from viewer.app.image_export import export_image
+from iibr_core.types import SRGB, GridShape, ViewUpdate
+from viewer.app.image_export import SavedShot, export_picture
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import SavedSettings, Source
 from viewer.model.state.optics import Optics
@@ -52,9 +54,10 @@ def _make_good(folder: Path, pixels: np.ndarray) -> None:
     Image.fromarray(pixels).save(folder / "photo.jpg")
     write_pfm(folder / "map.pfm", disparity)
     settings = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(WIDTH, HEIGHT))
-    export_image(folder / "saved.png", pixels, settings)
+    shot = SavedShot(settings, PictureFormat(), SRGB, None)
+    export_picture(folder / "saved.png", pixels, shot)
     huge = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(30_000, 30_000))
-    export_image(folder / "saved-huge.png", pixels, huge)
+    export_picture(folder / "saved-huge.png", pixels, replace(shot, settings=huge))
     with HciWriter(folder / "field", GridShape(3, 3), 40.0, "field", False) as writer:
         for row in range(3):
             for column in range(3):

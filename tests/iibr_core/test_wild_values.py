@@ -19,10 +19,13 @@ from iibr_core import color
 from iibr_core.depth import edge_blur, pictorial_cues, refine, rims, scaling, search
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
-from iibr_core.depth.embedded.xmp import Xmp, parse_packet
+from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.multi_view import estimate, matching
 from iibr_core.formats.images import photo
+from iibr_core.formats.images.picture_kinds import KINDS
+from iibr_core.formats.images.picture_writers import write_picture
+from iibr_core.formats.images.xmp_packet import parse_packet
 from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
 from iibr_core.generation import cost_model, outer_views, plan, relief
@@ -196,6 +199,12 @@ def field_on_disk(folder, value):
     return list(views.read_views(registry.open_light_field(folder / "field"))[1])
 
 
+def read_back(write, path, pixels):
+    """What is found in the file that was written."""
+    write(path, pixels)
+    return photo.read_photo(path).pixels
+
+
 FINITE = {
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
     "rendering.hypothesis_colors.blend_hypotheses": lambda v, _: decided(v),
@@ -331,6 +340,9 @@ FINITE = {
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
     "rendering.view_synthesis.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
     "types.Disparity": lambda v, _: Disparity(depths(v), "wild"),
+    "formats.images.picture_writers.write_picture": lambda v, to: [
+        read_back(write_picture, to / f"a{ending}", image(v)) for ending in KINDS
+    ],
     "color.photo_in_srgb": lambda v, _: (
         color.photo_in_srgb(Photo(image(v), 20.0, "wild", color_space=DISPLAY_P3)).pixels
     ),
@@ -400,7 +412,7 @@ READS_OR_TELLS = {
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
     "depth.sidecar": "find_sidecar sidecars_of map_to_read flat_disparity",
-    "depth.embedded.xmp": "is_jpeg jpeg_layout value_in number_in xmp_of parse_packet",
+    "depth.embedded.xmp": "is_jpeg jpeg_layout number_in xmp_of",
     "formats.animations": "even_size require_video_size write_animation",
     "formats.quilts": "Quilt quilt_for lay_out tagged",
     "formats.stereo": "anaglyph",
@@ -426,7 +438,12 @@ READS_OR_TELLS = {
     "formats.maps.npy": "read_array read_array_header",
     "formats.maps.pfm": "read_pfm read_pfm_size",
     "formats.maps.reader": "read_map read_map_header MapHeader",
-    "formats.images.oiio_writer": "write_image_file",
+    "formats.images.oiio_writer": "write_image_file encode_image_file",
+    "formats.images.icc_profile": "icc_profile",
+    "formats.images.metadata": "PictureMetadata read_metadata exif_for xmp_for text_in_xmp unpack_text",
+    "formats.images.picture_kinds": "PictureKind PictureFormat picture_kind require_picture_format is_float",
+    "formats.images.picture_writers": "write_png write_exr write_jpeg write_webp write_avif write_tiff",
+    "formats.images.xmp_packet": "value_in parse_packet",
     "formats.images.oiio_names": "oiio_name",
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
     "complaint_of full_scale",

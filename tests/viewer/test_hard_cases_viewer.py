@@ -20,12 +20,13 @@ import pytest
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.app.image_export import export_image, is_float, settings_of
+from viewer.app.image_export import export_picture, shot_of
 from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.background.jobs import Failed
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
@@ -170,18 +171,19 @@ def viewer(tmp_path: Path) -> Iterator[HeadlessViewer]:
         yield made
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.tif"])
 def test_a_full_disk_while_a_picture_is_saved(viewer: HeadlessViewer, tmp_path: Path, name: str) -> None:
     """One line, nothing half-written, what was there stays; with room again the same picture is saved."""
     path = tmp_path / name
     path.write_bytes(b"mine")
-    pixels, settings = viewer.picture((96, 64), is_float(path)), settings_of(viewer.state, (96, 64))
+    form = PictureFormat()
+    pixels, shot = viewer.picture((96, 64), is_float(path, form)), shot_of(viewer.state, (96, 64), form)
     others = set(tmp_path.iterdir())
     with full_disk(900), pytest.raises(InputError, match=f"{name}: cannot be written"):
-        export_image(path, pixels, settings)
+        export_picture(path, pixels, shot)
     assert path.read_bytes() == b"mine"
     assert set(tmp_path.iterdir()) == others
-    export_image(path, pixels, settings)
+    export_picture(path, pixels, shot)
     assert read_settings(path).size_px == (96, 64)
 
 

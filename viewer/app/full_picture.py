@@ -17,7 +17,6 @@ from iibr_core.rendering.lens_light import CENTRE, draw_large, mean_of_areas
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import (
-    SRGB,
     ColorSpace,
     FloatImage,
     ImageSize,
@@ -65,19 +64,19 @@ class FullPicture:
 
 
 def encode_light(
-    light: FloatImage, as_float: bool, color_space: ColorSpace, should_stop: ShouldStop = never
+    light: FloatImage, is_linear: bool, target: ColorSpace, source: ColorSpace, should_stop: ShouldStop = never
 ) -> NDArray[Any]:
-    """sRGB-encoded colours of light (H, W, 3) in a colour space: uint8, or float32 with 1 = white.
+    """Light (H, W, 3) of one colour space in another: bytes, encoded by sRGB's curve, or light as it is.
 
     Raises Cancelled once should_stop is true.
     """
-    encoded = np.empty(light.shape, np.float32 if as_float else np.uint8)
-    matrix = primaries_matrix(SRGB, color_space)
+    encoded = np.empty(light.shape, np.float32 if is_linear else np.uint8)
+    matrix = primaries_matrix(target, source)
 
     def band(first: int, last: int) -> None:
         rows = light[first:last]
-        colors = srgb_from_linear(rows if color_space == SRGB else rows @ matrix.T)
-        encoded[first:last] = colors if as_float else bytes_from_encoded(colors)
+        converted = rows if target == source else rows @ matrix.T
+        encoded[first:last] = converted if is_linear else bytes_from_encoded(srgb_from_linear(converted))
 
     in_bands(band, image_size(light), should_stop)
     return encoded

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
-from iibr_core.types import ReportProgress, ignore_progress
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ignore_progress
 from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
 from viewer.app.image_export import render_pixels
 from viewer.app.save_places import require_size
@@ -130,13 +131,14 @@ class HeadlessViewer:
     def picture(
         self,
         size: ScreenSize | None = None,
-        as_float: bool = False,
+        is_linear: bool = False,
+        color_space: ColorSpace = SRGB,
         report_progress: ReportProgress = ignore_progress,
     ) -> NDArray[Any]:
         """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3).
 
-        sRGB-encoded, uint8 or float32 with 1 = white. Raises InputError for absurd sizes, and where the photo is no
-        longer there to be read at its own size.
+        Bytes, encoded, or float32 linear light with 1 = white, of color_space. Raises InputError for absurd sizes, and
+        where the photo is no longer there to be read at its own size.
         """
         scene = self.state.scene
         assert scene is not None
@@ -148,19 +150,19 @@ class HeadlessViewer:
         x, y, box_width, box_height = layout.picture_px
         box_size = layout.picture_px.size
         if is_full(scene, self.state.optics, box_size):
-            pixels = self._full_picture(scene, box_size, as_float, report_progress)
+            light = self._full_picture(scene, box_size, report_progress)
+            pixels = encode_light(light, is_linear, color_space, scene.color_space)
         else:
-            pixels = render_pixels(self._scene_view, self.state, box_size, as_float)
+            pixels = render_pixels(self._scene_view, self.state, box_size, is_linear, color_space)
         if box_size == (width, height):
             return pixels
-        image = np.empty((height, width, 3), np.float32 if as_float else np.uint8)
-        image[:] = BACKGROUND[:3] if as_float else np.round(np.array(BACKGROUND[:3]) * 255)
+        image = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
+        background = np.array(BACKGROUND[:3])
+        image[:] = linear_from_srgb(background) if is_linear else np.round(background * 255)
         image[y : y + box_height, x : x + box_width] = pixels
         return image
 
-    def _full_picture(
-        self, scene: Scene, size: ScreenSize, as_float: bool, report_progress: ReportProgress
-    ) -> NDArray[Any]:
+    def _full_picture(self, scene: Scene, size: ScreenSize, report_progress: ReportProgress) -> FloatImage:
         loaded, optics = self._scene_view.loaded, self.state.optics
         assert loaded is not None
         assert scene.plan is not None
@@ -168,7 +170,7 @@ class HeadlessViewer:
         if needs_smaller(optics):
             smaller = self._scene_view.picture(optics, scene.size, is_linear=True, color_space=scene.color_space)
         full = FullPicture(scene, scene.plan, loaded, optics, size, smaller)
-        return encode_light(full.draw(report_progress=report_progress), as_float, scene.color_space)
+        return full.draw(report_progress=report_progress)
 
     @property
     def scene(self) -> Scene:

@@ -1,39 +1,52 @@
-"""Images on their way to a file, from the window and the command line: `export_image` writes every one of them."""
+"""Pictures and maps on their way to a file, from the window and the command line."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.color import srgb_from_linear
-from iibr_core.types import FloatImage
+from iibr_core.formats.files import is_folder
+from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.types import SRGB, ColorSpace, FloatImage
 from viewer.app.save_places import require_size
 from viewer.display.scene_view import SceneView
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState, SavedSettings
 
 
-def export_image(path: Path, pixels: NDArray[Any], settings: SavedSettings | None = None) -> None:
-    """Write an sRGB-encoded image (H, W, 3), uint8 or float with 1 = white, whole or not at all.
+@dataclass(frozen=True, eq=False)
+class SavedShot:
+    """A picture to be saved. form: how. color_space: of its colours. photo: whose file tells more, None without."""
 
-    settings: what it takes to take the picture again, put inside. Raises InputError where it cannot be written.
+    settings: SavedSettings
+    form: PictureFormat
+    color_space: ColorSpace
+    photo: Path | None
+
+
+def export_image(path: Path, pixels: NDArray[Any]) -> None:
+    """Write sRGB bytes (H, W, 3), whole or not at all. Raises InputError where that cannot be."""
+    from iibr_core.formats.images.picture_writers import write_picture
+
+    write_picture(path, pixels)
+
+
+def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
+    """Write a picture as it was drawn: (H, W, 3), bytes, or linear light, see `is_float`; returns the path.
+
+    What it takes to take it again is put inside, and what the photo's file says of the photo. Raises InputError.
     """
-    from iibr_core.formats.images.photo import write_image
-
-    if settings is None:
-        write_image(path, pixels)
-        return
+    from iibr_core.formats.images.metadata import PictureMetadata, read_metadata
+    from iibr_core.formats.images.picture_writers import write_picture
     from viewer.model.saved_settings import ATTRIBUTE, settings_text
 
-    write_image(path, pixels, {ATTRIBUTE: settings_text(settings)})
-
-
-def export_picture(path: Path, drawn: NDArray[Any], settings: SavedSettings) -> Path:
-    """Write a picture as the graphics card drew it, see `is_float`; returns the path. Raises InputError."""
-    export_image(path, srgb_from_linear(drawn) if is_float(path) else drawn, settings)
+    of_photo = PictureMetadata() if shot.photo is None else read_metadata(shot.photo)
+    texts = {ATTRIBUTE: settings_text(shot.settings)}
+    metadata = PictureMetadata(of_photo.exif, of_photo.xmp, texts)
+    write_picture(path, drawn, shot.form, metadata, shot.color_space)
     return path
 
 
@@ -51,16 +64,24 @@ def settings_of(state: AppState, size_px: ScreenSize) -> SavedSettings:
     return SavedSettings(state.optics, state.depth_strength, source, size_px, state.depth.edits)
 
 
-def is_float(path: Path) -> bool:
-    """Whether files of this kind hold more than 8 bits a channel: their pictures are drawn as linear light."""
-    return path.suffix.lower() == ".exr"
+def shot_of(state: AppState, size_px: ScreenSize, form: PictureFormat) -> SavedShot:
+    """The present picture, to be saved so."""
+    assert state.source is not None
+    space = SRGB if state.scene is None else state.scene.color_space
+    photo = Path(state.source.path)
+    return SavedShot(settings_of(state, size_px), form, form.space_for(space), None if is_folder(photo) else photo)
 
 
-def render_pixels(scene_view: SceneView, state: AppState, size_px: ScreenSize, as_float: bool = False) -> NDArray[Any]:
-    """The picture with every sample it will get, (height, width, 3), sRGB-encoded: uint8, or float32 with 1 = white.
+def render_pixels(
+    scene_view: SceneView,
+    state: AppState,
+    size_px: ScreenSize,
+    is_linear: bool = False,
+    color_space: ColorSpace = SRGB,
+) -> NDArray[Any]:
+    """The picture with every sample it will get, (height, width, 3), of color_space: bytes, or float32 linear light.
 
     Larger pictures than the graphics card can hold are drawn in parts. Raises InputError beyond MAX_PIXELS.
     """
     require_size(size_px)
-    pixels = scene_view.picture(state.optics, size_px, is_linear=as_float)
-    return srgb_from_linear(pixels) if as_float else pixels
+    return scene_view.picture(state.optics, size_px, is_linear=is_linear, color_space=color_space)

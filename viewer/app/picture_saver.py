@@ -12,16 +12,17 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from iibr_core.formats.images.picture_kinds import is_float
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import InputError
-from viewer.app.image_export import export_picture, is_float, settings_of
+from viewer.app.image_export import SavedShot, export_picture, shot_of
 from viewer.app.save_places import picture_path
 from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.jobs import message_of
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
-from viewer.model.state.app_state import AppState, Notice, SavedSettings, SavePrompt, SaveTask
+from viewer.model.state.app_state import AppState, Notice, SavePrompt, SaveTask
 from viewer.model.state.saving import Saving, SavingChanged
 
 
@@ -30,7 +31,7 @@ class PictureRequest:
     """A picture as it was asked for. views: what it is drawn from, see `_views_of`."""
 
     path: Path
-    settings: SavedSettings
+    shot: SavedShot
     views: tuple[int, int]
 
 
@@ -60,11 +61,11 @@ class PictureSaver:
             if not task.may_replace and any(request.path == path for request in self._requests):
                 raise AlreadyThereError(f"{path}: is about to be written")
         except AlreadyThereError:
-            return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True))]
+            return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, form=task.form))]
         except InputError as error:
             return [refusal(task, state, error)]
-        settings = settings_of(state, task.size_px)
-        self._requests.append(PictureRequest(path, settings, _views_of(self._scene_view)))
+        shot = shot_of(state, task.size_px, task.form)
+        self._requests.append(PictureRequest(path, shot, _views_of(self._scene_view)))
         return [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
 
     def cancel(self) -> None:
@@ -92,11 +93,13 @@ class PictureSaver:
     def _draw(self, request: PictureRequest, budget_s: float) -> list[Action]:
         if _views_of(self._scene_view) != request.views:
             return self._fail(f"{request.path}: not saved, for what it shows was changed meanwhile; save it again")
-        settings = request.settings
+        settings = request.shot.settings
         try:
             if self._drawing is None or self._drawing.is_stopped:  # more of the same scene is there now
-                is_linear = is_float(request.path)
-                self._drawing = self._scene_view.start_picture(settings.optics, settings.size_px, is_linear)
+                is_linear = is_float(request.path, request.shot.form)
+                self._drawing = self._scene_view.start_picture(
+                    settings.optics, settings.size_px, is_linear, color_space=request.shot.color_space
+                )
             self._drawing.advance(budget_s)
         except (InputError, MemoryError) as error:
             return self._fail(f"{request.path}: {message_of(error)}")
@@ -106,7 +109,7 @@ class PictureSaver:
 
     def _write(self, request: PictureRequest, drawing: PictureDrawing) -> None:
         self._is_writing = True
-        work = partial(export_picture, request.path, drawing.image, settings=request.settings)
+        work = partial(export_picture, request.path, drawing.image, request.shot)
         self._stop_drawing()
         self._writer.submit(FileRequest(0, work))
 
@@ -114,7 +117,7 @@ class PictureSaver:
         result = self._writer.next_result()
         if result is None and not self._writer.is_lost:
             return []
-        path, edits = self._requests[0].path, self._requests[0].settings.depth_edits
+        path, edits = self._requests[0].path, self._requests[0].shot.settings.depth_edits
         if isinstance(result, Done):
             self._next()
             return [Notify(Notice(f"Saved {path}")), EditsSaved(edits)]
@@ -147,7 +150,7 @@ class PictureSaver:
 def refusal(task: SaveTask, state: AppState, error: InputError) -> Action:
     """Why nothing is saved: where it was asked for, whatever was typed there stays; else in a notice."""
     if isinstance(state.prompt, SavePrompt):
-        return ShowPrompt(SavePrompt(task.path, task.size_px, what=task.what, problem=str(error)))
+        return ShowPrompt(SavePrompt(task.path, task.size_px, what=task.what, problem=str(error), form=task.form))
     return Notify(Notice(str(error), is_error=True))
 
 

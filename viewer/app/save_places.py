@@ -8,12 +8,12 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, require_picture_format
 from iibr_core.formats.outputs import require_file_place
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState, SaveTask, Source
 
-SUFFIXES = (".png", ".exr")
 MAX_PIXELS = 100_000_000
 """Of a picture: as float light it then takes 1.2 GB."""
 
@@ -34,22 +34,28 @@ def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     return (*found, *(Path(os.path.expanduser(path)) for path in beside if path))
 
 
-def require_picture_place(path: Path, size_px: ScreenSize | None, inputs: Sequence[Path], may_replace: bool) -> None:
+def require_picture_place(
+    path: Path,
+    size_px: ScreenSize | None,
+    inputs: Sequence[Path],
+    may_replace: bool,
+    form: PictureFormat = AS_USUAL,
+) -> None:
     """Find out before a picture is drawn, which may take minutes, whether it can be written. inputs: what is read.
 
-    Raises AlreadyThereError, and InputError for other endings, sizes beyond MAX_PIXELS, and as `require_file_place`.
+    Raises AlreadyThereError, and InputError for what its kind of file does not have, sizes beyond MAX_PIXELS, and as
+    `require_file_place`.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: can be written as .png or .exr only")
     if size_px is not None:
         require_size(size_px)
+    require_picture_format(path, form, None if size_px is None else ImageSize(size_px[1], size_px[0]))
     require_file_place(path, inputs, may_replace)
 
 
 def picture_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
     """Where this picture goes. Raises as `require_picture_place` does, and InputError without a name."""
     path = _path_of(task, ".png")
-    require_picture_place(path, task.size_px, inputs, task.may_replace)
+    require_picture_place(path, task.size_px, inputs, task.may_replace, task.form)
     return path
 
 

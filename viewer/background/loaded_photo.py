@@ -88,8 +88,6 @@ def load_photo(
     """
     require_process(budget_of(source.depth.memory_bytes), keeps_views)
     from iibr_core.depth.search import open_with_depth
-    from iibr_core.formats.images.avif import is_avif
-    from iibr_core.formats.images.heic import is_heic
     from viewer.model.saved_settings import settings_text_in
 
     said_at: dict[str, float] = {}
@@ -113,8 +111,7 @@ def load_photo(
     )
     found = replace(found, photo=replace(found.photo, notes=found.photo.notes + notes))
     give_back_memory()
-    # This program saves neither.
-    settings = "" if is_heic(path) or is_avif(path) else settings_text_in(path)
+    settings = settings_text_in(path)
     settings_wanted = depth_settings or DepthSettings(source.depth.refine)
     own_size = _turned_like(stored_size, found.photo.size)
     return _prepare(found, settings, _models_here(), settings_wanted, (own_size, stamp), should_stop)

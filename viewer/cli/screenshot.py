@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import InputError, ViewOffset
+from iibr_core.types import ColorSpace, InputError, ViewOffset
 from viewer.cli.lens_options import NO_LENS_OPTIONS, LensOptions
 from viewer.cli.options import (
     SCREEN_SIZE,
@@ -64,7 +65,7 @@ class Backend(StrEnum):
 @dataclass(frozen=True)
 class _Shot:
     """What is opened, and what is done to it before the picture is taken. size: None for the usual one. is_full: at
-    the photo's own size. notes: to be said with it.
+    the photo's own size. notes: to be said with it. form: how it is written.
     """
 
     source: Source
@@ -75,12 +76,20 @@ class _Shot:
     notes: tuple[str, ...] = ()
     is_full: bool = False
     lens: LensOptions = NO_LENS_OPTIONS
+    form: PictureFormat = AS_USUAL
+
+
+def profile_from_text(text: str) -> ColorSpace:
+    """A colour profile by name. Raises BadParameter."""
+    if text not in PROFILES:
+        raise typer.BadParameter(f"{text!r} is no profile: give {' or '.join(PROFILES)}")
+    return PROFILES[text]
 
 
 def screenshot(
     context: typer.Context,
     path: ScenePath,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Image to write (.png, .exr).")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help=f"To write: {', '.join(KINDS)}.")],
     like: Annotated[
         Path | None,
         typer.Option(
@@ -107,6 +116,23 @@ def screenshot(
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
     ] = None,
     full: Annotated[bool, typer.Option("--full", help="At the photo's own size, from all its pixels.")] = False,
+    bits: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="16 for .png, .tif, .exr: of a channel.", show_default="the usual"),
+    ] = None,
+    picture_quality: Annotated[
+        int, typer.Option(min=1, max=BEST_QUALITY, metavar="N", help="Of .jpg, .webp and .avif.")
+    ] = AS_USUAL.quality,
+    profile: Annotated[
+        ColorSpace | None,
+        typer.Option(
+            parser=profile_from_text,
+            metavar="|".join(PROFILES),
+            help="Colours of the picture: sRGB, Display P3.",
+            show_default="p3 for photos with more colours than sRGB",
+        ),
+    ] = None,
+    gps: Annotated[bool, typer.Option("--gps", help="Keep the place where the photo was taken.")] = False,
     ui: Annotated[bool, typer.Option("--ui", help="With the panels, as in the window.")] = False,
     backend: Annotated[Backend, typer.Option(help="Where OpenGL comes from.")] = Backend.auto,
     disparity: DisparityFile = None,
@@ -143,10 +169,11 @@ def screenshot(
         require_utf8(path, disparity, depth_model)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
-    require_picture_memory(shot.size, shot.source.depth.memory_bytes, output.suffix.lower() == ".exr")
-    require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force)
+    form = PictureFormat(bits, picture_quality, profile, gps)
+    require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force, form)
+    require_picture_memory(shot.size, shot.source.depth.memory_bytes, is_float(output, form))
     require_model(choice)
-    shot = replace(shot, lens=LensOptions(view, focus, aperture), is_full=full)
+    shot = replace(shot, lens=LensOptions(view, focus, aperture), is_full=full, form=form)
     notes, origin = _write(shot, output, ui, backend)
     print(output)
     print_depth(origin)
@@ -175,7 +202,7 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
     """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
     from viewer.app.full_picture import require_full
     from viewer.app.headless import HeadlessViewer
-    from viewer.app.image_export import export_image, is_float, settings_of
+    from viewer.app.image_export import export_image, export_picture, shot_of
 
     with HeadlessViewer(backend.value) as viewer:
         if ui and not viewer.has_panels:
@@ -195,13 +222,15 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
                 require_full(viewer.scene, viewer.state.optics)
             if ui or viewer.needs_views(size):
                 viewer.make_views(lambda made: show(made.done, made.total, made.doing))
-            if not ui:
-                pixels = viewer.picture(size, is_float(output), show)
-        if ui:
-            pixels = viewer.screen(shot.size or SCREEN_SIZE)
-    export_image(
-        output, pixels, None if ui else settings_of(viewer.state, ScreenSize(pixels.shape[1], pixels.shape[0]))
-    )
-    scene = viewer.state.scene
+            scene = viewer.scene
+            saved = shot_of(viewer.state, size or scene.size, shot.form)
+            if ui:
+                pixels = viewer.screen(shot.size or SCREEN_SIZE)
+            else:
+                pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space, show)
+    if ui:
+        export_image(output, pixels)
+    else:
+        export_picture(output, pixels, saved)
     clamped = shot.lens.notes(viewer.state.optics)
-    return (scene.notes + clamped, scene.depth_origin) if scene is not None else ((), None)
+    return scene.notes + clamped, scene.depth_origin

@@ -1,4 +1,4 @@
-"""XMP in JPEG files: found in the file's segments, put together, and parsed without ever expanding an entity.
+"""XMP in JPEG files: found in the file's segments and put together.
 
 Large values (a depth map in base64) do not fit a segment of 64 KB: they stand in an "extended" packet that is cut into
 parts, XMP specification part 3, section 1.1.3.1.
@@ -10,22 +10,14 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from xml.etree.ElementTree import Element, ParseError, TreeBuilder
+from xml.etree.ElementTree import Element
 
-from defusedxml.common import DTDForbidden
-from defusedxml.ElementTree import DefusedXMLParser
-
+from iibr_core.formats.images.xmp_packet import MAX_PACKET_BYTES, parse_packet, value_in
 from iibr_core.types import InputError
 
 STANDARD_HEADER = b"http://ns.adobe.com/xap/1.0/\0"
 EXTENDED_HEADER = b"http://ns.adobe.com/xmp/extension/\0"
 GUID_BYTES = 32
-MAX_PACKET_BYTES = 64 * 2**20
-"""Of extended XMP: twice what the sharp picture of a 100 MP camera would take as base64."""
-
-MAX_ELEMENTS = 20_000
-"""Real packets hold some hundreds."""
-
 NOTE = "http://ns.adobe.com/xmp/note/"
 APP1, START_OF_SCAN, END_OF_IMAGE = 0xE1, 0xDA, 0xD9
 # Markers without a length: TEM, restarts, start of image.
@@ -119,17 +111,6 @@ class Xmp:
                 yield from tree.iter(f"{{{namespace}}}{name}")
 
 
-def value_in(tree: Element, namespace: str, name: str) -> str | None:
-    """The first value of a property in a tree, its root included, as attribute or element; None without."""
-    key = f"{{{namespace}}}{name}"
-    for element in tree.iter():
-        if key in element.attrib:
-            return element.attrib[key]
-        if element.tag == key:
-            return "".join(element.itertext())
-    return None
-
-
 def number_in(text: str | None) -> float:
     """The number that a value states; NaN where there is none."""
     try:
@@ -168,32 +149,3 @@ def _join_parts(parts: list[tuple[int, int, bytes]]) -> bytes:
     if len(packet) != whole:
         raise InputError(f"extended XMP is cut short ({len(packet):,} of {whole:,} bytes)")
     return bytes(packet)
-
-
-class _LimitedTree(TreeBuilder):
-    """A tree of at most MAX_ELEMENTS elements."""
-
-    count = 0
-
-    def start(self, tag: str, attrs: dict[str, str]) -> Element:
-        self.count += 1
-        if self.count > MAX_ELEMENTS:
-            raise InputError(f"XMP holds more than {MAX_ELEMENTS:,} elements")
-        return super().start(tag, attrs)
-
-
-def parse_packet(packet: bytes) -> Element:
-    """The XML tree of a packet. Raises InputError where it is no XML, declares a document type, or is too large."""
-    if len(packet) > MAX_PACKET_BYTES:
-        raise InputError(f"XMP of {len(packet):,} bytes exceeds {MAX_PACKET_BYTES:,}")
-    parser = DefusedXMLParser(target=_LimitedTree(), forbid_dtd=True)
-    try:
-        parser.feed(packet.strip(b"\0 \t\r\n"))
-        tree: Element = parser.close()
-        return tree
-    except InputError:
-        raise
-    except DTDForbidden as error:
-        raise InputError("XMP declares a document type; entities are not expanded") from error
-    except (ParseError, AssertionError, ValueError, LookupError) as error:  # the last: of an encoding
-        raise InputError(f"XMP is damaged ({error})") from error

@@ -20,16 +20,13 @@ from iibr_core.formats.images.color_profile import color_profile_of, color_space
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
 from iibr_core.formats.images.heic import is_heic, read_heic
 from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute
-from iibr_core.formats.images.oiio_writer import write_image_file
+from iibr_core.formats.images.oiio_writer import PNG_SETTINGS, write_image_file
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
 FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)  # "35 mm equivalent" compares diagonals (CIPA DCG-001)
 MM_PER_RESOLUTION_UNIT = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # Exif 2.3, FocalPlaneResolutionUnit
-# Compression level 1 is 8 times faster than the default 6, 10 % larger; filter 64 is the average.
-PNG_SETTINGS: Mapping[str, str | int | float] = {"png:compressionLevel": 1, "png:filter": 64}
-
 ENCODED_ROWS = 64
 
 
@@ -75,7 +72,8 @@ def read_photo(
 
 
 def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | int | float] | None = None) -> None:
-    """Write sRGB-encoded pixels, (H, W) or (H, W, C): uint8 as it is, floats with 1 = white. Whole or not at all.
+    """Write sRGB-encoded pixels, (H, W) or (H, W, C): uint8 as it is, floats with 1 = white. Whole or not at all. For
+    views and data; pictures that people keep are written by `picture_writers`.
 
     `.png` gets 8 bits, `.exr` linear light: half floats for uint8 and float16, else float32. Raises InputError for
     other extensions and where the file cannot be written.

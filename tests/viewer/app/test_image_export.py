@@ -11,15 +11,11 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.color import srgb_from_linear
+from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_float
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.app.image_export import (
-    export_image,
-    is_float,
-    render_pixels,
-    settings_of,
-)
+from viewer.app.image_export import export_picture, render_pixels, shot_of
 from viewer.app.picture_saver import PictureSaver
 from viewer.model.actions import EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
@@ -53,7 +49,8 @@ def opened(photo: Path) -> Iterator[HeadlessViewer]:
 
 
 def saved(viewer: HeadlessViewer, path: Path, size_px: tuple[int, int]) -> np.ndarray:
-    export_image(path, viewer.picture(size_px, is_float(path)), settings_of(viewer.state, size_px))
+    shot = shot_of(viewer.state, size_px, PictureFormat())
+    export_picture(path, viewer.picture(size_px, is_float(path), shot.color_space), shot)
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))[..., :3]
 
 
@@ -66,7 +63,7 @@ def test_exr_holds_light_finer_than_png(opened: HeadlessViewer, tmp_path: Path) 
     assert np.mean(np.abs(encoded - np.rint(encoded)) > 0.05) > 0.5, "not rounded to 8 bits on the way"
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+@pytest.mark.parametrize("name", [f"a{ending}" for ending in KINDS])
 def test_settings_are_inside(opened: HeadlessViewer, tmp_path: Path, name: str) -> None:
     saved(opened, tmp_path / name, (70, 50))
     settings = read_settings(tmp_path / name)

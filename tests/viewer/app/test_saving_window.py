@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.color import srgb_from_linear
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, write_scene
@@ -50,7 +51,8 @@ def texts(viewer: Driver) -> list[str]:
 def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: Path, name: str) -> None:
     app, out = viewer.app, tmp_path / name
     asked = app.state
-    expected = render_pixels(app.scene_view, asked, SIZE, as_float=name.endswith("exr"))
+    expected = render_pixels(app.scene_view, asked, SIZE, is_linear=name.endswith("exr"))
+    expected = srgb_from_linear(expected) if name.endswith("exr") else expected
     app.do(DoTask(SaveTask(str(out), SIZE)))
     app.step()
     frames, drawn, turns, shares = app.frames_shown, app.scene_view.pictures_drawn, 0, []
@@ -132,7 +134,7 @@ def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path:
     before = path.read_bytes()
     viewer.app.do(DoTask(SaveTask(str(path), (48, 32), may_replace=True, what=what)))
     viewer.until(lambda app: bool(app.state.notices))
-    expected = "can be written as .png" if (what, path.suffix) == ("picture", ".npy") else "is read here"
+    expected = "can be written as .png, .jpg" if (what, path.suffix) == ("picture", ".npy") else "is read here"
     assert expected in texts(viewer)[0]
     viewer.until_idle()
     assert path.read_bytes() == before

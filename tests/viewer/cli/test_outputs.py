@@ -110,7 +110,11 @@ def test_an_empty_folder_and_links_are_written_to(
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (("screenshot", "-o", "o.jpg"), "o.jpg: can be written as .png or .exr only"),
+        (
+            ("screenshot", "-o", "o.gif"),
+            "o.gif: can be written as .png, .jpg, .jpeg, .tif, .tiff, .exr, .webp, .avif only",
+        ),
+        (("screenshot", "-o", "o.jpg", "--bits", "16"), "o.jpg: JPEG is written with 8 bits a channel, not 16"),
         (("screenshot", "-o", "none/o.png"), "the folder none does not exist"),
         (("screenshot", "-o", "o.png", "--size", "16384x16384"), "16384x16384 px"),
         (("screenshot", "-o", "{long}.png"), "a name has 303 bytes"),

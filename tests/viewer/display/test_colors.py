@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageCms
 
+from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
 from viewer.app.headless import HeadlessViewer
+from viewer.app.image_export import export_picture, shot_of
 from viewer.model.state.app_state import Source
 from viewer.model.state.optics import MoveEye, SetAperture
 
@@ -51,3 +55,22 @@ def test_srgb_photos_are_not_touched(tmp_path):
         viewer.open(photo_of_patches(tmp_path / "plain.png"), 1.0, lambda made: None)
         assert viewer.state.scene.color_space == SRGB
         assert np.array_equal(middles(viewer.picture()), PATCHES)
+
+
+@pytest.mark.parametrize("name", ["out.png", "out.jpg", "out.tif"])
+@pytest.mark.parametrize("is_wide", [True, False], ids=["P3", "sRGB"])
+def test_saved_colours_are_those_of_the_photo(tmp_path, name, is_wide):
+    """Seen by a reader that heeds profiles, within 1 of 255."""
+    options = {"icc_profile": profile_bytes()} if is_wide else {}
+    source, out = photo_of_patches(tmp_path / "in.png", **options), tmp_path / name
+    form = PictureFormat(bits=8, quality=100)
+    with HeadlessViewer() as viewer:
+        viewer.open(source, 1.0, lambda made: None)
+        shot = shot_of(viewer.state, viewer.state.scene.size, form)
+        export_picture(out, viewer.picture(color_space=shot.color_space), shot)
+    assert shot.color_space == (DISPLAY_P3 if is_wide else SRGB)
+    with Image.open(out) as image:
+        own = ImageCms.ImageCmsProfile(BytesIO(image.info["icc_profile"]))
+        wanted = BytesIO(profile_bytes()) if is_wide else ImageCms.createProfile("sRGB")
+        seen = ImageCms.profileToProfile(image, own, ImageCms.ImageCmsProfile(wanted))
+    assert np.abs(middles(np.asarray(seen)) - PATCHES).max() <= 1

@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
+from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
+from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ViewOffset
@@ -253,7 +255,7 @@ Saved = Literal["picture", "map"]
 class SavePrompt:
     """The question where to save the picture, and how large, or its disparity map. already_there: there is one.
 
-    problem: why nothing can be saved there, "" before that is known.
+    problem: why nothing can be saved there, "" before that is known. form: how the picture is written.
     """
 
     path: str
@@ -261,6 +263,7 @@ class SavePrompt:
     already_there: bool = False
     what: Saved = "picture"
     problem: str = ""
+    form: PictureFormat = USUAL_FORM
 
 
 @dataclass(frozen=True)
@@ -291,12 +294,13 @@ class ChoosePlaceTask:
 
 @dataclass(frozen=True)
 class SaveTask:
-    """Write the picture, or its disparity map. size_px: (width, height)."""
+    """Write the picture, or its disparity map. size_px: (width, height). form: how the picture is written."""
 
     path: str
     size_px: ScreenSize
     may_replace: bool = False
     what: Saved = "picture"
+    form: PictureFormat = USUAL_FORM
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import PurePath
 from typing import TypeVar
 
 from imgui_bundle import imgui
 
+from iibr_core.formats.images.picture_kinds import BEST_QUALITY, KINDS, PROFILES
 from iibr_core.formats.quilts import DEVICES
+from iibr_core.types import SRGB
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
 from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching
 from viewer.model.export_kinds import EXPORTS
@@ -28,6 +31,7 @@ from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
 
 Choice = TypeVar("Choice", bound=str)
+Option = TypeVar("Option")
 ANY_DISPLAY = "any"
 PROMPT_WIDTH = 460.0
 ROWS_SHOWN = 12
@@ -43,6 +47,7 @@ MOUSE = (
     ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
     ("Esc", "Close what is open, put the brush away"),
 )
+PICTURE_ENDINGS = "The name's ending decides: .png, .jpg, .tif, .webp, .avif, or .exr in linear light."
 MAP_ENDINGS = "The name's ending decides: .pfm, .exr, .npy, or .png (16 bits, scaled)."
 PATH_WORDS = {
     "photo": "Open a photo",
@@ -105,9 +110,9 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     label("File", layout)
     path, entered = _text_field("path", prompt.path)
     edited = prompt if path == prompt.path else replace(prompt, path=path, already_there=False, problem="")
-    edited = edited if is_map else _size_rows(edited, state, layout)
+    edited = edited if is_map else _form_rows(_size_rows(edited, state, layout), state, layout)
     gap(layout, 2)
-    quiet(MAP_ENDINGS if is_map else "The name's ending decides: .png, or .exr in linear light.")
+    quiet(MAP_ENDINGS if is_map else PICTURE_ENDINGS)
     problem = prompt.problem or ("There is a file of this name already." if prompt.already_there else "")
     _say_problem(problem, state)
     pressed, closed = _buttons("Replace" if prompt.already_there else "Save", layout)
@@ -116,7 +121,7 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
         if button("Choose a folder and name…", layout):
             return [DoTask(ChoosePlaceTask(edited))]
     if pressed or entered:
-        return [DoTask(SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what))]
+        return [DoTask(SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what, edited.form))]
     return _prompt_actions(closed, edited, prompt)
 
 
@@ -177,6 +182,41 @@ def _say_problem(problem: str, state: AppState) -> None:
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
         imgui.text_wrapped(problem)
         imgui.pop_style_color()
+
+
+def _form_rows(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
+    """Rows for what the kind of file that was typed can be told."""
+    kind, form, scene = KINDS.get(PurePath(prompt.path).suffix.lower()), prompt.form, state.scene
+    if kind is None or scene is None:
+        return prompt
+    if form.bits not in kind.bits:
+        form = replace(form, bits=None)  # of another kind, typed before
+    if kind.has_quality:
+        label("Quality", layout, "Less makes smaller files.")
+        form = replace(form, quality=imgui.slider_int("##quality", form.quality, 1, BEST_QUALITY)[1])
+    if len(kind.bits) > 1:
+        label("Bits", layout, "Of a channel: more of them leave room for edits.")
+        usual = form.bits or kind.bits[0]
+        chosen = _radio({str(bits): bits for bits in sorted(kind.bits)}, usual)
+        form = form if chosen == usual else replace(form, bits=chosen)
+    if scene.color_space != SRGB or form.color_space is not None:
+        label("Colours", layout, "Display P3 holds more of the photo's than sRGB, which every program shows.")
+        space = form.space_for(scene.color_space)
+        chosen_space = _radio({profile.name: profile for profile in PROFILES.values()}, space)
+        form = form if chosen_space == space else replace(form, color_space=chosen_space)
+    label("Place", layout, "Where the photo was taken, if its file says so.")
+    form = replace(form, keeps_position=imgui.checkbox("Keep it in the picture", form.keeps_position)[1])
+    return prompt if form == prompt.form else replace(prompt, form=form)
+
+
+def _radio(choices: Mapping[str, Option], chosen: Option) -> Option:
+    """One of some, side by side."""
+    for i, (words, choice) in enumerate(choices.items()):
+        if i:
+            imgui.same_line()
+        if imgui.radio_button(words, choice == chosen):
+            chosen = choice
+    return chosen
 
 
 def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
