@@ -8,7 +8,17 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from iibr_core.types import ViewOffset
-from viewer.model.actions import Action, DoTask, EndGesture, OpenPath, ReturnHome, SetHover, ShowPrompt
+from viewer.model.actions import (
+    Action,
+    DoTask,
+    EndGesture,
+    OpenPath,
+    ReturnHome,
+    SetFullscreen,
+    SetHover,
+    ShowBefore,
+    ShowPrompt,
+)
 from viewer.model.commands import BY_NAME, COMMANDS, Chord
 from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, Rect, pixel_at
@@ -146,6 +156,10 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [DropStroke()]
     if state.inspection.shows_grid:
         return [ShowGrid(False)]
+    if state.shows_before:
+        return [ShowBefore(False)]
+    if state.is_fullscreen and not state.brush.is_on:
+        return [SetFullscreen(False)]
     return [SetBrush(replace(state.brush, is_on=False))] if state.brush.is_on else []
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
+from viewer.app.gamepad import Gamepad, actions_from_gamepad
 from viewer.app.input import (
     Pointer,
     actions_from_drop,
@@ -21,7 +22,7 @@ from viewer.app.input import (
     read_keys,
     read_pointer,
 )
-from viewer.app.preferences_store import load_preferences, store_preferences
+from viewer.app.preferences_store import PREFERENCES_FILE, load_preferences, store_preferences
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
@@ -79,6 +80,9 @@ MOTION_FRAME_S = 1 / 60
 DIALOG_LOOK_S = 0.1
 """How often an open file dialog is asked for its answer."""
 
+GAMEPAD_LOOK_S = 0.05
+"""How often a gamepad that rests is asked."""
+
 FRAMES_OF_A_CLICK = 3
 """A press and its release, and the next press, are heard of in as many frames."""
 
@@ -112,6 +116,8 @@ class App:
         """
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
+        if kept_in and not (kept_in / PREFERENCES_FILE).exists():
+            self.state = replace(self.state, prompt="help")  # the first start
         self._window_slot = WindowSlot(kept_in)
         preferences = self.state.preferences
         place = self._window_slot.shift(preferences.window)
@@ -139,6 +145,8 @@ class App:
         self._stepped_at = 0.0
         self._noticed: Notice | None = None
         self._noticed_at = 0.0
+        self._gamepad: Gamepad | None = None
+        self._gamepad_at = 0.0
         self._took_s: deque[float] = deque(maxlen=FRAMES_OF_A_CLICK)
         self._shown: Frame | None = None
         self._same_frames = 0
@@ -185,6 +193,8 @@ class App:
             return max(self._stepped_at + MOTION_FRAME_S - time.perf_counter(), 0.0)
         if self._is_busy or self._same_frames < SETTLING_FRAMES:
             return 0.0
+        if self._gamepad is not None:
+            return GAMEPAD_LOOK_S if self._gamepad.is_resting else 0.0
         if self._side_effects.is_waiting:
             return DIALOG_LOOK_S
         return IDLE_WAIT_S if self.scene_view.shows_all_views() else VIEW_REFRESH_S
@@ -194,7 +204,8 @@ class App:
         scene = self.state.scene
         size = scene.size if scene else None
         beside = beside_of(self.state)
-        return layout_of(self.window.size, size, self.window.pixel_ratio, self.look().ui_scale, beside)
+        ratio, scale = self.window.pixel_ratio, self.look().ui_scale
+        return layout_of(self.window.size, size, ratio, scale, beside, has_panel=not self.state.hides_panel)
 
     def look(self) -> Look:
         """Theme, and size of text and widgets on this display."""
@@ -232,12 +243,21 @@ class App:
         while (result := self._comparisons.next_result()) is not None:
             actions += self.inspection_view.take(result)
         actions += self._expire_notices(self._stepped_at)
+        actions += self._take_gamepad(self._stepped_at)
         if self.state.motion.is_running:
             actions.append(Tick(self._stepped_at))
         actions += self._place_window()
         if self._worker.is_lost and self.state.stopped != self.state.generation == self._submitted:
             actions.append(WorkerLost())
         return actions
+
+    def _take_gamepad(self, now_s: float) -> list[Action]:
+        """It sends no events: where there is one, it is asked now and then, and every frame while it is held."""
+        pad, before = self.window.gamepad(), self._gamepad
+        seconds, self._gamepad, self._gamepad_at = now_s - self._gamepad_at, pad, now_s
+        if pad is None or pad.is_resting:
+            return []
+        return actions_from_gamepad(pad, before or Gamepad(), self.state, seconds)
 
     def _expire_notices(self, now_s: float) -> list[Action]:
         """The newest is the one that is seen: the others' time begins when they are."""
@@ -250,7 +270,8 @@ class App:
     def _place_window(self) -> list[Action]:
         """Where the window is, where that is news."""
         preferences, place = self.state.preferences, self.window.place
-        if self.window.is_hidden or (place is None and preferences.is_maximized):
+        self.window.set_fullscreen(self.state.is_fullscreen)
+        if self.window.is_fullscreen or self.window.is_hidden or (place is None and preferences.is_maximized):
             return []
         return [] if place == preferences.window and not preferences.is_maximized else [PlaceWindow(place)]
 

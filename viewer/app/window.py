@@ -14,6 +14,7 @@ import glfw
 
 # isort: on
 from iibr_core.types import InputError
+from viewer.app.gamepad import Gamepad
 from viewer.model.layout import ScreenSize
 
 WINDOW_SIZE = (1280, 800)
@@ -45,6 +46,7 @@ class Window:
         if place is not None and not is_maximized and _is_on_a_screen(place):
             glfw.set_window_pos(self.handle, place[0], place[1])
         self.damages = 0
+        self._place_before = (0, 0, *WINDOW_SIZE)
         self._dropped: list[str] = []
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
@@ -64,6 +66,26 @@ class Window:
             return None
         x, y = glfw.get_window_pos(self.handle)
         return (x, y, *self.size)
+
+    @property
+    def is_fullscreen(self) -> bool:
+        """Whether it fills the screen without frame and title."""
+        return bool(glfw.get_window_monitor(self.handle))
+
+    def set_fullscreen(self, is_full: bool) -> None:
+        """Fill the screen that most of the window lies on, or go back to where it was before."""
+        if is_full == self.is_fullscreen:
+            return
+        if not is_full:
+            no_monitor: Any = None
+            glfw.set_window_monitor(self.handle, no_monitor, *self._place_before, 0)
+            return
+        x, y = glfw.get_window_pos(self.handle)
+        self._place_before = (x, y, *self.size)
+        monitor = max(glfw.get_monitors(), key=lambda monitor: _overlap(self._place_before, monitor), default=None)
+        if monitor is not None:
+            mode = glfw.get_video_mode(monitor)
+            glfw.set_window_monitor(self.handle, monitor, 0, 0, *mode.size, mode.refresh_rate)
 
     @property
     def is_hidden(self) -> bool:
@@ -122,6 +144,22 @@ class Window:
         dropped, self._dropped = self._dropped, []
         return dropped
 
+    def gamepad(self) -> Gamepad | None:
+        """What is held on the first gamepad; None without one."""
+        for joystick in range(glfw.JOYSTICK_LAST + 1):
+            if glfw.joystick_is_gamepad(joystick) and (held := glfw.get_gamepad_state(joystick)) is not None:
+                axes, buttons = held.axes, held.buttons
+                return Gamepad(
+                    (axes[glfw.GAMEPAD_AXIS_LEFT_X], axes[glfw.GAMEPAD_AXIS_LEFT_Y]),
+                    (axes[glfw.GAMEPAD_AXIS_RIGHT_X], axes[glfw.GAMEPAD_AXIS_RIGHT_Y]),
+                    (axes[glfw.GAMEPAD_AXIS_LEFT_TRIGGER] + 1) / 2,
+                    (axes[glfw.GAMEPAD_AXIS_RIGHT_TRIGGER] + 1) / 2,
+                    bool(buttons[glfw.GAMEPAD_BUTTON_A]),
+                    bool(buttons[glfw.GAMEPAD_BUTTON_LEFT_BUMPER]),
+                    bool(buttons[glfw.GAMEPAD_BUTTON_RIGHT_BUMPER]),
+                )
+        return None
+
     def show_frame(self) -> None:
         """Put what was drawn on the screen."""
         glfw.swap_buffers(self.handle)
@@ -143,6 +181,14 @@ class Window:
 def _words_of(warning: Warning | str) -> str:
     """GLFW's warnings read "(65550) b'X11: ...'"; people want what is between the quotes."""
     return str(warning).partition(" b'")[2].rstrip("'") or str(warning)
+
+
+def _overlap(place: tuple[int, int, int, int], monitor: Any) -> int:
+    """Area of a place that lies on a monitor."""
+    (left, top), mode = glfw.get_monitor_pos(monitor), glfw.get_video_mode(monitor)
+    across = min(place[0] + place[2], left + mode.size.width) - max(place[0], left)
+    down = min(place[1] + place[3], top + mode.size.height) - max(place[1], top)
+    return max(across, 0) * max(down, 0)
 
 
 def _is_on_a_screen(place: tuple[int, int, int, int]) -> bool:

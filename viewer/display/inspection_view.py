@@ -29,6 +29,7 @@ from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model.actions import Action, Notify
 from viewer.model.colormap import VIRIDIS
 from viewer.model.inspection_request import (
+    DIFFERENCE_GAIN,
     NO_INSPECTION_TEXTURES,
     InspectionRequest,
     InspectionTextures,
@@ -65,13 +66,14 @@ class InspectionView:
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
         self._entropy: EntropyReady | None = None
         self._pair: PairReady | None = None
+        self._kept: tuple[object, NDArray[np.uint8]] | None = None
         self._probed: tuple[object, Probe | None] = (None, None)
 
     def open(self) -> None:
         """Another scene is on the screen."""
         self._inpainted.clear()
         self._drawn.clear()
-        self._entropy = self._pair = None
+        self._entropy = self._pair = self._kept = None
 
     def add(self, view: ViewUpdate) -> None:
         """Keep what of a view was inpainted, eight pixels a byte."""
@@ -94,6 +96,7 @@ class InspectionView:
         names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
         names["overlay"] = self._overlay(state, scene, field, layout.picture_px.size, base)
         names |= self._comparison_images(state, scene, field, base)
+        names |= self._kept_images(state, layout.picture_px.size, base)
         return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
 
     def probe(self, state: AppState) -> Probe | None:
@@ -231,6 +234,8 @@ class InspectionView:
         self, state: AppState, scene: Scene, field: LightFieldTexture, base: _ViewImage
     ) -> dict[str, int | None]:
         kind, pair = state.inspection.comparison, self._pair
+        if kind in ("kept", "difference"):
+            return {}
         if kind == "photo":
             draw = partial(self._passes.draw_view, field, *scene.grid.centre, "photo", base.exposure)
             return {"left": self._once("left", (base.generation, base.exposure), draw), "right": None}
@@ -239,6 +244,29 @@ class InspectionView:
         left = self._once("left", (pair.request, "left"), lambda: self._passes.show("left", pair.left))
         right = self._once("right", (pair.request, "right"), lambda: self._passes.show("right", pair.right))
         return {"left": left, "right": right}
+
+    def _kept_images(self, state: AppState, size_px: ScreenSize, base: _ViewImage) -> dict[str, int | None]:
+        """The picture as it was kept, or how far the present one is from it once that is finished."""
+        kind, optics = state.inspection.comparison, state.inspection.kept
+        if optics is None or kind not in ("kept", "difference"):
+            return {}
+        record = base.generation, base.views, base.previews, optics, size_px
+        if self._kept is None or self._kept[0] != record:
+            self._kept = record, self._scene_view.picture(optics, size_px)
+        kept = self._kept[1]
+        if kind == "kept":
+            return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}
+        renderer, drawn = self._scene_view.renderer, self._scene_view.picture_drawn
+        if not renderer.is_converged:
+            before = self._drawn.get("difference")
+            return {"difference": before[1] if before else None}
+        return {"difference": self._once("difference", (record, drawn), lambda: self._show_difference(kept))}
+
+    def _show_difference(self, kept: NDArray[np.uint8]) -> int:
+        """Black where nothing differs; amplified, for what differs little is what one looks for."""
+        now = self._scene_view.renderer.read_image().astype(np.int16)
+        difference = np.minimum(np.abs(now - kept) * DIFFERENCE_GAIN, 255).astype(np.uint8)
+        return self._passes.show("difference", difference)
 
     def _probe_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
         seen = None
@@ -267,7 +295,7 @@ class InspectionView:
 
 
 def _comparison_of(request: InspectionRequest) -> Comparison:
-    assert request.kind != "entropy"
+    assert request.kind != "entropy"  # the kept state is compared without a request
     return request.kind
 
 

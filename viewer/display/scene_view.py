@@ -161,7 +161,7 @@ class SceneView:
         """Draw the picture this state asks for, unless it is there already; return its record, None without views."""
         if self.views_uploaded == 0:
             return None
-        wanted = Picture(self.generation, self.views_uploaded, state.optics, size_px, previews=self.previews)
+        wanted = Picture(self.generation, self.views_uploaded, state.shown_optics, size_px, previews=self.previews)
         budget_s = self._gl.frame_budget_s
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)

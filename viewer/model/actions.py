@@ -262,6 +262,27 @@ class PlaceWindow:
 
 
 @dataclass(frozen=True)
+class SetFullscreen:
+    """Fill the screen with the window, without frame and title; or no longer."""
+
+    is_full: bool
+
+
+@dataclass(frozen=True)
+class HidePanel:
+    """Leave its room to the picture; or show it again."""
+
+    is_hidden: bool
+
+
+@dataclass(frozen=True)
+class ShowBefore:
+    """Show the photo as it was taken, to compare; or the picture again, as any edit of the lens does."""
+
+    is_shown: bool
+
+
+@dataclass(frozen=True)
 class Quit:
     """Close the window; is_sure: also where that loses depth edits, else it is asked."""
 
@@ -288,6 +309,9 @@ Action = (
     | DepthAction
     | FolderAction
     | ShowTiltHandles
+    | SetFullscreen
+    | HidePanel
+    | ShowBefore
     | SetDepthStrength
     | TakeSettings
     | EndGesture

@@ -13,15 +13,18 @@ from viewer.model.actions import (
     Action,
     AskToSave,
     DoTask,
+    HidePanel,
     OpenPath,
     PauseMotion,
     Quit,
     Redo,
     ReturnHome,
     SetFontScale,
+    SetFullscreen,
     SetLoop,
     SetTheme,
     SetUnits,
+    ShowBefore,
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
@@ -49,6 +52,7 @@ from viewer.model.state.inspection import (
     OVERLAYS,
     Compare,
     Comparison,
+    KeepState,
     OverlayKind,
     SetOverlay,
     ShowEpis,
@@ -65,12 +69,16 @@ KEY_WORDS = {
     "space": "Space",
     "page_down": "Page down",
     "page_up": "Page up",
+    "tab": "Tab",
+    "backslash": "\\",
 }
 """Of ImGui's names for keys, those that people write otherwise."""
 COMPARE_WORDS: dict[Comparison, str] = {
     "photo": "Compare photo and picture",
     "quality": "Compare fast and exact",
     "truth": "Compare with ground truth",
+    "kept": "Compare with the kept state",
+    "difference": "Difference to the kept state",
 }
 BRUSH_WORDS: dict[BrushTool, str] = {"nearer": "Nearer", "farther": "Farther", "smooth": "Smooth"}
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
@@ -176,6 +184,10 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
     Command("Stop making views", _always(StopWork())),
+    Command("Full screen", lambda s: SetFullscreen(not s.is_fullscreen), (Chord("f11"),)),
+    Command("Hide or show the panel", lambda s: HidePanel(not s.hides_panel), (Chord("tab"),)),
+    Command("Before and after", lambda s: ShowBefore(not s.shows_before), (Chord("backslash"),)),
+    Command("Keep this state to compare", _always(KeepState()), (Chord("k"),)),
     Command("Light or dark", lambda s: SetTheme("dark" if s.preferences.theme == "light" else "light")),
     Command(
         "Units: a photographer's or a light field's",

@@ -11,6 +11,8 @@ from viewer.model.state.app_state import AppState, Scene
 from viewer.model.state.inspection import Comparison, GroundTruth, ViewIndex
 
 SHEET_GAP = 3.0
+DIFFERENCE_GAIN = 4
+"""Differences are shown so many times as large."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class InspectionTextures:
     overlay: int | None = None
     left: int | None = None
     right: int | None = None
+    difference: int | None = None
     shown: tuple[object, ...] = ()
 
 
@@ -98,7 +101,7 @@ def make_inspection_request(
     kind = inspection.comparison
     if inspection.overlay == "entropy":
         return InspectionRequest(state.generation, "entropy", view_near(state.optics.eye, scene.grid))
-    if kind is None or kind == "photo":
+    if kind is None or kind == "photo" or kind == "kept" or kind == "difference":
         return None
     view = view_to_compare(scene, state.optics.eye, kind, inspection.truth)
     wanted = InspectionRequest(

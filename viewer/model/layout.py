@@ -109,12 +109,13 @@ def layout_of(
     pixel_ratio: float = 1.0,
     ui_scale: float = 1.0,
     beside: Beside = NOTHING_BESIDE,
+    has_panel: bool = True,
 ) -> Layout:
     """Panel at the right, picture as large as it fits beside it and what is beside it. Sizes are (width, height)."""
     width, window_height = window_size
     filmstrip_height = FILMSTRIP_HEIGHT * ui_scale if beside.has_filmstrip else 0.0
     height = max(window_height - filmstrip_height, 0)
-    panel_width = min(PANEL_WIDTH * ui_scale, width)
+    panel_width = min(PANEL_WIDTH * ui_scale, width) if has_panel else 0.0
     margin, gap = MARGIN * ui_scale, STRIP_GAP * ui_scale
     down, across = (_thickness(views, ui_scale) for views in beside.epi_views or (0, 0))
     status_height = STATUS_HEIGHT * ui_scale if beside.has_status else 0.0

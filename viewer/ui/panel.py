@@ -56,6 +56,8 @@ _FIXED = (
 def panel(state: AppState, layout: Layout) -> list[Action]:
     """Build the panel; what the user changed comes back as actions."""
     rect, palette = layout.panel, palette_of(state.preferences.theme)
+    if not rect.width:
+        return []
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
     imgui.begin("panel", None, _FIXED)

@@ -14,6 +14,7 @@ from viewer.model.state.inspection import (
     Comparison,
     GroundTruth,
     InspectionAction,
+    KeepState,
     MoveDivider,
     OverlayKind,
     PairCompared,
@@ -30,6 +31,9 @@ DIVIDER_MARGIN = 0.02
 """The divider stays so far (share of the picture's width) from its borders, where it could not be taken again."""
 
 NOT_MADE_HERE = "Only of views made here: these were read from disk."
+NOTHING_KEPT = "Nothing to compare with yet: keep a state first (K)."
+KEPT = "Kept. Change the lens, then compare: side by side, or as a difference."
+KEPT_COMMANDS = ("Compare with the kept state", "Difference to the kept state")
 NO_DISPARITY = "These views come without disparity."
 
 
@@ -48,6 +52,8 @@ def reduce_inspection(state: AppState, action: InspectionAction) -> AppState:
             return _with(state, opacity=clamp(opacity, 0.0, 1.0))
         case Compare(comparison):
             return _set_comparison(state, comparison)
+        case KeepState() if state.scene is not None:
+            return add_notice(_with(state, kept=state.optics), Notice(KEPT, commands=KEPT_COMMANDS))
         case MoveDivider(place) if math.isfinite(place):
             return _with(state, divider=clamp(place, DIVIDER_MARGIN, 1 - DIVIDER_MARGIN), divider_taken=True)
         case TruthRead(truth):
@@ -83,6 +89,11 @@ def obstacle_to_comparison(scene: Scene, kind: Comparison) -> str:
     return NOT_MADE_HERE if kind == "quality" and scene.plan is None else ""
 
 
+def lacks_kept_state(state: AppState, kind: Comparison) -> bool:
+    """Whether a state must be kept before this can be compared."""
+    return kind in ("kept", "difference") and state.inspection.kept is None
+
+
 def misfit(truth: GroundTruth, scene: Scene) -> str:
     """Why this ground truth cannot be held against the scene, a sentence; empty where it can.
 
@@ -113,7 +124,7 @@ def _set_comparison(state: AppState, kind: Comparison | None) -> AppState:
         return _with(state, comparison=None, pair=None, divider_taken=False)
     if kind == "truth" and state.inspection.truth is None:
         return replace(state, tasks=(*state.tasks, ChooseTask("truth")))
-    obstacle = obstacle_to_comparison(state.scene, kind)
+    obstacle = NOTHING_KEPT if lacks_kept_state(state, kind) else obstacle_to_comparison(state.scene, kind)
     return add_notice(state, Notice(obstacle)) if obstacle else _with(state, comparison=kind, overlay=None, pair=None)
 
 

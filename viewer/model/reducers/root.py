@@ -15,6 +15,7 @@ from viewer.model.actions import (
     DoTask,
     EditsSaved,
     EndGesture,
+    HidePanel,
     MotionAction,
     Notify,
     OpenPath,
@@ -28,11 +29,13 @@ from viewer.model.actions import (
     ReturnHome,
     SetDepthStrength,
     SetFontScale,
+    SetFullscreen,
     SetHover,
     SetLoop,
     SetSpeed,
     SetTheme,
     SetUnits,
+    ShowBefore,
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
@@ -88,6 +91,7 @@ LOST = "The worker stopped unexpectedly. Whatever you open or change next starts
 def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
     if isinstance(action, LensAction):
+        state = replace(state, shows_before=False) if state.shows_before else state
         moves = isinstance(action, MoveEye | SetDolly | ResetOptics)
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
         edited = reduce_lens(still, action)
@@ -174,6 +178,12 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, notices=tuple(other for other in state.notices if other != notice))
         case DismissNotices():
             return replace(state, notices=())
+        case SetFullscreen(is_full):
+            return replace(state, is_fullscreen=is_full)
+        case HidePanel(is_hidden):
+            return replace(state, hides_panel=is_hidden)
+        case ShowBefore(is_shown):
+            return replace(state, shows_before=is_shown and state.scene is not None)
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state

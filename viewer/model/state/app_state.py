@@ -388,7 +388,8 @@ class AppState:
     scene what is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs:
     whether the system has file dialogs. left_field: None where the open scene was left unfinished, or not at all.
     shown_generation: whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a
-    number. folder: the photos beside the one that is open, None before they are known.
+    number. folder: the photos beside the one that is open, None before they are known. is_fullscreen,
+    hides_panel: of the window; shows_before: the photo as it was taken stands in place of the picture.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -425,6 +426,14 @@ class AppState:
     shown_generation: int = 0
     given_up: int = 0
     folder: PhotoFolder | None = None
+    is_fullscreen: bool = False
+    hides_panel: bool = False
+    shows_before: bool = False
+
+    @property
+    def shown_optics(self) -> Optics:
+        """What the picture on the screen is drawn with."""
+        return Optics() if self.shows_before else self.optics
 
     @property
     def next_generation(self) -> int:

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from iibr_core.types import GridShape
+from viewer.model.state.optics import Optics
 
 OverlayKind = Literal["disparity", "entropy", "inpainted"]
 OVERLAYS: tuple[OverlayKind, ...] = ("disparity", "entropy", "inpainted")
-Comparison = Literal["photo", "quality", "truth"]
-COMPARISONS: tuple[Comparison, ...] = ("photo", "quality", "truth")
+Comparison = Literal["photo", "quality", "truth", "kept", "difference"]
+COMPARISONS: tuple[Comparison, ...] = ("photo", "quality", "truth", "kept", "difference")
 ViewIndex = tuple[int, int]
 """(row, column) in a grid of views."""
 
@@ -68,7 +69,7 @@ class Inspection:
 
     opacity: of the overlay, 0..1. divider: where the picture is divided, 0..1 from its left; divider_taken: while it is
     dragged. pair: what is compared now (see `Pair`). place: pixel (x, y) pointed at last. probe: of the pixel under
-    the pointer.
+    the pointer. kept: a state of the lens to compare with.
     """
 
     shows_epis: bool = False
@@ -83,6 +84,7 @@ class Inspection:
     pair: Pair | None = None
     place: tuple[float, float] | None = None
     probe: Probe | None = None
+    kept: Optics | None = None
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,11 @@ class Compare:
 
 
 @dataclass(frozen=True)
+class KeepState:
+    """Remember the lens as it is, to compare with what it will be."""
+
+
+@dataclass(frozen=True)
 class MoveDivider:
     """Drag the divider to this place, 0..1 from the picture's left."""
 
@@ -164,6 +171,7 @@ InspectionAction = (
     | SetOverlay
     | SetOpacity
     | Compare
+    | KeepState
     | MoveDivider
     | TruthRead
     | PairCompared
@@ -174,7 +182,6 @@ InspectionAction = (
 
 def of_next_scene(inspection: Inspection) -> Inspection:
     """What stays when another scene is opened: what is looked at, not what was found."""
-    comparison = None if inspection.comparison == "truth" else inspection.comparison
-    return replace(
-        inspection, comparison=comparison, divider_taken=False, truth=None, pair=None, place=None, probe=None
-    )
+    comparison = inspection.comparison if inspection.comparison in ("photo", "quality") else None
+    stays = replace(inspection, comparison=comparison, divider_taken=False)
+    return replace(stays, truth=None, pair=None, place=None, probe=None, kept=None)

@@ -6,7 +6,14 @@ from imgui_bundle import imgui
 
 from iibr_core.types import ViewOffset
 from viewer.model.colormap import VIRIDIS, map_color
-from viewer.model.inspection_request import InspectionTextures, grid_to_compare, sheet_cells, view_label, view_near
+from viewer.model.inspection_request import (
+    DIFFERENCE_GAIN,
+    InspectionTextures,
+    grid_to_compare,
+    sheet_cells,
+    view_label,
+    view_near,
+)
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.photographic_units import relative_distance
 from viewer.model.state.app_state import AppState, Hover, Scene
@@ -18,6 +25,7 @@ SIDES: dict[Comparison, tuple[str, str]] = {
     "photo": ("photo", "result"),
     "quality": ("fast", "exact"),
     "truth": ("result", "truth"),
+    "kept": ("kept", "now"),
 }
 ORIGIN_WORDS: dict[Origin, str] = {
     "photo": "photo",
@@ -36,6 +44,12 @@ def draw_over_picture(state: AppState, layout: Layout, textures: InspectionTextu
     if textures.overlay is not None:
         _image(textures.overlay, picture)
         _draw_legend(state, scene, layout, picture)
+    if state.shows_before:
+        _words("before", picture.x + 8 * layout.ui_scale, picture.y + 8 * layout.ui_scale, layout.ui_scale)
+    if textures.difference is not None:
+        _image(textures.difference, picture)
+        words = f"difference to the kept state, × {DIFFERENCE_GAIN}"
+        _words(words, picture.x + 8 * layout.ui_scale, picture.y + 8 * layout.ui_scale, layout.ui_scale)
     if textures.left is not None:
         _draw_comparison(state, scene, layout, picture, textures)
     if textures.sheet is not None:
@@ -147,7 +161,7 @@ def _draw_comparison(
     _words(names[0], x - 10 * scale, top, scale, align=1.0)
     _words(names[1], x + 10 * scale, top, scale)
     pair = state.inspection.pair
-    if pair is not None and kind != "photo":
+    if pair is not None and kind not in ("photo", "kept"):
         words = view_label(pair.view, grid_to_compare(scene, kind, state.inspection.truth))
         _words(words, picture.x + 8 * scale, bottom - imgui.get_text_line_height() - 13 * scale, scale)
     draw.pop_clip_rect()

@@ -45,6 +45,7 @@ MOUSE = (
     ("Drop", "Open a photo, a folder, a disparity map"),
     ("Ctrl+click a slider", "Type a value"),
     ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
+    ("Gamepad", "Sticks: viewpoint, focus; triggers: aperture; shoulders: the folder"),
     ("Esc", "Close what is open, put the brush away"),
 )
 PICTURE_ENDINGS = "The name's ending decides: .png, .jpg, .tif, .webp, .avif, or .exr in linear light."

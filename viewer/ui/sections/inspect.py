@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from viewer.model.actions import Action, DoTask, SetUnits
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
-from viewer.model.reducers.inspection import obstacle_to_comparison, obstacle_to_overlay
+from viewer.model.reducers.inspection import NOTHING_KEPT, lacks_kept_state, obstacle_to_comparison, obstacle_to_overlay
 from viewer.model.state.app_state import AppState, ChooseTask, Scene
 from viewer.model.state.inspection import (
     COMPARISONS,
@@ -32,12 +32,20 @@ OVERLAY_TIPS: dict[OverlayKind, str] = {
     "entropy": "How undecided the weights of the rays are: 1 where no ray of the photo shows anything.",
     "inpainted": "What the photo never saw and had to be made up.",
 }
-COMPARISON_WORDS: dict[Comparison, str] = {"photo": "Photo", "quality": "Exact", "truth": "Truth"}
+COMPARISON_WORDS: dict[Comparison, str] = {
+    "photo": "Photo",
+    "quality": "Exact",
+    "truth": "Truth",
+    "kept": "Kept state",
+    "difference": "Difference",
+}
 COMPARISON_TIPS: dict[Comparison, str] = {
     "photo": "The photo beside the picture.",
     "quality": "The view nearest to the viewpoint, made fast and made exactly.",
     "truth": "The view nearest to the viewpoint beside the same one of a light field on disk. Drop its folder on the "
     "panel, or press again to choose another one.",
+    "kept": "The picture as it was when its state was kept (K), beside the present one.",
+    "difference": "How far the present picture is from the one whose state was kept (K).",
 }
 
 
@@ -103,9 +111,17 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     inspection = state.inspection
     chosen = inspection.comparison
     row = [
-        (COMPARISON_WORDS[k], chosen == k, COMPARISON_TIPS[k], obstacle_to_comparison(scene, k)) for k in COMPARISONS
+        (
+            COMPARISON_WORDS[k],
+            chosen == k,
+            COMPARISON_TIPS[k],
+            NOTHING_KEPT if lacks_kept_state(state, k) else obstacle_to_comparison(scene, k),
+        )
+        for k in COMPARISONS
     ]
-    pressed = _choices(row, layout)
+    pressed = _choices(row[:3], layout)
+    kept = _choices(row[3:], layout)
+    pressed = pressed if kept is None else 3 + kept
     actions: list[Action] = []
     if pressed is not None:
         actions.append(Compare(None if chosen == COMPARISONS[pressed] else COMPARISONS[pressed]))
