@@ -53,13 +53,18 @@ DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
 
 @dataclass(frozen=True)
 class Pointer:
-    """The mouse as seen in one frame, in window units; steps are how far it moved since the frame before."""
+    """The mouse as seen in one frame, in window units; steps are how far it moved since the frame before.
+
+    drag_distance: the farthest from where it was pressed, the frame of its release included. becomes_drag: whether it
+    has been no drag before this frame.
+    """
 
     x: float = 0.0
     y: float = 0.0
     step_x: float = 0.0
     step_y: float = 0.0
     drag_distance: float = 0.0
+    becomes_drag: bool = False
     pressed_x: float = 0.0
     pressed_y: float = 0.0
     is_down: bool = False
@@ -68,6 +73,9 @@ class Pointer:
     clicks: int = 0
     wheel: float = 0.0
     is_over_panel: bool = False
+
+
+NO_POINTER = Pointer()
 
 
 @dataclass(frozen=True)
@@ -97,7 +105,7 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
         return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
     if not picture.contains(pointer.pressed_x, pointer.pressed_y):
         return []
-    if pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD:
+    if (pointer.is_down or pointer.is_released) and pointer.drag_distance > DRAG_THRESHOLD:
         return _drag(pointer, layout, state, scene, picture, pick)
     if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
         if _grabs_divider(pointer, layout, state, picture):
@@ -240,11 +248,17 @@ def _grabbed_handle(pointer: Pointer, layout: Layout, state: AppState, picture: 
 
 
 def _eye_drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -> list[Action]:
-    """Content follows the hand: a point of disparity d goes d px left for a step right, so the eye goes against it."""
-    if not (pointer.step_x or pointer.step_y):
+    """Content follows the hand: a point of disparity d goes d px left for a step right, so the eye goes against it.
+
+    What it moved before it counted as a drag is made up for, and what it moved in the frame of its release counts.
+    """
+    step_x, step_y = pointer.step_x, pointer.step_y
+    if pointer.becomes_drag:
+        step_x, step_y = pointer.x - pointer.pressed_x, pointer.y - pointer.pressed_y
+    if not (step_x or step_y):
         return []
     per_view = units_per_view(layout, scene)
-    return [MoveEye(ViewOffset(eye.t - pointer.step_y / per_view, eye.s - pointer.step_x / per_view))]
+    return [MoveEye(ViewOffset(eye.t - step_y / per_view, eye.s - step_x / per_view))]
 
 
 def units_per_view(layout: Layout, scene: Scene) -> float:
@@ -258,18 +272,22 @@ def units_per_view(layout: Layout, scene: Scene) -> float:
     return max(nearest, DRAG_ACROSS_GRID * layout.picture.width / max(scene.grid.columns - 1, 1))
 
 
-def read_pointer() -> Pointer:
-    """The mouse of this ImGui frame."""
+def read_pointer(before: Pointer = NO_POINTER) -> Pointer:
+    """The mouse of this ImGui frame; before: of the one before."""
     from imgui_bundle import imgui
 
     io = imgui.get_io()
     moved = imgui.get_mouse_drag_delta(imgui.MouseButton_.left, 0.0)
+    # ImGui leaves out the frame of the release, in which a quick drag may have gone all its way.
+    drag_distance = max(float(io.mouse_drag_max_distance_sqr[0]) ** 0.5, math.hypot(moved.x, moved.y))
+    was_drag = before.is_down and not io.mouse_clicked[0] and before.drag_distance > DRAG_THRESHOLD
     return Pointer(
         x=io.mouse_pos.x,
         y=io.mouse_pos.y,
         step_x=io.mouse_delta.x,
         step_y=io.mouse_delta.y,
-        drag_distance=float(io.mouse_drag_max_distance_sqr[0]) ** 0.5,
+        drag_distance=drag_distance,
+        becomes_drag=drag_distance > DRAG_THRESHOLD and not was_drag,
         pressed_x=io.mouse_pos.x - moved.x,
         pressed_y=io.mouse_pos.y - moved.y,
         is_down=bool(io.mouse_down[0]),

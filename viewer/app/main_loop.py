@@ -12,6 +12,7 @@ from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.gamepad import Gamepad, actions_from_gamepad
 from viewer.app.input import (
+    NO_POINTER,
     Pointer,
     actions_from_drop,
     actions_from_hover,
@@ -151,6 +152,7 @@ class App:
         self._shown: Frame | None = None
         self._same_frames = 0
         self._is_busy = True
+        self._pointer = NO_POINTER
 
     def run(self) -> None:
         """Show frames until the user quits."""
@@ -171,7 +173,7 @@ class App:
             self.do(PictureDrawn(self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
         self._ui.begin(layout, look, sum(self._took_s))
-        pointer = read_pointer()
+        self._pointer = pointer = read_pointer(self._pointer)
         actions = gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         actions += build_screen(self.state, layout, self.scene_view.texture if picture else None, textures, thumbnails)

@@ -35,6 +35,14 @@ NO_MORE_VIEWS_S = 2.0
 """After so long without a new view none is thought to be on its way."""
 
 WAITING_VIEWS = 4
+PREPARED_AFTER_S = 0.05
+USUAL_NEXT = (
+    Optics(ViewOffset(0.2, 0.3), aperture_diameter=1.5),
+    Optics(ViewOffset(0.2, 0.3), aperture_diameter=3.0),
+    Optics(ViewOffset(0.2, 0.3)),
+)
+"""What is drawn next, the last of them first: what that takes is compiled while nothing else is to be done."""
+
 PREVIEW_GRID = GridShape(1, 1)
 
 
@@ -61,6 +69,8 @@ class SceneView:
         self._disparities: dict[ViewOffset, FloatImage] = {}
         self._drawn: Picture | None = None
         self._drawn_at = 0.0
+        self._passes_shown = 0
+        self._unprepared = list(USUAL_NEXT)
         self._view_came_at = 0.0
 
     def open(self, ready: SceneReady) -> None:
@@ -164,14 +174,20 @@ class SceneView:
         wanted = Picture(self.generation, self.views_uploaded, state.shown_optics, size_px, previews=self.previews)
         budget_s = self._gl.frame_budget_s
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
+            # A picture that only new views change is seen on: it must not become softer.
             is_still = self._differs_by_views_only(wanted)
-            self.renderer.render_in_time(wanted.optics, wanted.size_px, STILL_BUDGET_S if is_still else budget_s)
+            passes, budget_s = (self._passes_shown, STILL_BUDGET_S) if is_still else (0, budget_s)
+            self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, passes)
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
             self._drawn = replace(wanted, samples=self.report.samples)
+            self._passes_shown = self.renderer.passes_drawn
         elif self._is_same(wanted) and not self.renderer.is_converged and self._refines():
             self.renderer.refine(budget_s)
             self._drawn = replace(wanted, samples=self._drawn.samples + 1)
+            self._passes_shown = self.renderer.passes_drawn
+        if self._unprepared and self._is_same(wanted) and self._drawn_at < time.perf_counter() - PREPARED_AFTER_S:
+            self.renderer.prepare(self._unprepared.pop())
         return self._drawn
 
     def converge(self, state: AppState, size_px: ScreenSize) -> Picture | None:

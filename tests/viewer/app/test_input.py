@@ -76,6 +76,18 @@ def test_a_drag_adds_to_the_eye() -> None:
     assert move.eye.t < 1.0
 
 
+def test_what_moved_before_it_was_a_drag_and_in_the_frame_of_the_release_counts() -> None:
+    moved = replace(OVER_PICTURE, x=OVER_PICTURE.x + 12, drag_distance=12, step_x=7)
+    (late,) = asked(replace(moved, is_down=True, becomes_drag=True))
+    (whole,) = asked(replace(moved, is_down=True, step_x=12))
+    assert late == whole
+    (released,) = asked(replace(moved, is_released=True, becomes_drag=True))
+    assert released == whole, "all of it in one frame is no click"
+    (last,) = asked(replace(moved, is_released=True))
+    (step,) = asked(replace(moved, is_down=True))
+    assert last == step
+
+
 def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
     seen = []
 

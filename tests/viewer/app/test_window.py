@@ -14,6 +14,7 @@ from imgui_bundle import imgui
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
+from viewer.app.input import units_per_view
 from viewer.app.main_loop import App
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
@@ -61,6 +62,23 @@ def test_a_drag_moves_the_viewpoint_and_the_picture(viewer: Driver) -> None:
     assert viewer.app.state.optics.focus_disparity == 0, "a drag is no click"
     near_before, near_after = near_centre(before), near_centre(viewer.image())
     assert near_after > near_before, "near things follow the hand"
+
+
+@pytest.mark.parametrize("moves", [1, 2, 5])
+def test_a_quick_drag_loses_no_motion(viewer: Driver, moves: int) -> None:
+    """All of it may come in one frame, the release included."""
+    app, (x, y) = viewer.app, viewer.position(0.5, 0.5)
+    scene = app.state.scene
+    assert scene is not None
+    words: list[object] = ["mousemove", x, y, "mousedown", 1]
+    for k in range(1, moves + 1):
+        words += ["mousemove", x - round(60 * k / moves), y + round(10 * k / moves)]
+    viewer.send(*words, "mouseup", 1)
+    viewer.until(lambda app: app.state.optics.eye != ViewOffset(0, 0))
+    viewer.until_idle()
+    per_view = units_per_view(app.layout(), scene)
+    assert app.state.optics.eye == pytest.approx(ViewOffset(-10 / per_view, 60 / per_view))
+    assert app.state.optics.focus_disparity == 0
 
 
 def near_centre(image: np.ndarray) -> float:

@@ -58,6 +58,25 @@ def test_the_pace_is_learnt_for_each_sort_of_work() -> None:
     assert frame_time.seconds(pinhole) == guess
 
 
+def test_cheap_frames_on_a_stored_view_tell_nothing_of_those_beside_it() -> None:
+    """Else the first frame of a drag is drawn as if it took next to no time."""
+    frame_time = FrameTimeModel(5e-9)
+    at_rest = DrawCost(0, 1, False, False, PIXELS)
+    before = frame_time.seconds(replace(at_rest, searches=True))
+    for _ in range(12):
+        frame_time.learn(at_rest, 0.004)
+    assert frame_time.seconds(at_rest) < before / 3
+    assert frame_time.seconds(replace(at_rest, searches=True)) == before
+
+
+def test_what_was_not_drawn_yet_is_not_thought_quicker_than_what_was() -> None:
+    frame_time = FrameTimeModel(5e-9)
+    frame_time.learn(OF_LENS, 3.0)
+    per_fetch = (3.0 - OVERHEAD_S) / OF_LENS.fetches
+    pinhole = DrawCost(0, 4, False, False, PIXELS)
+    assert frame_time.seconds(pinhole) == pytest.approx(OVERHEAD_S + per_fetch * pinhole.fetches)
+
+
 def test_a_picture_near_the_limit_does_not_change_back_and_forth() -> None:
     frame_time = FrameTimeModel(5e-9)
     budget_s = frame_time.seconds(work_in(QUALITY_LEVELS[3])) * 1.02

@@ -67,13 +67,14 @@ def pass_count(lens: Lens, field: LightFieldTexture) -> int:
     if lens.aperture_share > 0 and lens.keeps_layers:
         affordable = STILL_SAMPLES // len(lens.samples(field.grid, field.present))
         count = min(math.ceil((lens.widest_blur_px / PASS_BLUR_PX) ** 2), MAX_PASSES, affordable)
-    is_warped = field.has_disparity.any() and (lens.has_dolly or not _is_stored(lens.eye, field))
+    is_warped = field.has_disparity.any() and (lens.has_dolly or not is_stored(lens.eye, field))
     if lens.aperture_share < 1 and is_warped:
         count = max(count, EDGE_PASSES)
     return max(count, 1)
 
 
-def _is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
+def is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
+    """Whether a view that is there lies at this viewpoint."""
     row, column = float(eye.t + field.grid.centre[0]), float(eye.s + field.grid.centre[1])
     is_on_grid = 0 <= row < field.grid.rows and 0 <= column < field.grid.columns
     return is_on_grid and row.is_integer() and column.is_integer() and bool(field.present[int(row), int(column)])

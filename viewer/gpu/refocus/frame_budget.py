@@ -45,6 +45,8 @@ QUALITY_LEVELS = (
 PICTURE_FETCHES, LAYERS_FETCHES = 4.0, 8.0
 PINHOLE_FETCHES, SOURCE_FETCHES = 4.0, 5.0
 REPROJECTION_FETCHES = 3.0
+UNMEASURED = 4.0
+"""What was not drawn yet may take so many times as long as guessed: the first frame of a drag must not stall."""
 OVERHEAD_S = 0.003
 """What a picture takes however small it is."""
 
@@ -76,6 +78,7 @@ class DrawCost:
     """What drawing a picture takes. samples: of the aperture, 0 without. sources: of the pinhole view, 0 without.
 
     has_reprojection: whether views stand in for others. keeps_layers: see `Lens`. pixels: of the picture as drawn.
+    searches: whether the pinhole view looks for surfaces, as it does wherever no stored view lies.
     """
 
     samples: int
@@ -83,6 +86,7 @@ class DrawCost:
     has_reprojection: bool
     keeps_layers: bool
     pixels: int
+    searches: bool = False
 
     @property
     def fetches(self) -> float:
@@ -93,9 +97,9 @@ class DrawCost:
         return self.pixels * (of_picture + of_samples + of_pinhole * (self.sources > 0))
 
     @property
-    def kind(self) -> tuple[bool, bool, bool, bool]:
+    def kind(self) -> tuple[bool, ...]:
         """What sorts of work there are: the estimate of each is off in its own way."""
-        return self.samples > 0, self.sources > 0, self.has_reprojection, self.keeps_layers
+        return self.samples > 0, self.sources > 0, self.has_reprojection, self.keeps_layers, self.searches
 
 
 class FrameTimeModel:
@@ -103,11 +107,16 @@ class FrameTimeModel:
 
     def __init__(self, seconds_per_fetch: float) -> None:
         self._guess = seconds_per_fetch
-        self._measured: dict[tuple[bool, bool, bool, bool], float] = {}
+        self._measured: dict[tuple[bool, ...], float] = {}
 
     def seconds(self, work: DrawCost) -> float:
         """How long it will take, about."""
-        return OVERHEAD_S + self._measured.get(work.kind, self._guess) * work.fetches
+        return OVERHEAD_S + self._measured.get(work.kind, self._unmeasured) * work.fetches
+
+    @property
+    def _unmeasured(self) -> float:
+        """Seconds per fetch of work of a sort that was not drawn yet: no less than of any that was."""
+        return max(UNMEASURED * self._guess, *self._measured.values(), 0.0)
 
     def learn(self, work: DrawCost, seconds: float) -> None:
         """Take note of how long it took."""

@@ -18,7 +18,7 @@ from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError,
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, pass_count, r2_sequence
+from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import (
     BEST_QUALITY,
@@ -37,6 +37,7 @@ from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import DrawReport
 from viewer.model.state.optics import Optics
 
+PREPARED_SIZE = ScreenSize(16, 16)
 KEPT_SIZES = 2
 """Of the picture: one drawn in a hurry is smaller than the one that follows it."""
 
@@ -125,21 +126,27 @@ class Renderer:
         self._finish(framebuffer)
         self._errors.begin(level)
 
-    def render_in_time(self, optics: Optics, size_px: ScreenSize, budget_s: float) -> None:
+    def render_in_time(self, optics: Optics, size_px: ScreenSize, budget_s: float, passes: int = 0) -> None:
         """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
 
-        Its own image may then be smaller than size_px.
+        Its own image may then be smaller than size_px. passes: draw so many of the best picture, whatever time they
+        take; 0: what there is time for.
         """
         start = time.perf_counter()
         programs_before = len(self.programs)
-        self._level = choose_quality_level(
-            partial(self._work, optics, size_px), self._frame_time, budget_s, self._level
+        self._level = (
+            0
+            if passes
+            else choose_quality_level(partial(self._work, optics, size_px), self._frame_time, budget_s, self._level)
         )
         level = QUALITY_LEVELS[self._level]
         self.render(optics, scale_size(size_px, level.scale), level=level)
+        if passes > 1:
+            self._draw(math.inf, min(passes, len(self._current().places)))
+            self._finish(None)
         self.ctx.finish()
         seconds = time.perf_counter() - start
-        if len(self.programs) == programs_before:
+        if len(self.programs) == programs_before and passes <= 1:
             self._frame_time.learn(self._work(optics, size_px, level), seconds)
         drawn = self._current().done
         if level != BEST_QUALITY:
@@ -212,6 +219,17 @@ class Renderer:
     def is_converged(self) -> bool:
         """Whether more samples would not make the picture better."""
         return self._accumulation is None or self._accumulation.is_complete
+
+    @property
+    def passes_drawn(self) -> int:
+        """How many passes of the best picture what is shown is made of; 0: it is softer than that."""
+        is_best = self._accumulation is not None and self._shown is self._targets.get(self._accumulation.size_px)
+        return self._current().pass_index if is_best else 0
+
+    def prepare(self, optics: Optics) -> None:
+        """Have what draws such a picture compiled, so that the first frame of it does not wait; none is shown."""
+        if not self.is_drawing_picture:
+            self.converged_picture(optics, PREPARED_SIZE, is_linear=False)
 
     @property
     def samples_drawn(self) -> int:
@@ -315,6 +333,7 @@ class Renderer:
             has_reprojection=lens.has_dolly or lens.focus_range > 0 or not field.present.all(),
             keeps_layers=lens.keeps_layers,
             pixels=math.prod(scale_size(size_px, level.scale)),
+            searches=lens.has_dolly or not is_stored(lens.eye, field),
         )
 
     def _learn(self, samples: int, seconds: float) -> None:
