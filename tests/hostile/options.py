@@ -137,8 +137,8 @@ _contradictions = [
 ]
 
 _IGNORED_BY_FOLDERS = (
-    ("--disparity", "map.pfm"), ("--disparity-scale", "2"), ("--depth", "rough"), ("--depth-model", "depth-pro"),
-    ("--refine", "off"), ("--depth-strength", "2"), ("--focus-disparity", "1"), ("--grid", "3"),
+    ("--disparity-scale", "2"), ("--depth", "rough"), ("--depth-model", "depth-pro"), ("--refine", "off"),
+    ("--depth-strength", "2"), ("--focus-disparity", "1"), ("--grid", "3"),
     ("--max-pixels", "100"), ("--quality", "fast"), ("--inpaint", "background"),
 )  # fmt: skip
 """A light field brings views of its own: what says how views are made says nothing about them."""
@@ -152,6 +152,11 @@ _ignored = [
 _others = [
     Case(f"{' '.join(words)[:60]}", words, says=says)
     for words, says in (
+        (("screenshot", "field", "-o", "new.png", "--disparity", "missing.pfm"), "missing.pfm"),
+        (("depth", "photo.png", "-o", "new.pfm"), "photo.png"),
+        (("depth", "missing", "-o", "new.pfm"), "missing"),
+        (("depth", "field", "-o", "new.jpg"), "new.jpg"),
+        (("depth", "field", "-o", "field/new.pfm"), "new.pfm"),
         (("fly",), "fly"),
         (("plan",), "photo"),
         (("plan", "photo.png", "photo.png"), "photo.png"),

@@ -121,7 +121,9 @@ def depth_choice(
 
 def require_heeded(context: typer.Context, path: Path) -> None:
     """Raise InputError for options given that a light field at `path` would not heed."""
-    given = given_options(context) & NOT_FOR_LIGHT_FIELDS
+    given = given_options(context)
+    # A scale says nothing without the map that it is of.
+    given &= NOT_FOR_LIGHT_FIELDS if "disparity" in given else NOT_FOR_LIGHT_FIELDS | {"disparity_scale"}
     if not given or not is_folder(path):
         return
     options = [parameter.opts[0] for parameter in context.command.params if parameter.name in given]
