@@ -25,6 +25,7 @@ from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_di
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.disparity_holes import say_filled
+from iibr_core.inpainting.protocol import EstimateDepth
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import (
     Disparity,
@@ -112,6 +113,24 @@ def read_shown_photo(path: Path, max_pixels: int, kind: DepthKind) -> Photo:
     if embedded is None or embedded.all_in_focus is None:
         return photo
     return _all_in_focus_photo(photo, embedded.all_in_focus, read_orientation(path), max_pixels)
+
+
+def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | None:
+    """What gave a photo's depth, for pictures of its size; None where that was no model."""
+    if found.origin.kind != "model":
+        return None
+
+    def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
+        from iibr_core.depth.models.catalog import model_to_use
+        from iibr_core.depth.models.transformers_models import estimate_with
+
+        model = model_to_use(choice)
+        if model is None:
+            raise InputError(f"{found.origin.words}: the model is not there any more")
+        depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
+        return disparity_from(resize_estimate(depth, found.photo.size), USUAL_GRID)
+
+    return estimate
 
 
 @dataclass(frozen=True, eq=False)

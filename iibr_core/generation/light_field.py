@@ -16,8 +16,8 @@ from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.stored_views import Draft, StoredViews, encode_for_storage
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.protocol import Inpainter
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
+from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter, require_inpainter
 from iibr_core.rendering.ambiguous_rays import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import RenderedView, ShownBefore, ViewSynthesis, rays_of_photo
@@ -44,6 +44,7 @@ def generate(
     quality: Quality | None = None,
     inpaint: str = DEFAULT_INPAINTER,
     draft_bytes: int | None = None,
+    aids: InpaintingAids | None = None,
 ) -> Generator[ViewUpdate, None, None]:
     """Yield every view of `plan.grid` once: the photo's own first, then the outer ones, then those nearest to
     `nearest_to()`.
@@ -51,7 +52,7 @@ def generate(
     disparity is the field's (`plan.field_disparity(given)`). should_stop is asked every few milliseconds; once it
     is true the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
     weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for
-    every ray. inpaint: a name among `INPAINTERS`.
+    every ray. inpaint: as `load_inpainter` takes it. aids: what it may ask.
 
     draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
     views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
@@ -65,7 +66,10 @@ def generate(
         raise ValueError(f"disparity is {image_size(disparity.values)}, the photo {photo.size}")
     with suppress(Cancelled):
         quality = quality or plan.quality
-        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, quality, inpaint, draft_bytes)
+        require_inpainter(inpaint)
+        # A model is not loaded for nothing.
+        load = partial(load_inpainter, inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, aids)
+        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, quality, load, draft_bytes)
 
 
 def _generate_views(
@@ -75,7 +79,7 @@ def _generate_views(
     should_stop: ShouldStop,
     nearest_to: Callable[[], ViewOffset],
     quality: Quality,
-    inpaint: str,
+    load: Callable[[], Inpainter],
     draft_bytes: int | None,
 ) -> Iterator[ViewUpdate]:
     grid = plan.grid
@@ -83,7 +87,7 @@ def _generate_views(
     yield ViewUpdate(*grid.centre, colors, disparity.values, np.zeros(photo.size, np.bool_))
     if grid == (1, 1):
         return
-    transformer, inpainter = transformer_for(quality), load_inpainter(inpaint)
+    transformer, inpainter = transformer_for(quality), load()
     rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter)
     with ViewSynthesis(should_stop, transformer, quality == "exact", inpainter=inpainter) as synthesis:
         views = StoredViews(synthesis, rays, grid, photo.is_hdr, should_stop)

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.tiling import ShouldStop, never
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.types import FloatImage, ReportProgress, ViewOffset, ignore_progress
+
+EstimateDepth = Callable[[FloatImage, ShouldStop], FloatImage]
+"""Of colours (H, W, 3), sRGB-encoded: inverse depth (H, W), any scale and offset, larger is nearer. Raises InputError
+where it cannot, Cancelled once should_stop is true.
+"""
+
+
+@dataclass(frozen=True)
+class InpaintingAids:
+    """What inpainters may ask. estimate_depth: what gave the photo's depth, None where that was no model."""
+
+    estimate_depth: EstimateDepth | None = None
+    report_progress: ReportProgress = ignore_progress
 
 
 class Inpainter(Protocol):

@@ -55,7 +55,7 @@ _screenshot = [
         ("--size", ("", "12", "0x5", "axb", "99999x1", f"{HUGE}x1")),
         ("--backend", ("", "vulkan")),
         ("--quality", ("", "best", "Exact")),
-        ("--inpaint", ("", "magic")),
+        ("--inpaint", ("", "magic", "diffusion", "diffusion:", "patch:folder")),
         ("--depth-strength", ("", "nan", "1e300")),
         ("--focus-disparity", ("", "inf")),
     )
@@ -102,6 +102,27 @@ _clamped = [
         f"screenshot {option} {value}", ("screenshot", "photo.png", "-o", "new.png", option, value), 0, "", ("new.png",)
     )
     for option, value in (("--focus", "1e300"), ("--focus", "-1e300"), ("--aperture", "1e300"))
+]
+
+_inpainters = [
+    Case(f"{command} --inpaint {typed}", (command, "photo.png", *COMMANDS[command], "--inpaint", typed), says=says)
+    for command, typed, says in (
+        ("screenshot", "diffusion:missing/model", "missing/model"),
+        ("generate", "diffusion:photo.png", "photo.png"),
+    )
+] + [
+    Case(
+        "generate --inpaint with an empty folder",
+        ("generate", "photo.png", "--disparity", "map.pfm", *COMMANDS["generate"], "--inpaint", "diffusion:folder"),
+        says="folder",
+    ),
+    Case(
+        "screenshot --inpaint patch",
+        ("screenshot", "photo.png", "-o", "new.png", "--inpaint", "patch"),
+        0,
+        "",
+        ("new.png",),
+    ),
 ]
 
 _models = [
@@ -190,4 +211,14 @@ _others = [
     )
 ]
 
-OPTION_CASES = (*_values, *_screenshot, *_export, *_clamped, *_models, *_contradictions, *_ignored, *_others)
+OPTION_CASES = (
+    *_values,
+    *_screenshot,
+    *_export,
+    *_clamped,
+    *_inpainters,
+    *_models,
+    *_contradictions,
+    *_ignored,
+    *_others,
+)

@@ -30,7 +30,7 @@ from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
 from iibr_core.generation import cost_model, outer_views, plan, relief
 from iibr_core.generation import light_field as generating
-from iibr_core.inpainting import beyond_frame, disparity_by_color, disparity_holes
+from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes
 from iibr_core.rendering import (
     candidates,
     coherent_cells,
@@ -85,6 +85,13 @@ def mixed_between_surfaces():
     """Two surfaces, and a column between them that is of neither."""
     column = np.repeat(np.float32([0.0, 0.9, 2.0]), [6, 1, SIZE[1] - 7])
     return np.tile(column, (SIZE[0], 1))
+
+
+def aligned(value):
+    """Disparity fitted to a wild estimate in a gap that takes half of the picture."""
+    disparity, gap = depths(1.0), np.tile(np.arange(SIZE[1]) >= 5, (SIZE[0], 1))
+    diffusion.align_in_gaps(depths(value), disparity, gap, gap)
+    return disparity
 
 
 @cache
@@ -244,6 +251,7 @@ FINITE = {
         disparity_by_color.fill_disparity_by_color(scene()[0].pixels, known(v)),
         disparity_by_color.fill_disparity_by_color(image(v), known(np.nan)),
     ],
+    "inpainting.diffusion.align_in_gaps": lambda v, _: aligned(v),
     "inpainting.disparity_holes.fill_disparity_holes": lambda v, _: disparity_holes.fill_disparity_holes(known(v)),
     "inpainting.disparity_holes.say_filled": lambda v, _: disparity_holes.say_filled("map", v) and None,
     "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
@@ -371,6 +379,7 @@ FINITE_BY_CONTRACT = {
     "geometry.offset_of_line": "lines along the plane give infinity or NaN, as it says",
     "geometry.pixel_of_line": "lines along the plane give infinity or NaN, as it says",
     "inpainting.background.fill_background": "of rendered views only",
+    "inpainting.diffusion.DiffusionInpainter": "of rendered views only; what a model paints is made finite",
     "inpainting.patch.fill_patches": "of rendered views only",
     "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
     "depth.multi_view.matching.sweep": "of `matching_views`, whose lumas `luma_of` made finite",
@@ -459,7 +468,8 @@ READS_OR_TELLS = {
     "inpainting.background": "background_inpainter",
     "inpainting.patch": "patch_inpainter",
     "inpainting.protocol": "Inpainter",
-    "inpainting.registry": "load_inpainter",
+    "inpainting.diffusion": "diffusion_inpainter large_gaps",
+    "inpainting.registry": "load_inpainter require_inpainter",
     "runtime.allocator": "limit_arenas give_back_memory",
     "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes",
     "runtime.kernel_cache": "KernelCache sources_hash",
@@ -470,7 +480,7 @@ READS_OR_TELLS = {
     "require_own_size mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
-    "depth.search": "read_shown_photo",
+    "depth.search": "estimator_of read_shown_photo",
     "rendering.large_views": "Part tiles_of whole",
     "rendering.view_synthesis": "ViewSynthesis",
     "types": "ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",

@@ -27,9 +27,10 @@ from iibr_core.generation.memory_model import (
 )
 from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.generation.relief import measure_relief
+from iibr_core.inpainting.protocol import InpaintingAids
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
-from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress
 from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.depth_editing import DepthSettings
 
@@ -115,6 +116,16 @@ def load_photo(
     settings_wanted = depth_settings or DepthSettings(source.depth.refine)
     own_size = _turned_like(stored_size, found.photo.size)
     return _prepare(found, settings, _models_here(), settings_wanted, (own_size, stamp), should_stop)
+
+
+def inpainting_aids(
+    source: Source, loaded: LoadedPhoto, report_progress: ReportProgress = ignore_progress
+) -> InpaintingAids:
+    """What inpainting this photo may ask: what gave its depth, where that was a model."""
+    from iibr_core.depth.search import PhotoWithDepth, estimator_of
+
+    found = PhotoWithDepth(loaded.photo, loaded.found, loaded.origin)
+    return InpaintingAids(estimator_of(found, source.depth), report_progress)
 
 
 def apply_depth_settings(

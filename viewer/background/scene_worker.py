@@ -19,7 +19,14 @@ from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.types import Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.light_field_job import median_of_middle, showings_of_folder
-from viewer.background.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, make_plan, prepare_brush
+from viewer.background.loaded_photo import (
+    LoadedPhoto,
+    apply_depth_settings,
+    inpainting_aids,
+    load_photo,
+    make_plan,
+    prepare_brush,
+)
 from viewer.background.photo_folder import first_photo
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Progress, Scene, Source
@@ -179,9 +186,14 @@ def _results_of_photo(
     from iibr_core.generation.light_field import generate
 
     draft_bytes = plan.draft_bytes if request.takes_drafts else None
+
+    def report_painting(done: float, total: float, doing: str) -> None:
+        report_progress(Progress(doing=f"{doing}, {done / total:.0%}"))
+
     views = generate(
-        loaded.photo, disparity, plan, should_stop, nearest_to, source.quality, source.inpaint, draft_bytes
-    )
+        loaded.photo, disparity, plan, should_stop, nearest_to, source.quality, source.inpaint, draft_bytes,
+        inpainting_aids(source, loaded, report_painting),
+    )  # fmt: skip
     yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
     if not should_stop():
         prepare_brush()

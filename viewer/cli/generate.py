@@ -72,18 +72,20 @@ def generate(
 
     from iibr_core.color import photo_in_srgb
     from iibr_core.generation.light_field import generate as generated
-    from viewer.background.loaded_photo import load_photo, make_plan
+    from viewer.background.loaded_photo import inpainting_aids, load_photo, make_plan
 
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
     photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
     plan = make_plan(source, loaded, depth_strength, keeps_views=False)
     total = grid.rows * grid.columns
-    views = generated(photo_read, plan.field_disparity(loaded.disparity), plan, inpaint=inpaint)
+    disparity_read = plan.field_disparity(loaded.disparity)
     with (
         new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         show_progress("making views") as show,
-        closing(views),
+        closing(
+            generated(photo_read, disparity_read, plan, inpaint=inpaint, aids=inpainting_aids(source, loaded, show))
+        ) as views,
     ):
         seconds = 0.0
         for done in range(1, total + 1):

@@ -12,7 +12,7 @@ import typer
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.files import is_folder, status_of
 from iibr_core.formats.light_fields.registry import WRITERS
-from iibr_core.inpainting.registry import INPAINTERS
+from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
 from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
 from viewer.model.layout import ScreenSize
 
@@ -73,8 +73,10 @@ def quality_from_text(text: str) -> Quality:
 
 def inpainter_from_text(text: str) -> str:
     """A way of inpainting, by name. Raises BadParameter."""
-    if text not in INPAINTERS:
-        raise typer.BadParameter(f"{text!r} is no way of inpainting: give {' or '.join(INPAINTERS)}")
+    try:
+        require_inpainter(text)
+    except InputError as error:
+        raise typer.BadParameter(f"{text!r}: {str(error).removeprefix(f'--inpaint {text}: ')}") from None
     return text
 
 
@@ -296,6 +298,8 @@ QualityChoice = Annotated[
 Inpaint = Annotated[
     str,
     typer.Option(
-        parser=inpainter_from_text, metavar="|".join(INPAINTERS), help="What fills the places that the photo never saw."
+        parser=inpainter_from_text,
+        metavar="|".join(INPAINTER_FORMS),
+        help="What fills the places that the photo never saw.",
     ),
 ]

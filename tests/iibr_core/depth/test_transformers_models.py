@@ -21,6 +21,8 @@ from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import KNOWN_MODELS, LocalModel, cached_folder, fetch, known_model, model_to_use
 from iibr_core.depth.models.config import Preparation, read_preparation
 from iibr_core.depth.models.transformers_models import estimate_with, input_size
+from iibr_core.depth.search import estimator_of, open_with_depth
+from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError, Photo
 
@@ -194,6 +196,18 @@ def test_as_the_library_prepares_and_reads_it(tmp_path: Path) -> None:
     found = values_of(estimate_with(model, dataclasses.replace(PHOTO, pixels=smooth)))
     assert found.shape == expected.shape
     np.testing.assert_allclose(found, expected, atol=0.02 * np.ptp(expected))
+
+
+def test_what_was_painted_is_seen_by_the_network_that_saw_the_photo(tmp_path: Path) -> None:
+    choice = DepthChoice(model=str(depth_anything(tmp_path / "model").folder), start="model", refine=0.0)
+    write_image(tmp_path / "photo.png", (PHOTO.pixels * 255).round().astype(np.uint8))
+    found = open_with_depth(tmp_path / "photo.png", choice)
+    estimate = estimator_of(found, choice)
+    assert estimate is not None
+    np.testing.assert_array_equal(estimate(found.photo.pixels, lambda: False), found.disparity.values)
+    assert (estimate(1 - found.photo.pixels, lambda: False) != found.disparity.values).any()
+    rough = DepthChoice(start="rough")
+    assert estimator_of(open_with_depth(tmp_path / "photo.png", rough), rough) is None
 
 
 def test_zoedepth_loses_its_borders_again(tmp_path: Path) -> None:

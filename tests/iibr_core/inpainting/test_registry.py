@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_inpainter
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, MODEL_INPAINTERS, load_inpainter
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import InputError, ViewOffset
@@ -32,6 +32,13 @@ def test_the_default_is_one_of_them():
 def test_an_unknown_name_is_one_line_that_names_those_there_are():
     with pytest.raises(InputError, match=f"--inpaint magic: .*{DEFAULT_INPAINTER}"):
         load_inpainter("magic")
+
+
+@pytest.mark.parametrize("name", MODEL_INPAINTERS)
+def test_a_name_that_needs_a_folder_asks_for_it_and_others_want_none(name):
+    for typed in (name, f"{name}:", f"{DEFAULT_INPAINTER}:folder"):
+        with pytest.raises(InputError, match=f"--inpaint {typed}: .*{name}:FOLDER"):
+            load_inpainter(typed)
 
 
 def test_names_are_known_before_anything_heavy_loads():

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
 from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
-from viewer.background.loaded_photo import LoadedPhoto
+from viewer.background.loaded_photo import LoadedPhoto, inpainting_aids
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Scene
@@ -83,6 +83,7 @@ class ExportSource:
 
             source, plan = self.scene.source, self.plan(zero)
             disparity = plan.field_disparity(self.loaded.disparity)
+            aids = inpainting_aids(source, self.loaded, self.report_progress)
             made = generate(
                 photo_in_srgb(self.loaded.photo),
                 disparity,
@@ -90,6 +91,7 @@ class ExportSource:
                 self.should_stop,
                 quality=source.quality,
                 inpaint=source.inpaint,
+                aids=aids,
             )
         yield from self.watched(made, total, "making views")
         raise_if_stopped(self.should_stop)
