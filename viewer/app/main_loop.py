@@ -24,6 +24,7 @@ from viewer.app.input import (
     read_pointer,
 )
 from viewer.app.preferences_store import PREFERENCES_FILE, load_preferences, store_preferences
+from viewer.app.session_store import SessionStore
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
@@ -138,6 +139,7 @@ class App:
         self._ahead = PhotosAhead(wake)
         self._worker = SceneWorker(wake)
         self._side_effects = SideEffects(self.scene_view, wake)
+        self._sessions = SessionStore(kept_in, wake)
         self._kept_in = kept_in
         self._kept_recent = self.state.recent
         self._submitted = 0
@@ -221,6 +223,7 @@ class App:
         self._ahead.close()
         self._comparisons.close()
         self._keep()
+        self._sessions.close(self.state)
         self._side_effects.close()
         self._ui.release()
         self._filmstrip.release()
@@ -241,7 +244,7 @@ class App:
     def _take_events(self) -> list[Action]:
         """What neither user nor worker says: the clock, side effects done, the window moved, the worker lost."""
         self._stepped_at = time.perf_counter()
-        actions = self._side_effects.run(self.state)
+        actions = self._side_effects.run(self.state) + self._sessions.run(self.state)
         while (result := self._comparisons.next_result()) is not None:
             actions += self.inspection_view.take(result)
         actions += self._expire_notices(self._stepped_at)

@@ -15,9 +15,10 @@ from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import FloatImage, InputError
 from viewer.app.dialogs import Dialog, SaveDialog, has_dialogs
 from viewer.app.exporter import Exporter
-from viewer.app.image_export import export_map
+from viewer.app.image_export import export_map, settings_of
 from viewer.app.picture_saver import PictureSaver, refusal
 from viewer.app.save_places import inputs_of_scene, map_path
+from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.background.photo_folder import list_photos
@@ -39,7 +40,7 @@ from viewer.model.state.exporting import CancelExportTask, ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
 from viewer.model.state.optics import ApertureMask, SetApertureShape
-from viewer.model.state.saving import CancelSaveTask
+from viewer.model.state.saving import CancelSaveTask, WriteSidecarTask
 
 
 class SideEffects:
@@ -109,6 +110,9 @@ class SideEffects:
                 return self._exporter.add(task, state, self._inputs(state))
             case CancelExportTask():
                 self._exporter.cancel()
+            case WriteSidecarTask() if state.scene is not None and is_scene_open(state):
+                settings = settings_of(state, state.scene.size)
+                self._submit(partial(write_sidecar, Path(state.scene.source.path), settings))
             case CancelSaveTask():
                 self._saver.cancel()
         return []
@@ -176,6 +180,8 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return [listed]
         case GroundTruth() as truth:
             return [TruthRead(truth)]
+        case Path() as sidecar:
+            return [Notify(Notice(f"Saved {sidecar}"))]
         case SavedMap(sentence, edits):
             return [Notify(Notice(sentence)), EditsSaved(edits)]
     raise AssertionError(f"nothing comes of {result.value!r}")

@@ -91,6 +91,13 @@ class TakeSettings:
 
 
 @dataclass(frozen=True)
+class RestoreSession:
+    """Go on with an opened photo as it was left."""
+
+    settings: SavedSettings
+
+
+@dataclass(frozen=True)
 class EndGesture:
     """The pointer went down or up: the next edit is another one, for undo."""
 
@@ -314,6 +321,7 @@ Action = (
     | ShowBefore
     | SetDepthStrength
     | TakeSettings
+    | RestoreSession
     | EndGesture
     | Undo
     | Redo

@@ -25,6 +25,7 @@ from viewer.model.actions import (
     PreferencesAction,
     Quit,
     Redo,
+    RestoreSession,
     ResumeWork,
     ReturnHome,
     SetDepthStrength,
@@ -78,13 +79,14 @@ from viewer.model.state.app_state import (
     SavePrompt,
     TiltHandles,
 )
-from viewer.model.state.depth_editing import DepthAction
+from viewer.model.state.depth_editing import DepthAction, DepthSettings
 from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
 from viewer.model.state.saving import SavingChanged
 
+AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
 
 
@@ -113,6 +115,8 @@ def reduce(state: AppState, action: Action) -> AppState:
             return record_edit(state, _set_depth_strength(state, action), "SetDepthStrength")
         case TakeSettings(settings):
             return record_edit(state, _take_settings(state, settings), "TakeSettings")
+        case RestoreSession(settings):
+            return record_edit(state, _restore(state, settings), "RestoreSession")
         case EndGesture():
             return release_divider(end_gesture(end_stroke(state)))
         case Undo():
@@ -252,6 +256,22 @@ def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
     optics = clamp_optics(settings.optics, state.scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
     return replace(state, optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
+
+
+def _restore(state: AppState, settings: SavedSettings) -> AppState:
+    """As the photo was left: the lens, and what was made of its depth; the edits are kept, so nothing is unsaved."""
+    restored = _take_settings(state, settings)
+    if state.scene is None or restored is state:
+        return state
+    has_aperture = settings.optics.aperture_diameter > 0
+    restored = replace(restored, has_chosen_focus=True, has_chosen_aperture=has_aperture)
+    if state.scene.plan is None:
+        return restored
+    depth = DepthSettings(settings.source.depth.refine, settings.depth_edits)
+    if (depth, settings.depth_strength) != (state.depth, state.depth_strength):
+        restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
+        restored = replace(restored, generation=state.next_generation, saved_edits=settings.depth_edits)
+    return add_notice(restored, Notice(AS_LEFT))
 
 
 def _reduce_preferences(preferences: Preferences, action: PreferencesAction) -> Preferences:

@@ -21,7 +21,7 @@ from viewer.model.state.exporting import CancelExportTask, Exporting, ExportProm
 from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.optics import CENTRE, Optics
-from viewer.model.state.saving import CancelSaveTask, Saving
+from viewer.model.state.saving import CancelSaveTask, Saving, WriteSidecarTask
 
 AS_FOUND = DepthSettings()
 AS_USUAL = DepthChoice()
@@ -322,6 +322,7 @@ Task = (
     | ChoosePlaceTask
     | SaveTask
     | CancelSaveTask
+    | WriteSidecarTask
     | ExportTask
     | CancelExportTask
     | ReadMaskTask

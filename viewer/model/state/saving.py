@@ -25,5 +25,10 @@ class SavingChanged:
 
 
 @dataclass(frozen=True)
+class WriteSidecarTask:
+    """Keep what the photo is left with beside it too, for other machines."""
+
+
+@dataclass(frozen=True)
 class CancelSaveTask:
     """Give up the picture that is being drawn for a file; the next one follows."""

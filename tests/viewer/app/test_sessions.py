@@ -1,0 +1,133 @@
+"""Photos open as they were left, in a real window: moved, renamed, and after the program was killed too."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from iibr_core.depth.editing.edits import UNEDITED, Stroke
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import Driver
+from viewer.app.session_store import sidecar_of
+from viewer.model.actions import DoTask, Undo
+from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
+from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+from viewer.model.state.saving import WriteSidecarTask
+
+Opener = Callable[..., Driver]
+ONE = GridShape(1, 1)
+AS_LEFT = "As you left it"
+
+
+@pytest.fixture(autouse=True)
+def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
+
+
+def change(driver: Driver) -> None:
+    """All that is kept."""
+    app = driver.app
+    driver.until_idle()
+    app.do(MoveEye(ViewOffset(0.3, -0.2)), SetAperture(1.5), SetFocus(0.25))
+    app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
+    app.do(SetBrush(replace(app.state.brush, is_on=True)), Paint((0.5, 0.5)))
+    app.do(*_end())
+    driver.until_idle()
+
+
+def _end() -> list[object]:
+    from viewer.model.actions import EndGesture
+
+    return [EndGesture()]
+
+
+def left_with(driver: Driver) -> tuple[object, ...]:
+    state = driver.app.state
+    return state.optics, state.depth, state.depth_strength
+
+
+def told(driver: Driver) -> bool:
+    return any(AS_LEFT in notice.text for notice in driver.app.state.notices)
+
+
+def kept_files(kept: Path) -> list[Path]:
+    return list((kept / "sessions").glob("*.json"))
+
+
+def test_a_photo_opens_as_it_was_left(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    first = open_window(photo_path, kept_in=kept, grid=ONE)
+    change(first)
+    left = left_with(first)
+    first.app.close()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    for path in photo_path.parent.glob(f"{photo_path.stem}*"):
+        shutil.move(path, elsewhere / path.name.replace(photo_path.stem, "renamed"))
+    second = open_window(elsewhere / f"renamed{photo_path.suffix}", kept_in=kept, grid=ONE)
+    second.until(lambda app: told(second))
+    second.until_idle()
+    assert left_with(second) == left
+    assert isinstance(second.app.state.depth.edits.strokes[0], Stroke)
+    assert not second.app.state.has_unsaved_edits
+    assert second.app.scene_view.loaded.depth_settings == second.app.state.depth
+    second.app.do(Undo())
+    second.until_idle()
+    assert second.app.state.depth.edits == UNEDITED
+
+
+def test_after_a_crash_too(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    """What was written while the window was used must do."""
+    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    change(first)
+    first.until(lambda app: bool(kept_files(tmp_path / "kept")) and app.wait_s == 1.0)
+    shutil.copytree(tmp_path / "kept" / "sessions", tmp_path / "of the dead" / "sessions")
+    left = left_with(first)
+    first.app.close()
+    second = open_window(photo_path, kept_in=tmp_path / "of the dead", grid=ONE)
+    second.until(lambda app: told(second))
+    assert left_with(second) == left
+
+
+def test_what_was_only_looked_at_leaves_nothing(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    driver.until_idle()
+    driver.app.close()
+    assert not kept_files(tmp_path / "kept")
+    again = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    again.until_idle()
+    assert not told(again)
+
+
+def test_beside_the_photo_if_asked(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    change(first)
+    first.app.do(DoTask(WriteSidecarTask()))
+    first.until(lambda app: sidecar_of(photo_path).is_file())
+    left = left_with(first)
+    first.app.close()
+    second = open_window(photo_path, kept_in=tmp_path / "another machine", grid=ONE)
+    second.until(lambda app: told(second))
+    assert left_with(second) == left
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"format": 99}', '{"format": 1}', "\x00\xff", "[" * 100_000])
+def test_damaged_ones_are_told(open_window: Opener, photo_path: Path, tmp_path: Path, text: str) -> None:
+    sidecar_of(photo_path).write_text(text, "utf-8")
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    driver.until(lambda app: any("damaged" in notice.text for notice in app.state.notices))
+    driver.until_idle()
+    change(driver)
+    driver.until(lambda app: bool(kept_files(tmp_path / "kept")))
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    driver.until_idle()
+    (tmp_path / "kept" / "sessions").write_text("a file is in the way")
+    change(driver)
+    driver.until(lambda app: any("not kept" in notice.text for notice in app.state.notices))

@@ -1,0 +1,186 @@
+"""What a photo was left with (lens, viewpoint, depth edits), kept for the next time it is opened: in the user's folder,
+by what is in the photo's file, so that it may be moved and renamed. Written while the window is used: it may crash.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from pathlib import Path
+
+from iibr_core.formats.files import is_folder
+from iibr_core.formats.outputs import atomic_write
+from iibr_core.types import InputError
+from viewer.app.image_export import settings_of
+from viewer.background.file_worker import FileRequest, FileWorker
+from viewer.background.jobs import Failed
+from viewer.model.actions import Action, Notify, RestoreSession
+from viewer.model.state.app_state import AppState, Notice, SavedSettings, Scene, Source
+
+FOLDER = "sessions"
+SIDECAR_ENDING = ".iibr"
+QUIET_S = 2.0
+"""So long nothing must have changed before it is written."""
+HASHED_AT_ONCE = 1 << 20
+MOST_KEPT = 1000
+MOST_BYTES = 2_000_000
+"""Of one: as much as settings may have."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionFound:
+    """What was kept for a scene, None where nothing was. problem: why it cannot be used, "" where it can."""
+
+    scene: Scene
+    settings: SavedSettings | None
+    problem: str = ""
+
+
+class SessionStore:
+    """Call it from the window's thread; files are read and written in one of its own."""
+
+    def __init__(self, folder: Path | None, wake: Callable[[], None]) -> None:
+        """folder: of the user's settings; None: nothing is kept. wake: called, in the thread, when there is news."""
+        self._folder = None if folder is None else folder / FOLDER
+        self._files = FileWorker("iibr-sessions", wake)
+        self._ids = count(1)
+        self._scene: Scene | None = None
+        self._is_known = False
+        self._kept: SavedSettings | None = None
+        self._latest: SavedSettings | None = None
+        self._changed_at = 0.0
+        self._has_failed = False
+
+    def run(self, state: AppState) -> list[Action]:
+        """Look for what was kept where another scene is open, and keep what was changed a while ago."""
+        if self._folder is None:
+            return []
+        actions = self._take_results(state)
+        scene = state.scene
+        if actions or scene is None or scene.source is not state.source:
+            return actions
+        if self._scene is None or self._scene.source is not scene.source:
+            self._leave()
+            self._scene, self._is_known = scene, False
+            self._submit(partial(_find, self._folder, scene))
+        elif self._is_known and state.stroke is None:
+            self._follow(settings_of(state, scene.size))
+        return actions
+
+    def close(self, state: AppState) -> None:
+        """Keep what is there now, and wait until it is written."""
+        if self._is_known and self._scene is not None and state.source is self._scene.source:
+            self._latest = settings_of(state, self._scene.size)
+        self._leave()
+        self._files.close(cancels=False)
+
+    def _follow(self, settings: SavedSettings) -> None:
+        now = time.monotonic()
+        if self._kept is None:
+            self._kept = self._latest = settings  # as it was opened: nothing to keep yet
+        if settings != self._latest:
+            self._latest, self._changed_at = settings, now
+        elif settings != self._kept and now - self._changed_at > QUIET_S:
+            self._leave()
+
+    def _leave(self) -> None:
+        """Have what was changed written."""
+        if self._scene is None or self._folder is None or self._latest == self._kept or self._latest is None:
+            return
+        self._submit(partial(_keep, self._folder, self._scene.source, self._latest))
+        self._kept = self._latest
+
+    def _submit(self, work: Callable[[], object]) -> None:
+        self._files.submit(FileRequest(next(self._ids), work))
+
+    def _take_results(self, state: AppState) -> list[Action]:
+        actions: list[Action] = []
+        while (result := self._files.next_result()) is not None:
+            if isinstance(result, Failed):
+                actions += [] if self._has_failed else [Notify(Notice(result.message))]
+                self._has_failed = True  # once is enough
+            elif isinstance(result.value, SessionFound) and result.value.scene is self._scene:
+                actions += self._take_up(result.value, state)
+        return actions
+
+    def _take_up(self, found: SessionFound, state: AppState) -> list[Action]:
+        self._is_known, self._kept, self._latest = True, None, None
+        if found.problem:
+            return [Notify(Notice(found.problem))]
+        is_open = state.scene is not None and state.scene.source is found.scene.source
+        return [RestoreSession(found.settings)] if is_open and found.settings is not None else []
+
+
+def sidecar_of(path: Path) -> Path:
+    """Where the same lies beside a photo, where that was asked for."""
+    return path.with_name(path.name + SIDECAR_ENDING)
+
+
+def write_sidecar(path: Path, settings: SavedSettings) -> Path:
+    """Write them beside a photo; where that is. Raises InputError."""
+    _write(sidecar_of(path), settings)
+    return sidecar_of(path)
+
+
+def _find(folder: Path, scene: Scene) -> SessionFound:
+    """What was kept in the folder, else beside the photo."""
+    from viewer.model.saved_settings import settings_from_text
+
+    for path in (folder / f"{_key_of(scene.source)}.json", sidecar_of(Path(scene.source.path))):
+        try:
+            with path.open("rb") as file:
+                text = file.read(MOST_BYTES).decode("utf-8", "replace")
+            return SessionFound(scene, settings_from_text(text, str(path)))
+        except OSError:
+            continue
+        except InputError as error:
+            return SessionFound(scene, None, str(error))
+    return SessionFound(scene, None)
+
+
+def _keep(folder: Path, source: Source, settings: SavedSettings) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made ({error.strerror or error}); what you do is not kept") from error
+    _write(folder / f"{_key_of(source)}.json", settings)
+    _forget_oldest(folder)
+
+
+def _write(path: Path, settings: SavedSettings) -> None:
+    from viewer.model.saved_settings import settings_text
+
+    with atomic_write(path) as temporary:
+        temporary.write_text(settings_text(settings), "utf-8")
+
+
+def _forget_oldest(folder: Path) -> None:
+    kept = list(folder.glob("*.json"))
+    if len(kept) > MOST_KEPT:
+        for path in sorted(kept, key=lambda path: path.stat().st_mtime)[: len(kept) - MOST_KEPT]:
+            path.unlink(missing_ok=True)
+
+
+def _key_of(source: Source) -> str:
+    """By what is in the photo's file, or the path of a folder; and by what was said about its depth, which is edited.
+
+    Raises InputError where the file is gone.
+    """
+    path = Path(source.path)
+    digest = hashlib.blake2b(digest_size=16)
+    said = source.depth
+    digest.update(repr((said.file and str(said.file), said.file_scale, said.start, said.model)).encode())
+    if is_folder(path):
+        digest.update(str(path.absolute()).encode("utf-8", "surrogateescape"))
+        return digest.hexdigest()
+    try:
+        with path.open("rb") as file:
+            while part := file.read(HASHED_AT_ONCE):
+                digest.update(part)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}; what you do with it is not kept") from error
+    return digest.hexdigest()
