@@ -201,7 +201,7 @@ class Exporter:
         while (result := self._thread.next_result()) is not None:
             export = self._exports.popleft()
             if isinstance(result, Done):
-                said = f"Exported {export.path}" if result.value else export.reason
+                said = result.value or export.reason
                 actions += [Notify(Notice(said, is_error=not result.value))] if said else []
             else:
                 actions.append(Notify(Notice(result.message, is_error=True)))
@@ -217,14 +217,14 @@ class Exporter:
         return Exporting(self._exports[0].path.name, int(100 * done) / 100, doing, len(self._exports) - 1)
 
 
-def _carry_out(write: Callable[..., None], export: _Export, source: ExportSource, options: Any) -> bool:
-    """In the thread: whether it was written; False where it was given up."""
+def _carry_out(write: Callable[..., str | None], export: _Export, source: ExportSource, options: Any) -> str:
+    """In the thread: what is to be said of it; nothing where it was given up."""
     try:
         raise_if_stopped(source.should_stop)
-        write(export.path, source, options)
+        said = write(export.path, source, options)
     except Cancelled:
-        return False
-    return True
+        return ""
+    return f"Exported {export.path}. {said}" if said else f"Exported {export.path}"
 
 
 def _views_of(scene_view: SceneView) -> tuple[int, int]:

@@ -16,6 +16,7 @@ from iibr_core.types import InputError, ViewOffset
 from viewer.app.exports.registry import export_path, require_export_place, writer_of
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.options import (
+    MOST,
     DepthFrom,
     DepthModel,
     DepthStrength,
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
     from viewer.model.state.app_state import Scene, Source
 
-ABOUT_EXPORTS = ("view", "focus", "aperture", "size", "device", "eyes", "motion", "keys", "frames", "rate")
+ABOUT_EXPORTS = ("view", "focus", "aperture", "size", "device", "eyes", "motion", "keys", "frames", "rate", "row")
 """Options that some kinds heed and others do not."""
 MOST_FRAMES, MOST_RATE = 10_000, 240.0
 
@@ -139,6 +140,9 @@ def export(
         float | None,
         typer.Option(parser=rate_from_text, metavar="X", help="Frames a second.", show_default="30"),
     ] = None,
+    row: Annotated[
+        int | None, typer.Option(min=0, max=MOST, help="Row of the picture.", show_default="the middle")
+    ] = None,
     literal: Literal = False,
     disparity: DisparityFile = None,
     disparity_scale: DisparityScale = 1.0,
@@ -179,7 +183,7 @@ def export(
     if not to.path:
         require_export_place(to, output, inputs, force)
     require_model(choice)
-    options = ExportOptions(size, device, eyes, motion, keys, frames, rate)
+    options = ExportOptions(size, device, eyes, motion, keys, frames, rate, row)
     target = output
 
     def require_place(scene: Scene) -> None:
@@ -188,10 +192,10 @@ def export(
         require_export_place(to, target, inputs, force)
 
     def write(made: ExportSource) -> None:
-        writer_of(to)(target, made, options)
+        said = writer_of(to)(target, made, options)
         print(target)
         print_depth(made.scene.depth_origin)
-        print_notes(made.scene.notes + lens.notes(made.optics))
+        print_notes(made.scene.notes + lens.notes(made.optics) + ((said,) if said else ()))
 
     lens = LensOptions(view, focus, aperture)
     if to.is_drawn:

@@ -12,8 +12,11 @@ from pathlib import Path
 from iibr_core.types import InputError
 
 LIGHT_FIELD = ("light_field:write_light_field",)
+MAP = (".pfm", ".exr", ".npy", ".png")
 PICTURE = (".png",)
 MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
+STACK_FILES = r"(focus|aperture)_\d+\.png|all_in_focus\.png|disparity\.pfm"
+CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
 STACK = ("view", "focus", "aperture", "size", "frames")
 EYES = ("focus", "aperture", "size", "eyes")
 
@@ -22,7 +25,8 @@ EYES = ("focus", "aperture", "size", "eyes")
 class ExportKind:
     """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
     names of the options about exports and the lens that mean something to it. path: makes the file's name what players
-    expect. layout: of a light field, among `WRITERS`. needs: packages, of the extra `export`.
+    expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
+    expression. needs: packages, of the extra `export`.
     """
 
     words: str
@@ -31,6 +35,7 @@ class ExportKind:
     heeds: tuple[str, ...] = ()
     path: str = ""
     layout: str = ""
+    own_files: str = ""
     needs: tuple[str, ...] = ()
 
     @property
@@ -56,10 +61,18 @@ EXPORTS = {
     "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING),
     "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING),
     "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING),
-    "focal-stack": ExportKind("Focal stack, PNGs", (), "stack:write_focal_stack", STACK),
+    "focal-stack": ExportKind("Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES),
     "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK),
-    "aperture-sweep": ExportKind("Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK),
+    "aperture-sweep": ExportKind("Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES),
     "aperture-sweep-exr": ExportKind("Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK),
+    "epi": ExportKind("Epipolar plane image", PICTURE, "maps:write_epi", ("row",)),
+    "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity"),
+    "depth": ExportKind("Depth map", MAP, "maps:write_depth", path="maps:depth_path"),
+    "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians"),
+    "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud"),
+    "llff": ExportKind("Cameras, LLFF", (), "cameras:write_llff_folder", own_files=CAMERA_FILES),
+    "nerfstudio": ExportKind("Cameras, nerfstudio", (), "cameras:write_nerfstudio_folder", own_files=CAMERA_FILES),
+    "colmap": ExportKind("Cameras, COLMAP", (), "cameras:write_colmap_folder", own_files=CAMERA_FILES),
     "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci"),
     "numbered-grid": ExportKind("Light field, numbered views", (), *LIGHT_FIELD, layout="numbered-grid"),
     "stanford": ExportKind("Light field, Stanford archive", (), *LIGHT_FIELD, layout="stanford"),

@@ -19,7 +19,7 @@ class ExportOptions:
 
     size: (width, height) of each picture in pixels. device: a display by name, see `DEVICES`. eyes: view steps between
     the two eyes. motion: of an animation. keys: file of a path of one's own. frames: of one turn, or pictures of a
-    stack. rate: frames a second.
+    stack. rate: frames a second. row: of the picture.
     """
 
     size: ScreenSize | None = None
@@ -29,6 +29,7 @@ class ExportOptions:
     keys: Path | None = None
     frames: int | None = None
     rate: float | None = None
+    row: int | None = None
 
 
 USUAL_OPTIONS = ExportOptions()

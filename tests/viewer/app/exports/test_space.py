@@ -1,0 +1,177 @@
+"""Cameras, points and maps, read by plyfile, OpenImageIO and our own readers: all agree on where things are."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from PIL import Image
+from plyfile import PlyData
+
+from iibr_core.formats.cameras import FieldCameras, infinity_of
+from iibr_core.formats.light_fields.llff import read_llff
+from iibr_core.formats.maps.pfm import read_pfm
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from tests.viewer.app.exports.conftest import exported
+from viewer.app.exports.cameras import cameras_of
+from viewer.app.exports.source import ExportSource
+from viewer.model.layout import ScreenSize
+from viewer.model.state.optics import Optics
+
+GRID, SIZE = GridShape(3, 3), ImageSize(64, 96)
+
+
+def colmap_model(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
+    """Projection matrices and places by picture, and points with their colours (N, 6)."""
+    model = folder / "sparse" / "0"
+    intrinsics = {}
+    for line in (model / "cameras.txt").read_text().splitlines():
+        name, kind, width, height, *numbers = line.split()
+        assert (kind, width, height) == ("PINHOLE", "96", "64")
+        fx, fy, cx, cy = map(float, numbers)
+        intrinsics[name] = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    projections, places = {}, {}
+    for line in (model / "images.txt").read_text().splitlines()[::2]:
+        _, w, x, y, z, *moved, camera, name = line.split()
+        assert (float(w), float(x), float(y), float(z)) == (1, 0, 0, 0)
+        translation = np.array(moved, float)
+        projections[name] = intrinsics[camera] @ np.column_stack([np.eye(3), translation])
+        places[name] = -translation
+    points = np.array([line.split()[1:7] for line in (model / "points3D.txt").read_text().splitlines()], float)
+    return projections, places, points
+
+
+def test_colmap_points_lie_on_their_colours_in_every_view(source: ExportSource, tmp_path: Path) -> None:
+    """The near square's points are red; where they are seen in other views, these are red too."""
+    folder = exported(source, "colmap", tmp_path / "scene")
+    projections, _, points = colmap_model(folder)
+    assert len(projections) == 9
+    red = points[points[:, 3] - points[:, 5] > 100]
+    inner = red[(np.abs(red[:, :2]) < 0.8 * np.abs(red[:, :2]).max(axis=0)).all(axis=1)]
+    assert len(inner) > 200
+    for name, projection in projections.items():
+        pixels = np.asarray(Image.open(folder / "images" / name)).astype(int)
+        x, y, z = projection @ np.column_stack([inner[:, :3], np.ones(len(inner))]).T
+        seen = pixels[(y / z).astype(int), (x / z).astype(int)]
+        assert (seen[:, 0] - seen[:, 2] > 80).mean() > 0.98
+
+
+def test_the_three_layouts_say_the_same(source: ExportSource, tmp_path: Path) -> None:
+    folders = {kind: exported(source, kind, tmp_path / kind) for kind in ("llff", "nerfstudio", "colmap")}
+    _, colmap, _ = colmap_model(folders["colmap"])
+    whole = json.loads((folders["nerfstudio"] / "transforms.json").read_text())
+    assert (whole["w"], whole["h"], len(whole["frames"])) == (96, 64, 9)
+    for frame in whole["frames"]:
+        assert (folders["nerfstudio"] / frame["file_path"]).is_file()
+        matrix = np.array(frame["transform_matrix"])
+        place = colmap[Path(frame["file_path"]).name] * [1, -1, -1]
+        np.testing.assert_allclose(matrix[:3, 3], place, atol=1e-12)
+        assert (frame["cx"], frame["cy"]) == (48, 32)
+    poses = np.load(folders["llff"] / "poses_bounds.npy")
+    assert poses.shape == (9, 17)
+    for name, pose in zip(sorted(colmap), poses):
+        matrix = pose[:15].reshape(3, 5)
+        np.testing.assert_allclose(matrix[:, 3], colmap[name] * [1, -1, -1], atol=1e-12)
+        np.testing.assert_allclose(matrix[:, 4], [64, 96, whole["fl_x"]])
+        np.testing.assert_array_equal(matrix[:, 0], [0, -1, 0], "down, where y is up")
+
+
+def test_our_own_reader_finds_the_grid_in_llff(source: ExportSource, tmp_path: Path) -> None:
+    scene = read_llff(exported(source, "llff", tmp_path / "scene"))
+    assert scene is not None
+    offsets = {view.name: (view.offset.t, view.offset.s) for view in scene.views}
+    for row in range(3):
+        for column in range(3):
+            assert offsets[f"v{row:02d}_u{column:02d}"] == pytest.approx((row - 1, column - 1), abs=1e-6)
+    assert scene.range_px is not None
+    low, high = source.scene.disparity_range_px
+    assert scene.range_px[1] - scene.range_px[0] == pytest.approx(high - low, rel=1e-4)
+
+
+def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp_path: Path) -> None:
+    vertex = PlyData.read(str(exported(source, "splats", tmp_path / "a.ply")))["vertex"]
+    count = 96 * 64
+    assert len(vertex) > count, "behind the square"
+    colors = np.column_stack([vertex[f"f_dc_{i}"] for i in range(3)]) * 0.28209479177387814 + 0.5
+    shown = source.draw(Optics(), ScreenSize(96, 64)).reshape(-1, 3) / 255
+    assert np.abs(colors[:count] - shown).max() < 1.6 / 255
+    opacity = 1 / (1 + np.exp(-np.asarray(vertex["opacity"])))
+    assert 0.9 < opacity.min() <= opacity.max() < 1
+    quaternion = np.column_stack([vertex[f"rot_{i}"] for i in range(4)])
+    assert np.array_equal(quaternion, np.tile([1, 0, 0, 0], (len(vertex), 1)))
+    cameras = cameras_of(source)
+    depth = np.asarray(vertex["z"])
+    assert np.exp(np.asarray(vertex["scale_0"])) == pytest.approx(0.6 * depth / cameras.focal_px, rel=1e-4)
+    assert depth.min() == pytest.approx(1, rel=1e-4)
+    square = (colors[:, 0] - colors[:, 2]) > 0.3
+    assert np.median(depth[count:]) > 1.1 * np.median(depth[:count][square[:count]]), "made up behind what is near"
+
+
+def test_point_cloud(source: ExportSource, tmp_path: Path) -> None:
+    cloud = PlyData.read(str(exported(source, "point-cloud", tmp_path / "a.ply")))["vertex"]
+    splats = PlyData.read(str(exported(source, "splats", tmp_path / "b.ply")))["vertex"]
+    assert [p.name for p in cloud.properties] == ["x", "y", "z", "red", "green", "blue"]
+    for axis, sign in (("x", 1), ("y", -1), ("z", -1)):
+        np.testing.assert_allclose(cloud[axis], sign * np.asarray(splats[axis]))
+    shown = source.draw(Optics(), ScreenSize(96, 64)).reshape(-1, 3).astype(int)
+    colors = np.column_stack([cloud[name] for name in ("red", "green", "blue")]).astype(int)
+    assert np.abs(colors[: len(shown)] - shown).max() <= 1
+
+
+def test_points_of_a_view_land_where_they_are_seen() -> None:
+    """For a field whose still plane is at a finite distance, as they mostly are."""
+    cameras = FieldCameras(GRID, SIZE, 80.0, (-1.5, 2.5), -2.0)
+    rng = np.random.default_rng(0)
+    disparity = rng.uniform(-1.5, 2.5, SIZE).astype(np.float32)
+    points = cameras.points(disparity, ViewOffset(0, 0)).astype(float)
+    y, x = np.indices(SIZE)
+    for offset in (ViewOffset(1, -2), ViewOffset(0.5, 3)):
+        moved = points - cameras.place(offset)
+        cx, cy = cameras.principal_point(offset)
+        np.testing.assert_allclose(80 * moved[..., 0] / moved[..., 2] + cx - 0.5, x - disparity * offset.s, atol=1e-3)
+        np.testing.assert_allclose(80 * moved[..., 1] / moved[..., 2] + cy - 0.5, y - disparity * offset.t, atol=1e-3)
+    assert cameras.depth(disparity).min() >= 1
+    assert cameras.depth_range == (1.0, pytest.approx(9.0))
+
+
+@pytest.mark.parametrize(("low", "high"), [(1.0, 5.0), (-3.0, 3.0), (0.001, 9.0), (2.0, 2.0), (-2.0, -2.0)])
+def test_infinity_lies_beyond_all(low: float, high: float) -> None:
+    infinity = infinity_of(low, high)
+    assert infinity < low
+    assert (high - infinity) / (low - infinity) <= 20.001
+    if low == 1.0:
+        assert infinity == 0
+
+
+@pytest.mark.parametrize("numbers", [(np.nan, 0, 1, -1), (0.0, 0, 1, -1), (80.0, 0, 1, 0), (80.0, 2, 1, 0)])
+def test_cameras_that_make_no_sense_are_refused(numbers: tuple[float, ...]) -> None:
+    focal_px, low, high, infinity = numbers
+    with pytest.raises(InputError, match="make no cameras"):
+        FieldCameras(GRID, SIZE, focal_px, (low, high), infinity)
+
+
+def test_maps(source: ExportSource, tmp_path: Path) -> None:
+    disparity = read_pfm(exported(source, "disparity", tmp_path / "a.pfm"))
+    out = exported(source, "depth", tmp_path / "a.exr")
+    assert out.name == "a_depth.exr"
+    depth = np.asarray(oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT))[..., 0]
+    cameras = cameras_of(source)
+    np.testing.assert_allclose(
+        depth, (cameras.range_px[1] - cameras.at_infinity) / (disparity - cameras.at_infinity), rtol=1e-5
+    )
+    assert (disparity.min(), disparity.max()) == pytest.approx(source.scene.disparity_range_px)
+    stored = np.asarray(Image.open(exported(source, "depth", tmp_path / "b.png"))).astype(float)
+    assert np.corrcoef(stored.ravel(), depth.ravel())[0, 1] > 0.9999
+
+
+def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
+    epi = np.asarray(Image.open(exported(source, "epi", tmp_path / "a.png", row=32))).astype(int)
+    assert epi.shape == (3, 96, 3)
+    for line, s in zip(epi, (-1.0, 0.0, 1.0)):
+        shown = source.draw(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64))[32].astype(int)
+        assert np.abs(line - shown).max() <= 1
+    with pytest.raises(InputError, match="rows 0 to 63"):
+        exported(source, "epi", tmp_path / "b.png", row=64)
