@@ -20,7 +20,6 @@ from viewer.cli.options import (
     Force,
     Inpaint,
     LightFieldFormat,
-    Literal,
     MaxPixels,
     Memory,
     PhotoPath,
@@ -46,7 +45,14 @@ def generate(
     depth_model: DepthModel = None,
     refine: Refine = 1.0,
     format: LightFieldFormat = "hci",
-    literal: Literal = False,
+    literal: Annotated[
+        bool | None,
+        typer.Option(
+            "--literal/--planned",
+            help="Disparity counts as given, in px from view to view, or as the window shows it.",
+            show_default="literal with --disparity",
+        ),
+    ] = None,
     depth_strength: DepthStrength = 1.0,
     with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
     max_pixels: MaxPixels = None,
@@ -55,7 +61,8 @@ def generate(
     inpaint: Inpaint = DEFAULT_INPAINTER,
     force: Force = False,
 ) -> None:
-    """Write the light field of a photo, with the parallax that the window shows.
+    """Write the light field of a photo: a disparity map that is named counts as it is, in px from view to view; found
+    or estimated depth gets the parallax that the window shows.
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
     """
@@ -64,7 +71,8 @@ def generate(
     from viewer.model.state.app_state import Source
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
-    source = Source(str(photo), choice, grid, max_pixels=max_pixels, quality=quality, is_literal=literal)
+    is_literal = disparity is not None if literal is None else literal
+    source = Source(str(photo), choice, grid, max_pixels=max_pixels, quality=quality, is_literal=is_literal)
     require_existing(source)
     new_writer = writer_for(format)
     new_writer.require_place(out, inputs_with_sidecar(source), force)

@@ -63,7 +63,9 @@ EXPORTS = {
     "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING),
     "focal-stack": ExportKind("Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES),
     "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK),
-    "aperture-sweep": ExportKind("Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES),
+    "aperture-sweep": ExportKind(
+        "Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES
+    ),
     "aperture-sweep-exr": ExportKind("Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK),
     "epi": ExportKind("Epipolar plane image", PICTURE, "maps:write_epi", ("row",)),
     "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity"),

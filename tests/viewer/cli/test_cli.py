@@ -79,19 +79,34 @@ def test_generate_writes_a_light_field_that_opens(
     assert run(monkeypatch, "screenshot", out, "-o", tmp_path / "field.png", "--view", "-1,1") == 0
 
 
-def test_generate_shows_what_the_window_shows_unless_disparity_is_taken_literally(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    ("words", "is_literal"),
+    [
+        ((), False),
+        (("--literal",), True),
+        (("--disparity", "{map}"), True),
+        (("--disparity", "{map}", "--planned"), False),
+        (("--disparity", "{map}", "--literal"), True),
+    ],
+)
+def test_a_map_that_is_named_counts_as_it_is_unless_said_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    photo_path: Path,
+    tmp_path: Path,
+    words: tuple[str, ...],
+    is_literal: bool,
 ) -> None:
     """As given, the square moves by 3 px from view to view: 12 of 96 from the first to the last."""
-    moved = {}
-    for name, words in (("planned", ()), ("literal", ("--literal",))):
-        out = tmp_path / name
-        assert run(monkeypatch, "generate", photo_path, "--grid", 5, "--out", out, *words) == 0
-        values = read_pfm(out / "gt_disp_lowres.pfm")
-        moved[name] = 4 * float(values.max() - values.min())
-        assert ("Without --literal it is 4%" in capsys.readouterr().err) == (name == "literal")
-    assert moved["literal"] == pytest.approx(12)
-    assert moved["planned"] == pytest.approx(TOTAL_PARALLAX * WIDTH)
+    out, given = tmp_path / "field", photo_path.with_name("scene_disparity.npy")
+    words = tuple(word.replace("{map}", str(given)) for word in words)
+    assert run(monkeypatch, "generate", photo_path, "--grid", 5, "--refine", "off", "--out", out, *words) == 0
+    values = read_pfm(out / "gt_disp_lowres.pfm")
+    if is_literal:
+        np.testing.assert_array_equal(values, np.load(given))
+    else:
+        assert 4 * float(values.max() - values.min()) == pytest.approx(TOTAL_PARALLAX * WIDTH)
+    assert ("In the window it is 4%" in capsys.readouterr().err) == is_literal
 
 
 @pytest.fixture

@@ -56,7 +56,7 @@ def test_a_light_field_of_disparity_as_given(
     assert run(monkeypatch, *words, "--grid", 5) == 0
     shown = capsys.readouterr()
     assert shown.out.splitlines() == [str(out)]
-    assert "Without --literal" in shown.err
+    assert "In the window it is 4%" in shown.err
     assert len(list(out.glob("v??_u??.png"))) == 25
     assert run(monkeypatch, "export", out, "--to", "eslf", "-o", tmp_path / "a_eslf.png") == 0
     with Image.open(tmp_path / "a_eslf.png") as image:
