@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from viewer.model.actions import (
@@ -63,6 +64,7 @@ from viewer.model.state.optics import ApplyPreset, ResetOptics
 from viewer.model.state.saving import WriteSidecarTask
 
 FONT_STEP = 1.1
+RECENT_SHOWN = 4
 KEY_WORDS = {
     "equal": "+",
     "minus": "−",
@@ -205,10 +207,19 @@ COMMANDS: tuple[Command, ...] = (
 BY_NAME = {command.name: command for command in COMMANDS}
 
 
-def commands_matching(text: str) -> tuple[Command, ...]:
-    """Commands whose names hold every word typed."""
+def commands_matching(text: str, recent: tuple[Command, ...] = ()) -> tuple[Command, ...]:
+    """Commands whose names hold every word typed; recent: what comes first."""
     words = text.lower().split()
-    return tuple(command for command in COMMANDS if all(word in command.name.lower() for word in words))
+    return tuple(command for command in (*recent, *COMMANDS) if all(word in command.name.lower() for word in words))
+
+
+def recent_commands(state: AppState) -> tuple[Command, ...]:
+    """To open what was open before, the latest first; not what is open now."""
+    open_now = state.source.path if state.source is not None else None
+    others = [path for path in state.recent if path != open_now][:RECENT_SHOWN]
+    return tuple(
+        Command(f"Open {PurePath(path).name}", _always(OpenPath(source_beside(state.source, path)))) for path in others
+    )
 
 
 def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from imgui_bundle import imgui
 
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching
+from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, ChooseTask, PalettePrompt, SavePrompt
@@ -49,3 +51,16 @@ def test_what_the_commands_bring_up() -> None:
     listed = reduce(state, BY_NAME["All commands"].action(state))
     assert listed.prompt == PalettePrompt()
     assert reduce(AppState(), BY_NAME["Save the picture…"].action(AppState())).prompt is None
+
+
+def test_recent_files_come_first_in_the_list_but_for_the_open_one() -> None:
+    state = replace(state_with(scene_of()), recent=("photo.png", "/a/one.jpg", "/b/two.jpg"))
+    assert state.source is not None
+    assert state.source.path == "photo.png"
+    listed = commands_matching("", recent_commands(state))
+    assert [command.name for command in listed[:2]] == ["Open one.jpg", "Open two.jpg"]
+    assert listed[2:] == COMMANDS
+    opened = reduce(state, listed[0].action(state)).source
+    assert opened is not None
+    assert opened.path == "/a/one.jpg"
+    assert [command.name for command in commands_matching("two", recent_commands(state))] == ["Open two.jpg"]

@@ -13,7 +13,7 @@ from iibr_core.formats.images.picture_kinds import BEST_QUALITY, KINDS, PROFILES
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.types import SRGB
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
-from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching
+from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching, recent_commands
 from viewer.model.export_kinds import EXPORTS
 from viewer.model.layout import Layout, ScreenSize
 from viewer.model.reducers.exporting import export_path_beside
@@ -238,7 +238,7 @@ def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Act
     _focus_on_appearing()
     imgui.set_next_item_width(-1)
     text, entered = _text_field("command", prompt.text, "Type a command")
-    matching = commands_matching(text)
+    matching = commands_matching(text, recent_commands(state))
     steps = imgui.is_key_pressed(imgui.Key.down_arrow) - imgui.is_key_pressed(imgui.Key.up_arrow)
     selected = min(max((prompt.selected if text == prompt.text else 0) + steps, 0), max(len(matching) - 1, 0))
     chosen = matching[selected] if entered and matching else None
@@ -258,7 +258,7 @@ def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -
     imgui.begin_child("commands", imgui.ImVec2(0, max(height, 1)), 0, imgui.WindowFlags_.no_nav)
     room = imgui.get_content_region_avail().x - imgui.get_style().item_inner_spacing.x
     for i, command in enumerate(commands):
-        if imgui.selectable(command.name, i == selected)[0]:
+        if imgui.selectable(f"{command.name}##{i}", i == selected)[0]:
             pressed = command
         if i == selected and has_moved:
             imgui.set_scroll_here_y()

@@ -1,0 +1,150 @@
+"""The panel's text from 60 % to 200 %: nothing cut, nothing over anything else, contrast of 4.5 : 1 at least."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import pytest
+from imgui_bundle import imgui
+
+from tests.viewer.conftest import headless_with_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import SetFontScale, SetUnits
+from viewer.model.layout import PANEL_WIDTH, ScreenSize
+from viewer.model.state.app_state import SECTIONS, Theme, Units
+from viewer.model.state.optics import (
+    APERTURE_KINDS,
+    ApertureShape,
+    SetAperture,
+    SetApertureShape,
+    SetFocusRange,
+    SetTilt,
+)
+from viewer.ui.style import Color, palette_of
+
+LEAST_CONTRAST = 4.5
+SCALES = (0.6, 0.8, 1.0, 1.33, 2.0)
+SLACK_PX = 1.0
+WIDGETS = ("text", "text_disabled", "button", "small_button", "checkbox", "slider_float", "slider_int", "begin_combo")
+WORDS_INSIDE = ("button", "small_button", "slider_float", "slider_int", "begin_combo")
+
+
+@dataclass(frozen=True)
+class Item:
+    """A widget as it was laid out. words: drawn in it, on one line."""
+
+    kind: str
+    words: str
+    left: float
+    top: float
+    right: float
+    bottom: float
+    words_width: float
+
+
+def words_of(kind: str, arguments: tuple[Any, ...]) -> str:
+    if kind in ("slider_float", "slider_int"):
+        value, form = arguments[1], arguments[4]
+        return str(form % value if form.replace("%%", "").count("%") else form.replace("%%", "%"))
+    return str(arguments[1] if kind == "begin_combo" else arguments[0]).partition("##")[0]
+
+
+@pytest.fixture
+def items(monkeypatch: pytest.MonkeyPatch) -> list[Item]:
+    """Every widget that is built from now on, in windows of whatever name; the real ones, watched."""
+    found: list[Item] = []
+
+    def watch(kind: str) -> None:
+        real = getattr(imgui, kind)
+
+        def build(*arguments: Any) -> Any:
+            result = real(*arguments)
+            words = words_of(kind, arguments)
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            width = imgui.calc_text_size(words).x
+            found.append(Item(kind, words, low.x, low.y, high.x, high.y, width))
+            return result
+
+        monkeypatch.setattr(imgui, kind, build)
+
+    for kind in WIDGETS:
+        watch(kind)
+    begin = imgui.begin
+
+    def begin_anew(name: str, *others: Any) -> Any:
+        if name == "panel":
+            found.clear()
+        return begin(name, *others)
+
+    monkeypatch.setattr(imgui, "begin", begin_anew)
+    return found
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+    with headless_with_scene(tmp_path_factory.mktemp("legible"), *SECTIONS) as viewer:
+        yield viewer
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("units", ["photographic", "light field"])
+def test_no_widget_is_cut_and_none_lies_over_another(
+    viewer: HeadlessViewer, items: list[Item], scale: float, units: Units
+) -> None:
+    lens = (SetAperture(2.3), SetFocusRange(0.7), SetTilt((0.3, -0.2)))
+    kind = APERTURE_KINDS[SCALES.index(scale) % (len(APERTURE_KINDS) - 1)]
+    viewer.do(SetFontScale(scale), SetUnits(units), SetApertureShape(ApertureShape(kind)), *lens)
+    left = 120  # room for a small picture: it is not what is looked at
+    right = left + PANEL_WIDTH * scale
+    viewer.screen(ScreenSize(round(right), 2600))
+    assert len(items) > 40
+    for item in items:
+        assert left - SLACK_PX <= item.left, f"{item} begins outside"
+        assert item.right <= right - 14 * scale + SLACK_PX, f"{item} is cut at the right"
+        if item.kind in WORDS_INSIDE:
+            assert item.words_width <= item.right - item.left + SLACK_PX, f"{item} has no room for its words"
+    for one, other in combinations(items, 2):
+        across = min(one.right, other.right) - max(one.left, other.left)
+        down = min(one.bottom, other.bottom) - max(one.top, other.top)
+        assert min(across, down) <= SLACK_PX, f"{one} lies over {other}"
+
+
+def test_widgets_are_watched(items: list[Item], tmp_path: Path) -> None:
+    with headless_with_scene(tmp_path) as viewer:
+        viewer.screen(ScreenSize(400, 300))
+        assert any(item.kind == "button" and item.words_width > 0 for item in items)
+        assert {item.kind for item in items} >= {"text", "button", "slider_float", "checkbox"}
+
+
+def contrast(one: Color, other: Color) -> float:
+    """Of two sRGB colours, as the Web Content Accessibility Guidelines have it: 1 to 21."""
+
+    def light(color: Color) -> float:
+        linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in color[:3]]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    low, high = sorted((light(one), light(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_words_stand_out_from_what_they_stand_on(theme: Theme) -> None:
+    palette = palette_of(theme)
+    assert contrast((0, 0, 0, 1), (1, 1, 1, 1)) == pytest.approx(21)
+    pairs = {
+        (words, ground): contrast(getattr(palette, words), getattr(palette, ground))
+        for words, ground in [
+            *(
+                ("text", ground)
+                for ground in ("panel", "frame", "frame_hovered", "accent_dim", "selected", "background")
+            ),
+            *(("quiet", ground) for ground in ("panel", "frame", "background")),
+            ("error", "panel"),
+            ("warning", "panel"),
+        ]
+    }
+    assert not {pair: round(value, 2) for pair, value in pairs.items() if value < LEAST_CONTRAST}
