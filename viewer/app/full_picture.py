@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +18,7 @@ from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.large_views import whole
 from iibr_core.rendering.lens_light import CENTRE, draw_large, mean_of_areas
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import Cancelled, ShouldStop, in_bands, never
 from iibr_core.types import (
     ColorSpace,
     FloatImage,
@@ -25,13 +28,15 @@ from iibr_core.types import (
     ignore_progress,
     image_size,
 )
+from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.large_photo import complete_fills, load_large
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.display.large_lens import large_lens
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Scene
+from viewer.model.state.app_state import Progress, Scene
 from viewer.model.state.optics import Optics
 
+TELL_EVERY_S = 0.1
 MOST_PIXELS = 100_000_000
 """Of the photo; a larger one is read that large."""
 
@@ -49,6 +54,10 @@ class FullPicture:
     size: ScreenSize
     smaller: FloatImage | None = None
 
+    def with_smaller(self, smaller: FloatImage) -> FullPicture:
+        """The same with what it needs."""
+        return replace(self, smaller=smaller)
+
     def draw(self, should_stop: ShouldStop = never, report_progress: ReportProgress = ignore_progress) -> FloatImage:
         """Linear light (height, width, 3). Raises InputError where the file is gone or another one by now, Cancelled
         once should_stop is true.
@@ -61,6 +70,38 @@ class FullPicture:
         with ViewSynthesis(should_stop) as synthesis:
             light = draw_large(photo, lens, whole(photo.size), synthesis, self.smaller, should_stop, report_progress)
         return mean_of_areas(light, ImageSize(self.size.height, self.size.width), should_stop)
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnFull:
+    """What became of a `FullPicture`: linear light (height, width, 3)."""
+
+    light: FloatImage
+
+
+FullPictureResult = DrawnFull | ProgressReport[int] | Failed[int]
+
+
+class FullPictureWorker(JobThread[FullPicture, FullPictureResult]):
+    """Draws pictures at the photo's own size, one at a time, beside the window."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when a result was posted."""
+        super().__init__("iibr-full", wake, _results_of, lambda asked, message: Failed(0, message))
+
+
+def _results_of(job: Job[FullPicture, FullPictureResult]) -> Iterator[FullPictureResult]:
+    told_s, begun_s = -math.inf, time.perf_counter()
+
+    def report(done: float, total: float, doing: str) -> None:
+        nonlocal told_s
+        now_s = time.perf_counter()
+        if now_s - told_s >= TELL_EVERY_S:
+            told_s = now_s
+            job.post(ProgressReport(0, Progress(int(done), int(total), now_s - begun_s, doing)))
+
+    with suppress(Cancelled):
+        yield DrawnFull(job.request.draw(job.should_stop, report))
 
 
 def encode_light(

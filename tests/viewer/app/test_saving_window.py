@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import shutil
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from iibr_core.color import srgb_from_linear
+from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.rendering.lens_light import mean_of_areas
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, write_scene
+from viewer.app.full_picture import FullPicture
 from viewer.app.image_export import render_pixels
-from viewer.model.actions import Action, DismissNotice, DoTask, OpenPath, SetDepthStrength
+from viewer.model.actions import Action, AskToSave, DismissNotice, DoTask, OpenPath, SetDepthStrength
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import ReadMaskTask, Saved, SavePrompt, SaveTask, Source
 from viewer.model.state.optics import MoveEye, SetAperture
@@ -199,3 +204,61 @@ def test_a_file_that_cannot_be_written_is_a_notice_and_the_next_is_saved(
     assert [notice.is_error for notice in viewer.app.state.notices] == [True]
     viewer.app.do(DoTask(SaveTask(str(tmp_path / "a.png"), (48, 32))))
     viewer.until(lambda app: f"Saved {tmp_path / 'a.png'}" in texts(viewer))
+
+
+@pytest.fixture
+def large(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+    """The photo is four times as large as its views."""
+    driver = open_window(photo_path, grid=GridShape(3, 3), max_pixels=WIDTH * HEIGHT // 4)
+    driver.until_idle()
+    return driver
+
+
+@pytest.mark.parametrize("aperture", [0.0, 2.5])
+def test_a_picture_is_saved_at_the_photos_own_size(
+    large: Driver, photo_path: Path, tmp_path: Path, aperture: float
+) -> None:
+    """Asked for no other size it has all of the photo's pixels; what is out of focus is as in the views."""
+    app, out = large.app, tmp_path / "out.png"
+    app.do(SetAperture(aperture), AskToSave())
+    prompt = app.state.prompt
+    assert isinstance(prompt, SavePrompt)
+    assert prompt.size_px == (WIDTH, HEIGHT)
+    app.do(DoTask(SaveTask(str(out), prompt.size_px)))
+    large.until(lambda app: f"Saved {out}" in texts(large))
+    saved, photo = read_photo(out).pixels, read_photo(photo_path).pixels
+    assert saved.shape == photo.shape
+    if aperture == 0:
+        np.testing.assert_allclose(saved, photo, atol=1.01 / 255)
+    shown = linear_from_srgb(render_pixels(app.scene_view, app.state, app.state.scene.size) / np.float32(255))  # type: ignore[union-attr]
+    smaller = mean_of_areas(linear_from_srgb(saved), image_size(shown))
+    assert np.abs(smaller - shown).mean() < 0.01
+
+
+def test_a_picture_at_the_photos_own_size_can_be_given_up(
+    large: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, before = threading.Event(), set(tmp_path.iterdir())
+
+    def draw(self: FullPicture, should_stop: Callable[[], bool], _: object) -> None:
+        begun.set()
+        while not should_stop():
+            time.sleep(0.001)
+        raise Cancelled
+
+    with monkeypatch.context() as endless:
+        endless.setattr(FullPicture, "draw", draw)
+        large.app.do(DoTask(SaveTask(str(tmp_path / "out.png"), (WIDTH, HEIGHT))))
+        large.until(lambda app: begun.is_set())
+        assert large.app.state.saving is not None
+        large.app.do(DoTask(CancelSaveTask()), DoTask(SaveTask(str(tmp_path / "next.png"), (16, 12))))
+        large.until(lambda app: f"Saved {tmp_path / 'next.png'}" in texts(large))
+    assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
+
+
+def test_a_photo_that_was_replaced_meanwhile_is_noticed(large: Driver, photo_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.png"
+    shutil.copy(write_scene(tmp_path, "other", seed=3), photo_path)
+    large.app.do(DoTask(SaveTask(str(out), (WIDTH, HEIGHT))))
+    large.until(lambda app: any("was changed since it was opened" in text for text in texts(large)))
+    assert not out.exists()

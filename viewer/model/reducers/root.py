@@ -165,7 +165,9 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case AskForPath(what):
             return replace(state, prompt=PathPrompt(what))
         case AskToSave(what) if state.scene is not None and (what == "picture" or state.scene.plan is not None):
-            return replace(state, prompt=SavePrompt(_path_beside(state, what), state.scene.size, what=what))
+            scene = state.scene
+            size = scene.own_size if scene.own_size is not None and state.optics.dolly == 0 else scene.size
+            return replace(state, prompt=SavePrompt(_path_beside(state, what), size, what=what))
         case PictureDrawn(report):
             return replace(state, report=report)
         case AskToExport():

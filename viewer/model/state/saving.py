@@ -9,12 +9,13 @@ from dataclasses import dataclass
 class Saving:
     """The picture that is being saved. name: of its file. drawn: share that is drawn, 0..1; at 1 it is being written.
 
-    waiting: how many more wait for it.
+    waiting: how many more wait for it. seconds_left: about, None where that is not known.
     """
 
     name: str
     drawn: float = 0.0
     waiting: int = 0
+    seconds_left: int | None = None
 
 
 @dataclass(frozen=True)

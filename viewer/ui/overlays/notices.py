@@ -56,6 +56,8 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
 def saving_text(saving: Saving) -> str:
     """What is being saved, and how far it is: "Drawing a.png, 23 %, 1 more to save"."""
     words = f"Drawing {saving.name}, {saving.drawn:.0%}".replace("%", " %")
+    if saving.seconds_left is not None:
+        words += f", {saving.seconds_left} s left"
     words = words if saving.drawn < 1 else f"Writing {saving.name}"
     return f"{words}, {saving.waiting} more to save" if saving.waiting else words
 
