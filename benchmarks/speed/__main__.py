@@ -81,7 +81,11 @@ def measure(
     yardsticks: Path | None,
     data: Path | None,
 ) -> Bench:
-    """Everything, with a bar on stderr. scenes: with true views. inputs: fields whose time and memory are measured."""
+    """Everything, with a bar on stderr. scenes: with true views. inputs: fields that are made in several ways.
+
+    What the plan predicts is judged on scenes that no constant was fitted to, unless it must be quick.
+    """
+    from benchmarks.prediction import judged_scenes
     from benchmarks.provenance import made_by
     from benchmarks.speed.checks import view_agreement
     from benchmarks.speed.prediction import predict
@@ -92,7 +96,8 @@ def measure(
     qualities: tuple[Quality, ...] = ("fast", "balanced") if quick else ("fast", "balanced", "exact")
     with headless_gl() as gl, show_progress("measuring") as show:
         figures, drawings = measure_scenes(scenes, repeats, gl, show)
-        predicted = tuple(f for one in inputs for f in predict([one], qualities, repeats, show))
+        unseen = inputs if quick else list(judged_scenes(data))
+        predicted = tuple(f for one in unseen for f in predict([one], qualities, repeats, show))
         growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
         targets = tuple(all_targets(scenes, inputs, figures, predicted, 0 if quick else repeats, show))
         show(0, 0, "whether views agree")

@@ -11,9 +11,9 @@ from benchmarks.speed.measure import Cost, in_turns, median_cost, median_ratio, 
 from benchmarks.speed.prediction import whole_field
 from benchmarks.speed.variants import REFERENCE, BenchScene, Draw, Variant, evaluated_views, field_cost, is_possible
 from iibr_core.evaluation.metrics import bounded_psnr, flip
-from iibr_core.generation.plan import PlanOverrides, plan_for_viewing
+from iibr_core.generation.plan import PlanOverrides, plan_for_viewing, plan_literal
 from iibr_core.generation.relief import measure_relief
-from iibr_core.types import DEFAULT_QUALITY, TOTAL_PARALLAX, ReportProgress
+from iibr_core.types import TOTAL_PARALLAX, ReportProgress
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,9 @@ class MeasuredVariant:
 
 @dataclass(frozen=True)
 class SceneFigures:
-    """size: (height, width). planned: name of the variant that stores as many views as the plan would choose."""
+    """size: (height, width). planned: name of the variant of the quality, and with as many stored views, as the
+    plan would choose.
+    """
 
     name: str
     size: tuple[int, int]
@@ -48,10 +50,19 @@ class SceneFigures:
         return on_the_front({m.variant.name: (m.ratio, m.psnr_db) for m in self.measured})
 
     @property
+    def choice(self) -> MeasuredVariant:
+        """The plan's."""
+        return next(m for m in self.measured if m.variant.name == self.planned)
+
+    @property
     def behind_front_db(self) -> float:
         """By how much the plan's choice falls short of the best variant that takes no longer."""
-        own = next(m for m in self.measured if m.variant.name == self.planned)
-        return max(m.psnr_db for m in self.measured if m.ratio <= own.ratio) - own.psnr_db
+        return max(m.psnr_db for m in self.measured if m.ratio <= self.choice.ratio) - self.choice.psnr_db
+
+    def fastest_as_good(self, within_db: float) -> MeasuredVariant:
+        """The fastest variant that falls short of the plan's choice by no more than that."""
+        as_good = [m for m in self.measured if m.psnr_db >= self.choice.psnr_db - within_db]
+        return min(as_good, key=lambda m: m.ratio)
 
 
 def measure_scene(
@@ -97,12 +108,12 @@ def _errors(variant: Variant, scene: BenchScene, draw: Draw | None) -> tuple[flo
 
 
 def _plan_choice(scene: BenchScene, variants: Sequence[Variant]) -> str:
-    """The default quality with as few stored views as the plan finds enough for this parallax."""
+    """The plan's quality, with as few stored views as it finds enough for this parallax."""
     field, full = whole_field(scene), 2 * scene.reach
     moved_px = measure_relief(scene.disparity).range * full
     strength = max(moved_px / (TOTAL_PARALLAX * scene.photo.shape[1]), 1e-6)
     side = plan_for_viewing(field.photo, field.disparity, PlanOverrides(depth_strength=strength)).grid.columns
-    default = Variant("", DEFAULT_QUALITY)
-    plain = [variant for variant in variants if replace(variant, name="", every=1) == default and variant.every > 0]
+    chosen = Variant("", plan_literal(field.photo, field.disparity, field.grid).quality)
+    plain = [variant for variant in variants if replace(variant, name="", every=1) == chosen and variant.every > 0]
     enough = [variant for variant in plain if full // variant.every + 1 >= min(side, full + 1)]
     return max(enough, key=lambda variant: variant.every, default=REFERENCE).name

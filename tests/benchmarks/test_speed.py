@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.speed.figures import SceneFigures, measure_scene
+from benchmarks.speed.figures import MeasuredVariant, SceneFigures, measure_scene
 from benchmarks.speed.measure import Cost, exponent, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
 from benchmarks.speed.plot import plot_panels
 from benchmarks.speed.prediction import Prediction, fit_nanoseconds, is_near, make_field, predict, whole_field
@@ -192,9 +192,24 @@ def test_near_is_within_a_quarter() -> None:
 
 
 def test_the_plans_choice_is_judged_on_every_scene(figures: tuple[SceneFigures, ...]) -> None:
-    for scene, target in zip(figures, front_targets(figures), strict=True):
-        assert scene.name in target.what
-        assert target.is_met == (scene.behind_front_db <= 0.1)
+    found = list(front_targets(figures))
+    for scene, behind, slower in zip(figures, found[::2], found[1::2], strict=True):
+        assert scene.name in behind.what
+        assert scene.name in slower.what
+        assert behind.is_met == (scene.behind_front_db <= 0.1)
+
+
+@pytest.mark.parametrize(
+    ("time", "psnr_db", "is_good_enough", "is_fast_enough"),
+    [(2.0, 30.0, True, False), (2.0, 30.2, True, True), (1.2, 30.0, True, True), (2.0, 29.8, False, False)],
+)
+def test_a_choice_fails_that_is_slower_than_one_as_good(time, psnr_db, is_good_enough, is_fast_enough) -> None:
+    fast = MeasuredVariant(Variant("fast"), Cost(1.0, 1.0), 1.0, 0.0, 30.0, 0.1)
+    choice = MeasuredVariant(Variant("balanced", "balanced"), Cost(time, time), time, 0.0, psnr_db, 0.1)
+    scene = SceneFigures("scene", (10, 10), 9, 8, (fast, choice), "balanced")
+    behind, slower = front_targets([scene])
+    assert (behind.is_met, slower.is_met) == (is_good_enough, is_fast_enough)
+    assert scene.fastest_as_good(0.05).variant.name == ("balanced" if psnr_db > 30.05 else "fast")
 
 
 def test_made_up_scenes_have_what_is_asked_for() -> None:
