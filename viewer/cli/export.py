@@ -201,7 +201,7 @@ def export(
     if to.is_drawn:
         _export_drawn(source, depth_strength, lens, require_place, write)
     else:
-        _export_views(source, depth_strength, require_place, write)
+        _export_views(source, depth_strength, not to.layout, require_place, write)
 
 
 def _require_heeded(context: typer.Context, kind: ExportKind) -> None:
@@ -241,15 +241,18 @@ def _export_drawn(
 def _export_views(
     source: Source,
     depth_strength: float,
+    needs_disparity: bool,
     require_place: Callable[[Scene], None],
     write: Callable[[ExportSource], None],
 ) -> None:
-    """Make the scene's views, for what is made of them without a graphics card."""
+    """Make the scene's views, for what is made of them without a graphics card. needs_disparity: of a light field too,
+    which else is taken as it is.
+    """
     from viewer.app.exports.source import ExportSource, undrawn
     from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
     from viewer.model.state.optics import CENTRE, Optics
 
-    request = SceneRequest(0, source, depth_strength, takes_drafts=False)
+    request = SceneRequest(0, source, depth_strength, takes_drafts=not needs_disparity)
     with show_progress("reading") as show:
         results = results_of(request, never, lambda: CENTRE, lambda made: show(made.done, made.total, made.doing))
         ready = next(results)

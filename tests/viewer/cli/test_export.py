@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.formats.maps.pfm import read_pfm
 from tests.viewer.cli.test_cli import run
 
 
@@ -61,3 +63,19 @@ def test_a_light_field_of_disparity_as_given(
     assert run(monkeypatch, "export", out, "--to", "eslf", "-o", tmp_path / "a_eslf.png") == 0
     with Image.open(tmp_path / "a_eslf.png") as image:
         assert image.size == (5 * 96, 5 * 64)
+
+
+def test_disparity_is_found_where_a_light_field_brings_none(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+) -> None:
+    field = tmp_path / "field"
+    words = ("generate", photo_path, "--grid", 3, "--literal", "--out", field, "--format", "numbered-grid")
+    assert run(monkeypatch, *words) == 0
+    given = read_pfm(field / "disp_est_u01_v01.pfm")
+    for path in field.glob("*.pfm"):
+        path.unlink()
+    (field / "parameters.cfg").unlink()
+    assert run(monkeypatch, "export", field, "--to", "disparity", "-o", tmp_path / "a.pfm") == 0
+    assert np.median(np.abs(read_pfm(tmp_path / "a.pfm") - given)) < 0.3
+    assert run(monkeypatch, "export", field, "--to", "hci", "-o", tmp_path / "hci") == 0
+    assert sorted(path.suffix for path in (tmp_path / "hci").iterdir()) == [".cfg"] + 9 * [".png"]

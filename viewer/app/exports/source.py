@@ -18,7 +18,7 @@ from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
 from viewer.background.loaded_photo import LoadedPhoto, inpainting_aids
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Scene
+from viewer.model.state.app_state import Progress, Scene
 from viewer.model.state.optics import CENTRE, Optics
 
 Item = TypeVar("Item")
@@ -73,10 +73,7 @@ class ExportSource:
         """
         total = self.scene.grid.rows * self.scene.grid.columns
         if self.loaded is None:
-            from iibr_core.formats.light_fields.registry import open_light_field
-            from iibr_core.formats.light_fields.views import read_views
-
-            made = read_views(open_light_field(Path(self.scene.source.path)))[1]
+            made = self._views_of_folder()
         else:
             from iibr_core.color import photo_in_srgb
             from iibr_core.generation.light_field import generate
@@ -95,6 +92,20 @@ class ExportSource:
             )
         yield from self.watched(made, total, "making views")
         raise_if_stopped(self.should_stop)
+
+    def _views_of_folder(self) -> Iterator[ViewUpdate]:
+        """As read; with disparity that was found where the scene has such."""
+        from iibr_core.formats.light_fields.registry import open_light_field
+        from iibr_core.formats.light_fields.views import read_views
+        from viewer.background.light_field_job import showings_of_folder
+
+        if self.scene.depth_source in ("none", "light field"):
+            return read_views(open_light_field(Path(self.scene.source.path)))[1]
+        showings = showings_of_folder(self.scene.source, self.should_stop, self._tell, takes_drafts=False)
+        return next(showings).views
+
+    def _tell(self, progress: Progress) -> None:
+        self.report_progress(progress.done, progress.total, progress.doing)
 
     def plan(self, zero: float | None = None) -> ScenePlan:
         """Of a photo's views; see `views`."""
