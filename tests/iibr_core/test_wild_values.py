@@ -426,6 +426,7 @@ READS_OR_TELLS = {
     "formats.animations": "even_size require_video_size write_animation",
     "formats.cameras": "FieldCameras write_llff write_nerfstudio write_colmap spread infinity_of",
     "formats.ply": "write_points write_splats write_ply",
+    "formats.images.spatial_photo": "write_spatial_photo",
     "formats.quilts": "Quilt quilt_for lay_out tagged",
     "formats.stereo": "anaglyph",
     "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",

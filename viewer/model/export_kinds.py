@@ -56,6 +56,7 @@ EXPORTS = {
     "over-under": ExportKind("Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path"),
     "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES),
     "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES),
+    "spatial-photo": ExportKind("Spatial photo, HEIC", (".heic",), "spatial_photo:write_spatial", EYES),
     "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",)),
     "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",)),
     "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING),
