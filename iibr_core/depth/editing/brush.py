@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from math import ceil, exp, floor, hypot, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.depth.editing.edits import UNEDITED, BrushTool, DepthEdits, Stroke, apply_tone, extent_of, require_sound
 from iibr_core.runtime.jit import kernel, nearest_pixel
@@ -25,12 +26,16 @@ TOUCH_POINTS = 8
 SPECK_PIXELS = 3
 """So few unlike pixels in a square of 3 x 3 are texture."""
 COLOR_BIN = 0.1
+MOST_BIN = 10_000
 MOST_TOUCHED = 4000
 NOISE_MEDIANS = 2.5
 """Differences between neighbours below so many medians of them are texture, no contour."""
 MOST_NOISE = 0.03
-MOST_SWEEPS = 16
-"""Over a window, there and back, to measure ways: three do unless the ways wind like a maze's."""
+MOST_VISITS = 16
+"""Of a pixel on average, to measure ways: two or three do unless the ways wind like a maze's."""
+UNKNOWN = -1.0
+ALIKE = np.float32(LIKENESS**2)
+FAR = np.float32(1e30)
 MAPS_KEPT = 8
 """Of those before the last strokes: so many can be taken back at once."""
 SMOOTHING_ROUNDS = 3
@@ -138,10 +143,11 @@ class DepthCanvas:
         amount = stroke.strength * (self._extent[1] - self._extent[0]) * _SIGNS[stroke.tool]
         values = self._values.copy()
         for i in range(first, len(stroke.points)):
-            window = _measure_from(self._photo, stroke, i, distance)
-            weight, before = falloff(distance[window]), under[window].astype(np.float64)  # which do not overflow
-            change = amount if target is None else stroke.strength * (target[window] - before)
-            values[window] = np.clip(before + weight * change, -MOST, MOST)
+            window, touched = _measure_from(self._photo, stroke, i, distance)
+            if target is None:
+                _move(values[window], under[window], distance[window], touched, amount)
+            else:
+                _blend(values[window], under[window], target[window], distance[window], touched, stroke.strength)
         self._values = values
 
 
@@ -155,11 +161,6 @@ class _OpenStroke:
     under: FloatImage
     distance: FloatImage
     target: FloatImage | None
-
-
-def falloff(distance: FloatImage) -> FloatImage:
-    """How much a brush does at a distance (1 = its radius): 1 in its middle, smoothly to 0."""
-    return np.asarray(np.square(1 - np.square(np.minimum(distance, np.float32(1)))))
 
 
 def radius_px(stroke: Stroke, disparity: FloatImage) -> float:
@@ -198,10 +199,11 @@ def stroke_colours(photo: FloatImage, stroke: Stroke, index: int) -> FloatImage:
         parts.append(photo[rows, columns].reshape(-1, 3))
     colors = np.concatenate(parts)
     colors = colors[:: max(1, len(colors) // MOST_TOUCHED)]
-    _, bins, counts = np.unique(np.floor(colors / COLOR_BIN), axis=0, return_inverse=True, return_counts=True)
-    sums = np.zeros((len(counts), 3))
-    np.add.at(sums, bins.reshape(-1), colors)
-    return (sums / counts[:, None]).astype(np.float32)
+    bins = np.clip(np.floor(colors / COLOR_BIN), 0, MOST_BIN).astype(np.int64) @ (MOST_BIN**2, MOST_BIN, 1)
+    _, bins, counts = np.unique(bins, return_inverse=True, return_counts=True)
+    sums = np.stack([np.bincount(bins, colors[:, channel], len(counts)) for channel in range(3)], axis=-1)
+    often_first = np.argsort(-counts, kind="stable")  # most pixels are like them: the others are not asked
+    return (sums / counts[:, None])[often_first].astype(np.float32)
 
 
 def smooth_within_contours(photo: FloatImage, disparity: FloatImage, radius: float, noise: float) -> FloatImage:
@@ -229,10 +231,13 @@ def _goes_on(old: Stroke, new: Stroke) -> bool:
     return replace(new, points=old.points) == old and new.points[: len(old.points)] == old.points
 
 
-def _measure_from(photo: FloatImage, stroke: Stroke, index: int, distance: FloatImage) -> Window:
+def _measure_from(
+    photo: FloatImage, stroke: Stroke, index: int, distance: FloatImage
+) -> tuple[Window, NDArray[np.uint8]]:
     """Shorten the distances (H, W) to what they are from the way to the stroke's point of this index.
 
-    Returns the window in which they may have changed.
+    Returns the window in which they may have changed, and its pixels, 1 where they did: of a stroke's every step
+    that is little, all else being nearer to what was painted before.
     """
     height, width = distance.shape
     ends = [(x * width - 0.5, y * height - 0.5) for x, y in stroke.points[max(index - 1, 0) : index + 1]]
@@ -242,32 +247,19 @@ def _measure_from(photo: FloatImage, stroke: Stroke, index: int, distance: Float
     window = _span(min(ys) - reach, max(ys) + reach, height), _span(min(xs) - reach, max(xs) + reach, width)
     (x0, y0), (x1, y1) = ends[0], ends[-1]
     x0, y0, x1, y1 = (float(np.clip(at, -1e6, 1e6)) for at in (x0, y0, x1, y1))
-    _seed(distance, x0, y0, x1, y1, radius)
-    if distance[window].size:
-        unlike = np.zeros(distance[window].shape, np.float32)
-        _measure_unlikeness(photo[window], stroke_colours(photo, stroke, index), unlike)
-        _remove_specks(unlike)
-        _measure(unlike, distance[window], radius, MOST_SWEEPS)
-    return window
+    shape = distance[window].shape
+    touched = np.zeros(shape, np.uint8)
+    if touched.size:
+        colors = np.ascontiguousarray(stroke_colours(photo, stroke, index).T)
+        ends_in_window = x0 - window[1].start, y0 - window[0].start, x1 - window[1].start, y1 - window[0].start
+        unlike, climb = np.full(shape, UNKNOWN, np.float32), np.full(shape, UNKNOWN, np.float32)
+        _measure(photo[window], colors, distance[window], *ends_in_window, radius, unlike, climb, touched)
+    return window, touched
 
 
 def _span(low: float, high: float, size: int) -> slice:
     first, last = (int(min(max(at, 0), size)) for at in (floor(low), ceil(high) + 1))
     return slice(first, last)
-
-
-@kernel
-def _seed(distance, x0, y0, x1, y1, radius):
-    """Distances of the pixels about every place on the way from (x0, y0) to (x1, y1)."""
-    height, width = distance.shape
-    # Two places a pixel, so that none is stepped over.
-    steps = max(ceil(2 * hypot(x1 - x0, y1 - y0)), 1)
-    for k in range(steps + 1):
-        x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
-        column, row = nearest_pixel(x), nearest_pixel(y)
-        if 0 <= row < height and 0 <= column < width:
-            # Seeds of the ways: the exact distance from the path, in radii.
-            distance[row, column] = min(distance[row, column], np.float32(hypot(column - x, row - y) / radius))
 
 
 @kernel
@@ -281,72 +273,110 @@ def _contour(photo, y, x, other_y, other_x, noise):
 
 
 @kernel
-def _measure_unlikeness(photo, colors, unlike):
-    """How far every pixel's colour is from the nearest of the colours (N, 3), 0 where it is like one."""
-    for y in range(photo.shape[0]):
-        for x in range(photo.shape[1]):
-            # The nearest of the touched colours; without any, all colours are alike.
-            least = np.inf if len(colors) else 0.0
-            for n in range(len(colors)):
-                total = 0.0
-                for c in range(3):
-                    total += (photo[y, x, c] - colors[n, c]) ** 2
-                least = min(least, total)
-            # Squares are compared, one root a pixel is taken.
-            unlike[y, x] = max(sqrt(least) - LIKENESS, 0.0)
+def falloff(distance):
+    """How much a brush does at a distance (1 = its radius), or at many: 1 in its middle, smoothly to 0."""
+    inside = np.float32(1.0) - np.minimum(distance, np.float32(1.0)) ** 2
+    return inside * inside
 
 
 @kernel
-def _remove_specks(unlike):
-    """What few of a pixel's neighbours share is no other surface."""
-    height, width = unlike.shape
-    for y in range(height):
-        for x in range(width):
-            if unlike[y, x] == 0.0:
+def _move(values, under, distance, touched, amount):
+    """Lay a stroke that moves by an amount on what was there before."""
+    for y in range(touched.shape[0]):
+        for x in range(touched.shape[1]):
+            if touched[y, x] == 0:
                 continue
-            # Unlike pixels in the 3 x 3 square, this one included; what is cleared already counts no more.
-            count = 0
-            for j in range(max(y - 1, 0), min(y + 2, height)):
-                for i in range(max(x - 1, 0), min(x + 2, width)):
-                    count += unlike[j, i] > 0.0
-            if count <= SPECK_PIXELS:
-                unlike[y, x] = 0.0
+            # In float64, which does not overflow.
+            values[y, x] = min(max(under[y, x] + falloff(distance[y, x]) * amount, -MOST), MOST)
 
 
 @kernel
-def _measure(unlike, distance, radius, most_sweeps):
-    """Shortest ways from pixel to pixel (8 neighbours), by sweeps there and back until nothing changes.
+def _blend(values, under, target, distance, touched, strength):
+    """Lay a stroke that leads to a target on what was there before."""
+    for y in range(touched.shape[0]):
+        for x in range(touched.shape[1]):
+            if touched[y, x] == 0:
+                continue
+            before = np.float64(under[y, x])
+            change = strength * (np.float64(target[y, x]) - before)
+            values[y, x] = min(max(before + falloff(distance[y, x]) * change, -MOST), MOST)
 
-    To a pixel of a more unlike colour the way is longer.
+
+@kernel
+def _measure(photo, colors, distance, x0, y0, x1, y1, radius, unlike, climb, touched):
+    """Shortest ways (8 neighbours) from the way from (x0, y0) to (x1, y1); to a pixel of a more unlike colour the way
+    is longer. touched: becomes 1 where a distance became less.
     """
-    # Geodesic distance by raster scans (Toivanen 1996): there and back instead of the queue of Dijkstra.
     height, width = distance.shape
-    sweep = 0
-    changed = True
-    while changed and sweep < most_sweeps:
-        changed = False
-        for way in range(2):
-            for j in range(height):
-                y = j if way == 0 else height - 1 - j
-                back = -1 if way == 0 else 1
-                for i in range(width):
-                    x = i if way == 0 else width - 1 - i
-                    best = distance[y, x]
-                    for k in range(4):
-                        # The four neighbours that the sweep has passed.
-                        other_y = y if k == 0 else y + back
-                        other_x = x + back if k < 2 else (x if k == 2 else x - back)
-                        if not (0 <= other_y < height and 0 <= other_x < width):
-                            continue
-                        length = sqrt(2.0) if k == 1 or k == 3 else 1.0
-                        # A step, and the climb to a less alike colour; to come back to an alike one is free.
-                        before = distance[other_y, other_x] + length / radius
-                        before += max(unlike[y, x] - unlike[other_y, other_x], 0.0) / CONTOUR_CONTRAST
-                        best = min(best, np.float32(before))
-                    if best < distance[y, x]:
-                        distance[y, x] = best
-                        changed = True
-        sweep += 1
+    # A ring of pixels whose distance became less, for their neighbours (Moore 1957): each waits at most once.
+    waiting = np.empty(height * width, np.int32)
+    is_waiting = np.zeros(height * width, np.uint8)
+    first, count = 0, 0
+    # Two places a pixel, so that none is stepped over.
+    steps = max(ceil(2 * hypot(x1 - x0, y1 - y0)), 1)
+    for k in range(steps + 1):
+        x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
+        column, row = nearest_pixel(x), nearest_pixel(y)
+        if 0 <= row < height and 0 <= column < width:
+            # Seeds of the ways: the exact distance from the path, in radii.
+            away = np.float32(hypot(column - x, row - y) / radius)
+            if away < distance[row, column]:
+                distance[row, column], touched[row, column] = away, 1
+                if is_waiting[row * width + column] == 0:
+                    waiting[count], is_waiting[row * width + column] = row * width + column, 1
+                    count += 1
+    visits = MOST_VISITS * height * width
+    while count > 0 and visits > 0:
+        at = waiting[first]
+        first = first + 1 if first + 1 < height * width else 0
+        count -= 1
+        visits -= 1
+        is_waiting[at] = 0
+        y, x = at // width, at % width
+        here = distance[y, x]
+        # A step leads no nearer than this, and what is at hand may be out of reach.
+        if here + 1.0 / radius >= 1.0:
+            continue
+        top, bottom, left, right = max(y - 1, 0), min(y + 2, height), max(x - 1, 0), min(x + 2, width)
+        # What lies around is looked at when the way comes there, once.
+        for j in range(top, bottom):
+            for i in range(left, right):
+                if climb[j, i] >= 0.0 or (here >= distance[j, i] and (j != y or i != x)):
+                    continue
+                count_unlike = 0
+                for m in range(max(j - 1, 0), min(j + 2, height)):
+                    for n in range(max(i - 1, 0), min(i + 2, width)):
+                        if unlike[m, n] < 0.0:
+                            # The nearest of the touched colours; without any, all colours are alike.
+                            red, green, blue = photo[m, n, 0], photo[m, n, 1], photo[m, n, 2]
+                            least = FAR if colors.shape[1] else np.float32(0.0)
+                            for c in range(colors.shape[1]):
+                                total = (red - colors[0, c]) ** 2 + (green - colors[1, c]) ** 2
+                                total += (blue - colors[2, c]) ** 2
+                                least = min(least, total)
+                                if least <= ALIKE:
+                                    break  # nearer ones make no difference
+                            # Squares are compared, one root a pixel is taken.
+                            unlike[m, n] = max(sqrt(least) - LIKENESS, 0.0)
+                        count_unlike += unlike[m, n] > 0.0
+                # What few of a pixel's neighbours share is no other surface.
+                climb[j, i] = unlike[j, i] if count_unlike > SPECK_PIXELS else 0.0
+        own = climb[y, x]
+        for j in range(top, bottom):
+            for i in range(left, right):
+                length = sqrt(2.0) if j != y and i != x else 1.0
+                before = here + length / radius
+                if not before < distance[j, i]:
+                    continue
+                # A step, and the climb to a less alike colour; to come back to an alike one is free.
+                before += max(climb[j, i] - own, 0.0) / CONTOUR_CONTRAST
+                if np.float32(before) < distance[j, i]:
+                    distance[j, i], touched[j, i] = np.float32(before), 1
+                    if is_waiting[j * width + i] == 0:
+                        end = first + count
+                        waiting[end if end < height * width else end - height * width] = j * width + i
+                        is_waiting[j * width + i] = 1
+                        count += 1
 
 
 @kernel
