@@ -46,9 +46,11 @@ def find_scenes(folder: Path) -> Iterator[MultiView]:
     yield from found
 
 
-def read_known_disparity(known: KnownDisparity, size: ImageSize) -> Disparity:
-    """The map for a picture of (height, width), px per view step, what is unknown filled. Raises InputError."""
-    return read_disparity(known.path, size, known.scale)
+def read_known_disparity(known: KnownDisparity, size: ImageSize, colors: FloatImage | None = None) -> Disparity:
+    """The map for a picture of (height, width), px per view step. What is unknown is filled as the program does it, by
+    the picture's colors (H, W, 3); where they are not given, from behind. Raises InputError.
+    """
+    return read_disparity(known.path, size, known.scale, colors)
 
 
 def read_view(view: KnownView, max_pixels: int) -> tuple[FloatImage, NDArray[np.bool_]]:

@@ -17,11 +17,9 @@ from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.alignment import fit_to_truth, fit_to_views
 from iibr_core.evaluation.datasets import read_known_disparity, read_view
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.formats.images.oiio_reader import read_size
-from iibr_core.formats.images.photo import size_within
 from iibr_core.formats.light_fields.scene import KnownDisparity, MultiView
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.types import Disparity, FloatImage, GridShape, InputError, ViewOffset
+from iibr_core.types import Disparity, FloatImage, GridShape, InputError, ViewOffset, image_size
 
 DisparityFrom = Literal["auto", "gt", "estimate"]
 """Where the given view's disparity comes from; auto: ground truth, else a map in the folder, else estimated."""
@@ -139,8 +137,8 @@ def _map_of(trial: Trial, maps: Mapping[int, KnownDisparity], max_pixels: int) -
         return None
     scene = trial.scene
     nearest = min(maps, key=lambda index: sum(part**2 for part in trial.offset(index)))
-    size = size_within(read_size(scene.views[nearest].path), max_pixels)
-    stored = read_known_disparity(maps[nearest], size)
+    colors, _ = read_view(scene.views[nearest], max_pixels)
+    stored = read_known_disparity(maps[nearest], image_size(colors), colors)
     if nearest == trial.given:
         return stored
     offset = trial.offset(nearest)

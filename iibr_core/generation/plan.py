@@ -32,6 +32,7 @@ from iibr_core.generation.memory_model import (
     whole_bytes,
 )
 from iibr_core.generation.relief import Relief, measure_relief
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import (
     DEFAULT_QUALITY,
     TOTAL_PARALLAX,
@@ -287,7 +288,7 @@ def _wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
 
 def _edge_reasons(statistics: ParallaxStatistics) -> list[str]:
     inpainted = (
-        "holes behind them are inpainted."
+        f"holes behind them are inpainted, by {DEFAULT_INPAINTER} if nothing else is asked for: it measures best."
         if statistics.has_disocclusion
         else "nothing is disoccluded, so nothing is inpainted."
     )

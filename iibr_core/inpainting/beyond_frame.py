@@ -16,8 +16,10 @@ from iibr_core.types import FloatImage, Margins, image_size
 
 SPREAD = 1.6
 """Colours at distance r are a mean with a standard deviation of 0.41 px times 2 to the power of this, times r."""
-TEXTURE_SHARE = 0.6
-"""So much of the photo's texture is seen beyond its frame: its place there is a guess, and errors weigh twice."""
+TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0
+"""So much of the photo's texture is seen far beyond its frame, half of that at this distance: its place there is a
+guess, and close to the frame nobody misses it.
+"""
 BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
 """Texture is what differs from a mean with these weights, each way."""
 
@@ -104,8 +106,9 @@ def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfac
             k = min(int(level), len(means) - 2)
             part = np.float32(level - k)
             # What lies as far inside gives the texture.
+            share = np.float32(TEXTURE_SHARE * away / (away + TEXTURE_PX))
             v = min(max(2 * y - row + top, 0), height - 1)
             u = min(max(2 * x - column + left, 0), width - 1)
             for c in range(3):
                 mean = means[k, place, c] + part * (means[k + 1, place, c] - means[k, place, c])
-                grown[row, column, c] = max(mean + TEXTURE_SHARE * _texture(colors, v, u, c), 0.0)
+                grown[row, column, c] = max(mean + share * _texture(colors, v, u, c), 0.0)

@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation import report
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import flip, psnr, ssim
@@ -263,6 +264,19 @@ def test_places_where_no_report_can_be_are_told_before_any_work(tmp_path: Path) 
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
         with pytest.raises(InputError, match="file"):
             require_report_folder(folder)
+
+
+def test_unknown_disparity_is_filled_by_the_photo_as_the_program_does_it(tmp_path: Path) -> None:
+    folder = write_grid(tmp_path / "scene")
+    path = tmp_path / "map.npy"
+    unknown = disparity_of_square().copy()
+    edge = int(np.flatnonzero(np.diff(unknown[HEIGHT // 2]))[0])
+    unknown[:, edge - 2 : edge + 2] = np.nan
+    np.save(path, unknown)
+    centre = trials_of(scene_of(folder), path)[0]
+    given = trial_input(centre, path, UNREFINED, 10**6)
+    expected = open_with_depth(centre.scene.views[centre.given].path, replace(UNREFINED, file=str(path)))
+    np.testing.assert_array_equal(given.maps[0].values, expected.disparity.values)
 
 
 def test_the_summary_takes_means_over_scenes(results: list[EvaluationResult]) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
 from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.inpainting.beyond_frame import SPREAD, TEXTURE_SHARE, _level, extend_beyond_frame
+from iibr_core.inpainting.beyond_frame import SPREAD, TEXTURE_PX, TEXTURE_SHARE, _level, extend_beyond_frame
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
@@ -44,7 +44,7 @@ def extend_slowly(colors, disparity, margins):
         mean = means[k][place] * (k + 1 - level) + means[k + 1][place] * (level - k)
         v, u = 2 * y - row + margins.top, 2 * x - column + margins.left
         detail = colors[v, u] - np.einsum("ij,ijc->c", kernel, around[v : v + 5, u : u + 5])
-        grown[row, column] = np.maximum(mean + TEXTURE_SHARE * detail, 0)
+        grown[row, column] = np.maximum(mean + TEXTURE_SHARE * away / (away + TEXTURE_PX) * detail, 0)
     return grown, surfaces
 
 
