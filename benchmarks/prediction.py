@@ -2,9 +2,10 @@
 
     python -m benchmarks.prediction [--data DATA] [--photos DIR] [--repeats 3] [--qualities fast,balanced,exact]
 
-DATA holds scenes as `iibr evaluate` takes them: with made-up squares they are what constants are fitted to. Judged are
-scenes that training draws, the demo photo and the photos with depth of their own below DIR. Run it on a machine that
-does nothing else, put what the last line says into `iibr_core/generation/cost_model.py`, and run it again.
+DATA holds scenes as `iibr evaluate` takes them: with made-up squares and some scenes that training draws they are what
+constants are fitted to. Judged are other drawn scenes, the demo photo and the photos with depth of their own below DIR.
+Run it on a machine that does nothing else, put what the last line says into `iibr_core/generation/cost_model.py`, and
+run it again.
 """
 
 from __future__ import annotations
@@ -31,34 +32,38 @@ from viewer.cli.demo import demo_photo
 
 MADE_UP = ((1024, 2.0, 16, 9), (512, 2.0, 16, 9), (256, 2.0, 128, 5), (256, 8.0, 16, 13))
 """Side px, disparity range px, squares, views a side."""
-
-
+DRAWN_TO_FIT = ((201, 360, 480, 16.0, 9), (202, 240, 320, 24.0, 5), (203, 480, 640, 8.0, 5), (204, 300, 300, 12.0, 13))
 DRAWN = ((101, 480, 640, 12.0, 9), (102, 300, 400, 30.0, 9), (103, 600, 800, 20.0, 5), (104, 240, 320, 8.0, 13),
          (105, 512, 512, 45.0, 7), (106, 400, 600, 6.0, 9))  # fmt: skip
-"""Seed, height, width, largest parallax px, views a side."""
+"""Seed, height, width, largest parallax px, views a side: these are judged, those above fitted to."""
 PHOTO_EXTENSIONS = (".jpg", ".jpeg", ".heic")
 
 
 def fitted_scenes(data: Path | None) -> Iterator[BenchInput]:
-    """Made-up ones, and real ones with maps as they are and soft ones."""
+    """Made-up ones, drawn ones, and real ones with maps as they are and soft ones."""
     for side, range_px, squares, views in MADE_UP:
         name = f"{squares} squares, {side} px, {views}x{views}"
         yield BenchInput(name, *made_up_scene(side, range_px, squares), GridShape(views, views))
+    for drawn in DRAWN_TO_FIT:
+        yield drawn_scene(*drawn)
     for known in find_scenes(data) if data else ():
         if known.disparity:
             yield from map(whole_field, bench_scenes(known, DEFAULT_MAX_PIXELS))
 
 
+def drawn_scene(seed: int, height: int, width: int, parallax_px: float, views: int) -> BenchInput:
+    """A scene as training draws them."""
+    size, reach = ImageSize(height, width), views // 2
+    scene = random_scene(np.random.default_rng(seed), size, parallax_px / reach)
+    pixels, values = render(scene, size, ViewOffset(0.0, 0.0))
+    photo = Photo(pixels, float(width), f"drawn {seed}")
+    return BenchInput(f"{photo.name}, {size}, {views}x{views}", photo, Disparity(values, ""), GridShape(views, views))
+
+
 def judged_scenes(photos: Path | None) -> Iterator[BenchInput]:
     """Those that no constant is fitted to, with the field that their plan gives photos."""
-    for seed, height, width, parallax_px, views in DRAWN:
-        size, reach = ImageSize(height, width), views // 2
-        scene = random_scene(np.random.default_rng(seed), size, parallax_px / reach)
-        pixels, values = render(scene, size, ViewOffset(0.0, 0.0))
-        photo = Photo(pixels, float(width), f"drawn {seed}")
-        yield BenchInput(
-            f"{photo.name}, {size}, {views}x{views}", photo, Disparity(values, ""), GridShape(views, views)
-        )
+    for drawn in DRAWN:
+        yield drawn_scene(*drawn)
     below = sorted(photos.rglob("*")) if photos else []
     for path in [demo_photo(), *(path for path in below if path.suffix.lower() in PHOTO_EXTENSIONS)]:
         found = open_with_depth(path, DepthChoice())

@@ -1,7 +1,7 @@
 """What making a scene's views will cost, before any is made: time and memory in each quality.
 
-Cost follows what the scene needs: how many views, how many of their rays are ambiguous, whether views look beyond the
-photo's frame. The constants were measured; `python -m benchmarks.prediction` fits them anew.
+Cost follows what the scene needs: how many views, how much of them shows no smooth surface, how many of their rays are
+ambiguous. The constants were measured; `python -m benchmarks.prediction` fits them anew.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
-from iibr_core.rendering.ambiguity import AMBIGUOUS_PX, EVERY_COST, SOFT
+from iibr_core.rendering.ambiguity import AMBIGUOUS_PX, EVERY_COST
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
 from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 
@@ -25,6 +25,8 @@ STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
 GAP_PX = 1.0
 """A depth edge disoccludes something if it opens a gap wider than this in the outermost view."""
+SMOOTH_PX = 0.4
+"""A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
 OPEN_SHARE = 0.42
 """Of the rays where surfaces meet, so many are left open by the closed form."""
 REMADE = 0.6
@@ -48,22 +50,20 @@ NUMBER_BYTES, HOLE_BYTES = 4, 148
 class Workload(NamedTuple):
     """What there is to do, in pixels and rays of all views together.
 
-    photo_pixels: made rays of, once. view_pixels: each gets candidates, weights, a colour. meeting_pixels: those of
-    them where surfaces meet. framed_pixels: view_pixels, where views look beyond the photo's frame. ambiguous_rays,
-    soft_rays, plain_rays: that the transformer is asked for; ambiguous ones in maps with sharp and with soft edges, and
-    rays that are not.
+    source_pixels: made rays of, in all images of the ray set. view_pixels: each gets candidates, weights, a colour.
+    rough_pixels: those of them where no smooth surface shows, so that rays are splatted. ambiguous_rays, soft_rays,
+    plain_rays: that the transformer is asked for; where surfaces meet, near soft edges, and rays that are neither.
     """
 
-    photo_pixels: float
+    source_pixels: float
     view_pixels: float
-    meeting_pixels: float
-    framed_pixels: float
+    rough_pixels: float
     ambiguous_rays: float
     soft_rays: float
     plain_rays: float
 
 
-NANOSECONDS = Workload(100.0, 52.0, 680.0, 45.0, 1650.0, 2000.0, 870.0)
+NANOSECONDS = Workload(25.0, 50.0, 618.0, 1876.0, 1765.0, 870.0)
 """What each piece of work takes one core."""
 
 
@@ -95,16 +95,13 @@ NO_COST = CostEstimates(*3 * [CostEstimate(0.0, 0)])
 @dataclass(frozen=True, eq=False)
 class ParallaxStatistics:
     """How content moves in the outermost view, px. step (H, W): the largest difference between neighbours near each
-    pixel. softness, soft (H, W): see `DisparityStatistics`. most_px: of all content. frame_px: of what lies at the
-    frame. hole_share: of the pixels, those it shows and the photo hides, at most. canvas: the photo with what the outer
-    views see beyond its frame.
+    pixel. soft (H, W): see `DisparityStatistics`. most_px: of all content. hole_share: of the pixels, those it shows
+    and the photo hides, at most. canvas: the photo with what the outer views see beyond its frame.
     """
 
     step: FloatImage
-    softness: float
     soft: NDArray[np.bool_]
     most_px: float
-    frame_px: float
     hole_share: float
     canvas: ImageSize
 
@@ -118,20 +115,21 @@ class ParallaxStatistics:
         """Whether any view shows what the photo hides, at depth edges or beyond the frame."""
         return self.most_px > STILL_PX or bool((self.step > GAP_PX).any())
 
-    @property
-    def is_soft(self) -> bool:
-        """Whether depth edges are slopes: then surfaces that make a ray ambiguous are looked for farther around."""
-        return self.softness > SOFT
-
     def meeting_share(self, parallax: float) -> float:
         """Share of the pixels where surfaces meet in a view with this share of the outermost one's parallax."""
         return float((self.step * np.float32(parallax) > AMBIGUOUS_PX).mean())
 
-    def ambiguous_share(self, parallax: float) -> float:
-        """Share of the rays that are ambiguous there: more where edges are soft."""
-        if not self.is_soft:
-            return OPEN_SHARE * self.meeting_share(parallax)
+    def rough_share(self, parallax: float) -> float:
+        """Share of the pixels where no smooth surface shows in such a view."""
+        return float((self.step * np.float32(parallax) > SMOOTH_PX).mean())
+
+    def soft_share(self, parallax: float) -> float:
+        """Share of the rays that soft edges make ambiguous there."""
         return float(self.soft.mean() * parallax**SOFT_GROWTH)
+
+    def ambiguous_share(self, parallax: float) -> float:
+        """Share of the rays that are ambiguous there."""
+        return min(OPEN_SHARE * self.meeting_share(parallax) + self.soft_share(parallax), 1.0)
 
 
 def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatistics:
@@ -142,13 +140,10 @@ def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatist
     moved = np.nan_to_num(disparity * np.float32(outermost))
     moved = np.clip(moved, -MOST_PARALLAX_PX, MOST_PARALLAX_PX)
     around = measure_disparity(moved[None], 1.0)
-    frame = np.concatenate([moved[0], moved[-1], moved[:, 0], moved[:, -1]])
     return ParallaxStatistics(
         around.step[0],
-        around.softness,
         around.soft,
         float(np.abs(moved).max()),
-        float(np.abs(frame).max()),
         _hole_share(moved),
         margins_beyond_frame(moved, [ViewOffset(-1.0, -1.0), ViewOffset(1.0, 1.0)]).around(image_size(moved)),
     )
@@ -187,13 +182,14 @@ def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: 
     pixels, views = statistics.step.size, grid.rows * grid.columns - 1
     # The outer views complete the ray set in closed form; for the transformer, most but their colours is made again.
     twice = REMADE * _inpainted_views(statistics, grid) if quality != "fast" else 0
-    made = pixels * (views + twice)
-    meeting = pixels * (_sum_over_views(statistics.meeting_share, grid) + twice * statistics.meeting_share(1.0))
-    framed = made if statistics.frame_px > STILL_PX else 0
-    asked = pixels * _sum_over_views(statistics.ambiguous_share, grid) if quality != "fast" else 0
-    sharp, soft = (0, asked) if statistics.is_soft else (asked, 0)
+    rough = pixels * (_sum_over_views(statistics.rough_share, grid) + twice * statistics.rough_share(1.0))
+    sources = math.prod(statistics.canvas) * (2 + _inpainted_views(statistics, grid)) if views else 0
+    asked, soft = 0.0, 0.0
+    if quality != "fast":
+        asked = pixels * _sum_over_views(statistics.ambiguous_share, grid)
+        soft = min(pixels * _sum_over_views(statistics.soft_share, grid), asked)
     plain = pixels * views - asked if quality == "exact" else 0
-    return Workload(pixels if views else 0, made, meeting, framed, sharp, soft, plain)
+    return Workload(sources, pixels * (views + twice), rough, asked - soft, soft, plain)
 
 
 def _sum_over_views(share: Callable[[float], float], grid: GridShape) -> float:
