@@ -145,9 +145,12 @@ def is_full(scene: Scene, optics: Optics, size: ScreenSize) -> bool:
 
 def require_full(scene: Scene, optics: Optics) -> None:
     """Raise InputError where there is no memory for a picture at the photo's own size."""
+    from iibr_core.formats.images.photo import size_within
+
     if scene.plan is None or scene.own_size is None:
         return
     (width, height), (own_width, own_height) = scene.size, scene.own_size
     field_bytes = scene.plan.field_bytes if needs_smaller(optics) else 0
     budget = budget_of(scene.source.depth.memory_bytes)
-    require_own_size(budget, ImageSize(own_height, own_width), ImageSize(height, width), field_bytes)
+    read = size_within(ImageSize(own_height, own_width), MOST_PIXELS)
+    require_own_size(budget, read, ImageSize(height, width), field_bytes)

@@ -149,6 +149,7 @@ class HeadlessViewer:
         assert layout.picture_px is not None
         x, y, box_width, box_height = layout.picture_px
         box_size = layout.picture_px.size
+        require_size(box_size)
         if is_full(scene, self.state.optics, box_size):
             light = self._full_picture(scene, box_size, report_progress)
             pixels = encode_light(light, is_linear, color_space, scene.color_space)
