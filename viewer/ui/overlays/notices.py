@@ -37,6 +37,8 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
         right, bottom = layout.strip_down.x - STRIP_GAP * layout.ui_scale, layout.strip_across.y - margin / 2
     elif layout.status is not None:
         bottom = layout.status.y
+    elif layout.filmstrip is not None:
+        bottom = layout.filmstrip.y - margin / 2
     width = min(NOTICE_WIDTH * layout.ui_scale, right - margin)
     if width <= 0:
         return []
@@ -103,15 +105,23 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     imgui.text_wrapped(notice.text)
     imgui.pop_style_color()
-    if notice.offer is not None and imgui.button("Use its settings"):
-        actions.append(TakeSettings(notice.offer))
-    for name in notice.commands:
-        if imgui.button(name):
-            actions.append(BY_NAME[name].action(state))
-        imgui.same_line()
-    if notice.commands:
-        imgui.new_line()
-    if others and imgui.button(f"Close all ({others + 1})"):
-        actions.append(DismissNotices())
+    offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
+    offers += [("Use its settings", TakeSettings(notice.offer))] if notice.offer is not None else []
+    offers += [(f"Close all ({others + 1})", DismissNotices())] if others else []
+    actions += _buttons(offers)
     imgui.end_group()
+    return actions
+
+
+def _buttons(offers: list[tuple[str, Action]]) -> list[Action]:
+    """Side by side, on as many lines as they need."""
+    actions: list[Action] = []
+    style = imgui.get_style()
+    right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    for i, (words, action) in enumerate(offers):
+        width = imgui.calc_text_size(words).x + 2 * style.frame_padding.x
+        if i and imgui.get_item_rect_max().x + style.item_spacing.x + width <= right:
+            imgui.same_line()
+        if imgui.button(words):
+            actions.append(action)
     return actions

@@ -33,7 +33,7 @@ from viewer.ui.widgets import button, gap, label, quiet
 Choice = TypeVar("Choice", bound=str)
 Option = TypeVar("Option")
 ANY_DISPLAY = "any"
-PROMPT_WIDTH = 460.0
+PROMPT_WIDTH, HELP_WIDTH = 460.0, 860.0
 ROWS_SHOWN = 12
 LARGEST_SIDE = 65536
 MOUSE = (
@@ -45,7 +45,7 @@ MOUSE = (
     ("Drop", "Open a photo, a folder, a disparity map"),
     ("Ctrl+click a slider", "Type a value"),
     ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
-    ("Gamepad", "Sticks: viewpoint, focus; triggers: aperture; shoulders: the folder"),
+    ("Gamepad", "Viewpoint, focus; triggers: aperture"),
     ("Esc", "Close what is open, put the brush away"),
 )
 PICTURE_ENDINGS = "The name's ending decides: .png, .jpg, .tif, .webp, .avif, or .exr in linear light."
@@ -72,7 +72,7 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     prompt = state.prompt
     if prompt is None:
         return []
-    width = min(PROMPT_WIDTH * layout.ui_scale, layout.window.width)
+    width = min((HELP_WIDTH if prompt == "help" else PROMPT_WIDTH) * layout.ui_scale, layout.window.width)
     middle = imgui.ImVec2(max(layout.panel.x, width) / 2, layout.window.height / 2)
     imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
@@ -273,9 +273,13 @@ def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -
 def _help(layout: Layout) -> list[Action]:
     imgui.text("Mouse and keys")
     gap(layout, 2)
-    keys = [(c.chords[0].words, c.name) for c in COMMANDS if c.chords]
-    if imgui.begin_table("keys", 2, imgui.TableFlags_.sizing_fixed_fit):
-        for what, meaning in (*MOUSE, *keys):
+    rows = [*MOUSE, *((c.chords[0].words, c.name) for c in COMMANDS if c.chords)]
+    across = 2 if imgui.get_content_region_avail().x > 1.5 * PROMPT_WIDTH * layout.ui_scale else 1
+    down = -(-len(rows) // across)
+    if imgui.begin_table("keys", 2 * across, imgui.TableFlags_.sizing_fixed_fit):
+        for i in range(down * across):
+            index = i % across * down + i // across
+            what, meaning = rows[index] if index < len(rows) else ("", "")
             imgui.table_next_column()
             imgui.text_disabled(what)
             imgui.table_next_column()
