@@ -106,11 +106,12 @@ def _predict_one(given: BenchInput, quality: Quality, measured_s: float) -> Pred
 
 
 def fit_nanoseconds(predicted: Sequence[Prediction]) -> Workload:
-    """cost_model.NANOSECONDS as these measurements would set it: least squares of relative errors, none negative.
+    """cost_model.NANOSECONDS as these measurements would set it, all above 0: least squares of the logarithms of
+    predicted over measured, so that twice and half count alike.
 
     What no measurement contains keeps its value.
     """
-    from scipy.optimize import nnls
+    from scipy.optimize import least_squares, nnls
 
     long_enough = [f for f in predicted if f.measured_s >= LEAST_S]
     parts = np.array([np.array(f.work) * 1e-9 / CORES / f.measured_s for f in long_enough]).reshape(
@@ -119,5 +120,6 @@ def fit_nanoseconds(predicted: Sequence[Prediction]) -> Workload:
     known = parts.any(axis=0)
     values = np.array(NANOSECONDS)
     if known.any():
-        values[known] = nnls(parts[:, known], np.ones(len(parts)))[0]
+        first = np.log(np.maximum(nnls(parts[:, known], np.ones(len(parts)))[0], 1.0))
+        values[known] = np.exp(least_squares(lambda logs: np.log(parts[:, known] @ np.exp(logs)), first).x)
     return Workload(*(float(value) for value in values))

@@ -63,7 +63,7 @@ class Workload(NamedTuple):
     plain_rays: float
 
 
-NANOSECONDS = Workload(25.0, 50.0, 618.0, 1876.0, 1765.0, 870.0)
+NANOSECONDS = Workload(53.0, 60.0, 446.0, 1747.0, 1923.0, 870.0)
 """What each piece of work takes one core."""
 
 
