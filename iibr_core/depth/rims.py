@@ -6,6 +6,8 @@ both fly about as crumbs. Where colours do not tell the sides apart nothing chan
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color, vote_weight
@@ -26,22 +28,17 @@ ALIKE = 0.05
 UNLIKE_WEIGHT = 1e-3
 RIM_WEIGHT = 0.1
 """Of pixels that are of a rim themselves."""
-MAJORITY = 3.0
-"""A pixel changes sides where the other side has so many times the votes of its own."""
-PLATEAU_SHARE = 0.15
-"""A pixel lies between two surfaces if each changes by at most this share of their distance ..."""
-PLATEAU_PX = 2
-"""... over so many pixels."""
-MIXED_NEAR_PX = 8
-"""Rims are unsure within so many pixels of what lies between two surfaces."""
-MIXED = (0.1, 0.8)
-"""How far up from the lower to the higher of both it lies; above that, a round thing turns away from the view."""
-MIXED_EDGES = 5.0
-"""Times the least edge: what lies between nearer surfaces may be a slope."""
+MAJORITY = 5.0
+"""A pixel changes sides where the other side has so many times the votes of its own ..."""
+LEAST_TOUCHED = 3
+"""... and so many of its eight neighbours are there, too: lone pixels would fly about as crumbs."""
+TOUCH_ROUNDS = 3
 LEAST_MIXED = 0.025
-"""A map of whose rims a smaller share is mixed is exact: nothing is changed."""
-MOST_FELLOWS = 4
-"""A pixel with more neighbours on its own disparity than this lies on a surface."""
+"""A map of whose rims a smaller share lies between two surfaces was not measured, and not resampled ..."""
+LEAST_ASTRAY = 0.005
+"""... and if colours claim a smaller share of its rims for the front, it is exact: nothing is changed."""
+MOST_FELLOWS = (2, 4)
+"""A pixel with more neighbours on its own disparity, within one pixel or two each way, lies on a surface."""
 
 
 def settle_rims(
@@ -51,71 +48,49 @@ def settle_rims(
 
     least_edge: the step that counts as a depth edge, more than 0. Lone disparities between two surfaces, which maps
     have that were measured or resampled, are taken for unknown and filled anew; then pixels of rims change sides where
-    the colours say so. A map without them is exact, and comes back as it is. Raises Cancelled once should_stop is true.
+    the colours say so. An exact map comes back as it is. Raises Cancelled once should_stop is true.
     """
     colors, size = np.ascontiguousarray(photo, np.float32), image_size(values)
     between, rim = np.zeros(values.shape, np.bool_), np.zeros(values.shape, np.bool_)
     in_bands(lambda first, last: _find_between(values, least_edge, first, last, between), size, should_stop)
     in_bands(lambda first, last: _find_rims(values, least_edge, first, last, rim), size, should_stop)
-    if np.count_nonzero(between) <= LEAST_MIXED * np.count_nonzero(rim):
+    rims = np.count_nonzero(rim)
+    is_mixed = np.count_nonzero(between) > LEAST_MIXED * rims
+    if is_mixed:
+        values = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
+    settled = values.copy()
+    astray = in_bands(
+        lambda first, last: _choose_sides(colors, values, rim, least_edge, first, last, settled), size, should_stop
+    )
+    if not is_mixed and sum(astray) <= LEAST_ASTRAY * rims:
         return values
-    whole = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
-    settled, unsure = whole.copy(), np.zeros(values.shape, np.bool_)
-
-    def band(first: int, last: int) -> None:
-        _mark_around(between, MIXED_NEAR_PX, first, last, unsure)
-        _choose_sides(colors, whole, rim, unsure, least_edge, first, last, settled)
-
-    in_bands(band, size, should_stop)
+    for _ in range(TOUCH_ROUNDS):
+        chosen, settled = settled, values.copy()
+        in_bands(partial(_keep_touching, values, chosen, least_edge, settled), size, should_stop)
     return settled
-
-
-@kernel
-def _is_between(values, y, x, right, down, least_edge):
-    """Whether, along this direction, a lower plateau ends just before a pixel and a higher one begins just after it."""
-    here = values[y, x]
-    # One of the sides may begin a pixel later: rims are up to two pixels wide.
-    for after in range(1, 3):
-        for before in range(1, 4 - after):
-            a, b = values[y + after * down, x + after * right], values[y - before * down, x - before * right]
-            high, low = max(a, b), min(a, b)
-            if (
-                high - low > MIXED_EDGES * least_edge
-                and high - here > least_edge
-                and here - low > least_edge
-                and MIXED[0] * (high - low) <= here - low <= MIXED[1] * (high - low)
-            ):
-                flat, is_flat = PLATEAU_SHARE * (high - low), True
-                for beyond in range(1, PLATEAU_PX + 1):
-                    far_a = values[y + (after + beyond) * down, x + (after + beyond) * right]
-                    far_b = values[y - (before + beyond) * down, x - (before + beyond) * right]
-                    is_flat &= abs(far_a - a) <= flat and abs(far_b - b) <= flat
-                if is_flat:
-                    return True
-    return False
 
 
 @kernel
 def _find_between(values, least_edge, first, last, between):
     """Rows [first, last): pixels of no surface, between two."""
     height, width = values.shape
-    margin = 2 + PLATEAU_PX
-    for y in range(max(first, margin), min(last, height - margin)):
-        for x in range(margin, width - margin):
+    for y in range(first, last):
+        for x in range(width):
             # Neighbours above and below it, and few on its own disparity: most pixels end here.
             fellows, higher, lower = -1, False, False
-            for v in range(y - 1, y + 2):
-                for u in range(x - 1, x + 2):
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
                     step = values[v, u] - values[y, x]
                     higher, lower = higher or step > least_edge, lower or step < -least_edge
                     fellows += abs(step) <= least_edge
-            if higher and lower and fellows <= MOST_FELLOWS:
-                between[y, x] = (
-                    _is_between(values, y, x, 1, 0, least_edge)
-                    or _is_between(values, y, x, 0, 1, least_edge)
-                    or _is_between(values, y, x, 1, 1, least_edge)
-                    or _is_between(values, y, x, 1, -1, least_edge)
-                )
+            if not (higher and lower and fellows <= MOST_FELLOWS[0]):
+                continue
+            # Things of two pixels and more, before one surface and behind another, have fellows farther off.
+            fellows = -1
+            for v in range(max(y - 2, 0), min(y + 3, height)):
+                for u in range(max(x - 2, 0), min(x + 3, width)):
+                    fellows += abs(values[v, u] - values[y, x]) <= least_edge
+            between[y, x] = fellows <= MOST_FELLOWS[1]
 
 
 @kernel
@@ -131,23 +106,13 @@ def _find_rims(values, least_edge, first, last, rim):
 
 
 @kernel
-def _mark_around(marked, around_px, first, last, found):
-    """Rows [first, last): pixels within around_px of a marked one, each way."""
-    height, width = marked.shape
-    for y in range(max(first - around_px, 0), min(last + around_px, height)):
-        for x in range(width):
-            if marked[y, x]:
-                rows = slice(max(y - around_px, first), min(y + around_px + 1, last))
-                found[rows, max(x - around_px, 0) : x + around_px + 1] = True
-
-
-@kernel
-def _choose_sides(colors, values, rim, unsure, least_edge, first, last, settled):
-    """Rows [first, last): pixels of unsure rims that look like the other side get its disparity."""
+def _choose_sides(colors, values, rim, least_edge, first, last, settled):
+    """Rows [first, last): pixels of rims that look like the other side get its disparity; how many got the front's."""
     height, width = values.shape
+    claimed = 0
     for y in range(first, last):
         for x in range(width):
-            if not (rim[y, x] and unsure[y, x]):
+            if not rim[y, x]:
                 continue
             low, high = np.inf, -np.inf
             for v in range(max(y - SIDES_PX, 0), min(y + SIDES_PX + 1, height)):
@@ -174,3 +139,21 @@ def _choose_sides(colors, values, rim, unsure, least_edge, first, last, settled)
                     settled[y, x] = low + back_sum / back
             elif front > MAJORITY * back:
                 settled[y, x] = low + front_sum / front
+                claimed += 1
+    return claimed
+
+
+@kernel
+def _keep_touching(values, chosen, least_edge, settled, first, last):
+    """Rows [first, last): pixels that changed sides, from values to chosen, and touch what is there are settled so."""
+    height, width = values.shape
+    for y in range(first, last):
+        for x in range(width):
+            if chosen[y, x] == values[y, x]:
+                continue
+            touched = -1
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    touched += abs(chosen[v, u] - chosen[y, x]) <= least_edge
+            if touched >= LEAST_TOUCHED:
+                settled[y, x] = chosen[y, x]
