@@ -71,7 +71,11 @@ def refine(
         return values
     least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
     values = _sharpen(colors, values, least_edge, softness, should_stop)
-    return settle_rims(colors, values, least_edge, should_stop) if least_edge > 0 else values
+    if not least_edge > 0:
+        return values
+    settled = settle_rims(colors, values, least_edge, should_stop)
+    # Rims, too, go so far only.
+    return settled if strength == 1 else values + np.float32(strength) * (settled - values)
 
 
 def _sharpen(

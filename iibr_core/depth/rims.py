@@ -33,12 +33,20 @@ MAJORITY = 5.0
 LEAST_TOUCHED = 3
 """... and so many of its eight neighbours are there, too: lone pixels would fly about as crumbs."""
 TOUCH_ROUNDS = 3
+PLATEAU_SHARE = 0.15
+"""A pixel clearly lies between two surfaces if each changes by at most this share of their distance ..."""
+PLATEAU_PX = 2
+"""... over so many pixels."""
+MIXED = (0.1, 0.8)
+"""How far up from the lower to the higher of both it lies; above that, a round thing turns away from the view."""
+MIXED_EDGES = 5.0
+"""Times the least edge: what lies between nearer surfaces may be a slope."""
 LEAST_MIXED = 0.025
-"""A map of whose rims a smaller share lies between two surfaces was not measured, and not resampled ..."""
-LEAST_ASTRAY = 0.005
-"""... and if colours claim a smaller share of its rims for the front, it is exact: nothing is changed."""
+"""A map of whose rims a smaller share is clearly between two surfaces is exact: nothing is changed."""
+MOST_CLEAR_FELLOWS = 4
+"""What is clearly between has at most so many neighbours on its own disparity."""
 MOST_FELLOWS = (2, 4)
-"""A pixel with more neighbours on its own disparity, within one pixel or two each way, lies on a surface."""
+"""So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
 
 
 def settle_rims(
@@ -52,28 +60,49 @@ def settle_rims(
     """
     colors, size = np.ascontiguousarray(photo, np.float32), image_size(values)
     between, rim = np.zeros(values.shape, np.bool_), np.zeros(values.shape, np.bool_)
-    in_bands(lambda first, last: _find_between(values, least_edge, first, last, between), size, should_stop)
+    clear = in_bands(lambda first, last: _find_between(values, least_edge, first, last, between), size, should_stop)
     in_bands(lambda first, last: _find_rims(values, least_edge, first, last, rim), size, should_stop)
-    rims = np.count_nonzero(rim)
-    is_mixed = np.count_nonzero(between) > LEAST_MIXED * rims
-    if is_mixed:
-        values = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
-    settled = values.copy()
-    astray = in_bands(
-        lambda first, last: _choose_sides(colors, values, rim, least_edge, first, last, settled), size, should_stop
-    )
-    if not is_mixed and sum(astray) <= LEAST_ASTRAY * rims:
+    if sum(clear) <= LEAST_MIXED * np.count_nonzero(rim):
         return values
+    whole = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
+    settled = whole.copy()
+    in_bands(lambda first, last: _choose_sides(colors, whole, rim, least_edge, first, last, settled), size, should_stop)
     for _ in range(TOUCH_ROUNDS):
-        chosen, settled = settled, values.copy()
-        in_bands(partial(_keep_touching, values, chosen, least_edge, settled), size, should_stop)
+        chosen, settled = settled, whole.copy()
+        in_bands(partial(_keep_touching, whole, chosen, least_edge, settled), size, should_stop)
     return settled
 
 
 @kernel
+def _is_between(values, y, x, right, down, least_edge):
+    """Whether, along this direction, a lower plateau ends just before a pixel and a higher one begins just after it."""
+    here = values[y, x]
+    # One of the sides may begin a pixel later: rims are up to two pixels wide.
+    for after in range(1, 3):
+        for before in range(1, 4 - after):
+            a, b = values[y + after * down, x + after * right], values[y - before * down, x - before * right]
+            high, low = max(a, b), min(a, b)
+            if (
+                high - low > MIXED_EDGES * least_edge
+                and high - here > least_edge
+                and here - low > least_edge
+                and MIXED[0] * (high - low) <= here - low <= MIXED[1] * (high - low)
+            ):
+                flat, is_flat = PLATEAU_SHARE * (high - low), True
+                for beyond in range(1, PLATEAU_PX + 1):
+                    far_a = values[y + (after + beyond) * down, x + (after + beyond) * right]
+                    far_b = values[y - (before + beyond) * down, x - (before + beyond) * right]
+                    is_flat &= abs(far_a - a) <= flat and abs(far_b - b) <= flat
+                if is_flat:
+                    return True
+    return False
+
+
+@kernel
 def _find_between(values, least_edge, first, last, between):
-    """Rows [first, last): pixels of no surface, between two."""
+    """Rows [first, last): pixels of no surface, between two; how many are so clearly."""
     height, width = values.shape
+    margin, clear = 2 + PLATEAU_PX, 0
     for y in range(first, last):
         for x in range(width):
             # Neighbours above and below it, and few on its own disparity: most pixels end here.
@@ -83,7 +112,18 @@ def _find_between(values, least_edge, first, last, between):
                     step = values[v, u] - values[y, x]
                     higher, lower = higher or step > least_edge, lower or step < -least_edge
                     fellows += abs(step) <= least_edge
-            if not (higher and lower and fellows <= MOST_FELLOWS[0]):
+            if not (higher and lower and fellows <= MOST_CLEAR_FELLOWS):
+                continue
+            if margin <= y < height - margin and margin <= x < width - margin:
+                is_clear = (
+                    _is_between(values, y, x, 1, 0, least_edge)
+                    or _is_between(values, y, x, 0, 1, least_edge)
+                    or _is_between(values, y, x, 1, 1, least_edge)
+                    or _is_between(values, y, x, 1, -1, least_edge)
+                )
+                clear += is_clear
+                between[y, x] = is_clear
+            if fellows > MOST_FELLOWS[0] or between[y, x]:
                 continue
             # Things of two pixels and more, before one surface and behind another, have fellows farther off.
             fellows = -1
@@ -91,6 +131,7 @@ def _find_between(values, least_edge, first, last, between):
                 for u in range(max(x - 2, 0), min(x + 3, width)):
                     fellows += abs(values[v, u] - values[y, x]) <= least_edge
             between[y, x] = fellows <= MOST_FELLOWS[1]
+    return clear
 
 
 @kernel
@@ -107,9 +148,8 @@ def _find_rims(values, least_edge, first, last, rim):
 
 @kernel
 def _choose_sides(colors, values, rim, least_edge, first, last, settled):
-    """Rows [first, last): pixels of rims that look like the other side get its disparity; how many got the front's."""
+    """Rows [first, last): pixels of rims that look like the other side get its disparity."""
     height, width = values.shape
-    claimed = 0
     for y in range(first, last):
         for x in range(width):
             if not rim[y, x]:
@@ -139,8 +179,6 @@ def _choose_sides(colors, values, rim, least_edge, first, last, settled):
                     settled[y, x] = low + back_sum / back
             elif front > MAJORITY * back:
                 settled[y, x] = low + front_sum / front
-                claimed += 1
-    return claimed
 
 
 @kernel

@@ -212,7 +212,7 @@ def _linear_rows(encoded, gain, exposure, first, last, light):
             )
             factor = exposure
             if gain > 0:
-                clipped = min(max(20.0 * math.sqrt(max(r, g, b)) - 19.0, 0.0), 1.0)
+                clipped = min(max(20.0 * math.sqrt(max(min(r, g, b), 0.0)) - 19.0, 0.0), 1.0)
                 factor *= 1.0 + gain * clipped * clipped
             light[y, x, 0], light[y, x, 1], light[y, x, 2] = factor * r, factor * g, factor * b
 

@@ -19,7 +19,8 @@ float focus_at(vec2 uv) {
 vec4 linear_from_stored(vec4 stored) {
     vec4 light = vec4(stored.rgb * stored.rgb, stored.a);
 #ifdef HIGHLIGHTS
-    float clipped = clamp(20.0 * max(max(stored.r, stored.g), stored.b) - 19.0, 0.0, 1.0);
+    // Only where all channels clip: one alone is a saturated colour.
+    float clipped = clamp(20.0 * min(min(stored.r, stored.g), stored.b) - 19.0, 0.0, 1.0);
     light.rgb *= 1.0 + highlight_gain * clipped * clipped;
 #endif
     return light;

@@ -178,6 +178,20 @@ def test_highlights_count_for_more(renderer: Renderer, recovery: float) -> None:
     assert light[3, 3] == pytest.approx(dark, rel=0.05), "what is not clipped stays"
 
 
+def test_saturated_colours_are_no_highlights(renderer: Renderer) -> None:
+    """A red wall whose red clips here and there: it shows the same with highlights recovered as without."""
+    grid, size = GridShape(3, 3), (40, 30)
+    renderer.open_field(grid, *size, hdr=False, with_disparity=True)
+    colors = np.full((30, 40, 3), (250, 90, 10), np.uint8)
+    colors[::3, ::4, 0] = 255
+    for row, column in np.ndindex(*grid):
+        renderer.upload_view(row, column, colors, np.zeros((30, 40), np.float32))
+    plain, recovered = (
+        picture(renderer, Optics(focus_disparity=4.0, aperture_diameter=3.0, highlight_recovery=r)) for r in (0.0, 1.0)
+    )
+    assert np.abs(plain.astype(int) - recovered).max() <= 2
+
+
 def test_highlight_recovery_leaves_a_pinhole_alone(renderer: Renderer) -> None:
     SCENE.fill(renderer, GRID)
     plain = picture(renderer, Optics(ViewOffset(0.3, 0.2)))
