@@ -13,7 +13,8 @@ from iibr_core.types import InputError
 
 LIGHT_FIELD = ("light_field:write_light_field",)
 MAP = (".pfm", ".exr", ".npy", ".png")
-PICTURE = (".png",)
+PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
+DATA = (".png",)
 MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
 STACK_FILES = r"(focus|aperture)_\d+\.png|all_in_focus\.png|disparity\.pfm"
 CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
@@ -49,6 +50,9 @@ EXPORTS = {
         "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device"),
         path="quilt:quilt_path",
     ),
+    "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside"),
+    "rgbd-left": ExportKind("Picture with depth at the left", PICTURE, "rgbd:write_before"),
+    "rgbd-below": ExportKind("Picture with depth below", PICTURE, "rgbd:write_below"),
     "sbs": ExportKind("Side by side", PICTURE, "stereo:write_side_by_side", EYES, "stereo:full_path"),
     "half-sbs": ExportKind(
         "Side by side, half width", PICTURE, "stereo:write_half_side_by_side", EYES, "stereo:half_path"
@@ -68,7 +72,7 @@ EXPORTS = {
         "Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES
     ),
     "aperture-sweep-exr": ExportKind("Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK),
-    "epi": ExportKind("Epipolar plane image", PICTURE, "maps:write_epi", ("row",)),
+    "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",)),
     "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity"),
     "depth": ExportKind("Depth map", MAP, "maps:write_depth", path="maps:depth_path"),
     "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians"),

@@ -24,7 +24,7 @@ def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
 
 def write_quilt(path: Path, source: ExportSource, options: ExportOptions) -> None:
     """Raises InputError where it cannot be written, Cancelled once the export should stop."""
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.picture_writers import write_picture
 
     quilt = _quilt_of(source.scene, options)
     pictures = side_pictures(source.scene, source.optics, quilt.views)
@@ -32,7 +32,7 @@ def write_quilt(path: Path, source: ExportSource, options: ExportOptions) -> Non
     size = fitted(pictures[0].aspect, frame, quilt.aspect)
     drawn = (source.draw(picture.optics, size, picture.part) for picture in pictures)
     tiles = (_framed(pixels, quilt) for pixels in source.watched(drawn, quilt.views, "drawing views"))
-    write_image(path, lay_out(quilt, tiles))
+    write_picture(path, lay_out(quilt, tiles))
 
 
 def _quilt_of(scene: Scene, options: ExportOptions) -> Quilt:

@@ -78,6 +78,6 @@ def write_anaglyph(path: Path, source: ExportSource, options: ExportOptions) -> 
 
 
 def _write(path: Path, pixels: NDArray[Any]) -> None:
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.picture_writers import write_picture
 
-    write_image(path, pixels)
+    write_picture(path, pixels)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.viewer.app.exports.conftest import exported
@@ -92,6 +93,13 @@ def test_stereo_pictures(source: ExportSource, tmp_path: Path) -> None:
     half = exported(source, "half-sbs", tmp_path / "a_LRF_Half_SBS.png")
     assert (half.name, pixels(half).shape) == ("a_LRF_Half_SBS.png", (64, 96, 3))
     assert np.abs(pixels(half)[:, :48] - source.draw(Optics(eye=ViewOffset(0.0, -1.0)), ScreenSize(48, 64))).max() <= 1
+
+
+@pytest.mark.parametrize("ending", [".jpg", ".webp", ".tif"])
+def test_pictures_are_of_the_kind_that_their_name_says(source: ExportSource, tmp_path: Path, ending: str) -> None:
+    png, other = (exported(source, "anaglyph", tmp_path / f"a{name}") for name in (".png", ending))
+    assert other.suffix == ending
+    assert np.abs(read_photo(png).pixels - read_photo(other).pixels).mean() < 0.02
 
 
 def test_eyes_stand_as_far_apart_as_asked(source: ExportSource, tmp_path: Path) -> None:

@@ -167,6 +167,23 @@ def test_maps(source: ExportSource, tmp_path: Path) -> None:
     assert np.corrcoef(stored.ravel(), depth.ravel())[0, 1] > 0.9999
 
 
+@pytest.mark.parametrize(
+    ("kind", "picture", "depth"),
+    [
+        ("rgbd", np.s_[:, :96], np.s_[:, 96:]),
+        ("rgbd-left", np.s_[:, 96:], np.s_[:, :96]),
+        ("rgbd-below", np.s_[:64], np.s_[64:]),
+    ],
+)
+def test_a_picture_with_its_depth_beside_it(
+    source: ExportSource, tmp_path: Path, kind: str, picture: tuple[slice, ...], depth: tuple[slice, ...]
+) -> None:
+    pixels = np.asarray(Image.open(exported(source, kind, tmp_path / "a.png")))
+    assert np.abs(pixels[picture].astype(int) - source.draw(Optics(), ScreenSize(96, 64))).max() <= 1
+    assert (pixels[depth].min(), pixels[depth].max()) == (0, 255)
+    assert pixels[depth][32, 48, 0] == 255, "the square in the middle is near"
+
+
 def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
     epi = np.asarray(Image.open(exported(source, "epi", tmp_path / "a.png", row=32))).astype(int)
     assert epi.shape == (3, 96, 3)

@@ -1,0 +1,40 @@
+"""A picture with its depth beside it, bright is near: what light-field displays and their players make views of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.color import bytes_from_encoded
+from iibr_core.types import InputError
+from viewer.app.exports.cameras import colors_of
+from viewer.app.exports.source import ExportSource
+from viewer.model.state.exporting import ExportOptions
+
+
+def write_beside(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Depth at the right; the others likewise: raises InputError where nothing tells depth or it cannot be written."""
+    _write(path, source, axis=1, is_first=False)
+
+
+def write_before(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Depth at the left."""
+    _write(path, source, axis=1, is_first=True)
+
+
+def write_below(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Depth below."""
+    _write(path, source, axis=0, is_first=False)
+
+
+def _write(path: Path, source: ExportSource, axis: int, is_first: bool) -> None:
+    from iibr_core.formats.images.picture_writers import write_picture
+
+    view = source.centre_view()
+    if view.disparity is None:
+        raise InputError(f"{source.scene.name}: has no depth")
+    far, near = float(view.disparity.min()), float(view.disparity.max())
+    nearness = (view.disparity - far) / ((near - far) or 1.0)
+    pictures = [colors_of(view), np.repeat(bytes_from_encoded(nearness)[..., None], 3, axis=2)]
+    write_picture(path, np.concatenate(pictures[::-1] if is_first else pictures, axis=axis))
