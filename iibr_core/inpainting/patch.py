@@ -1,8 +1,9 @@
 """Gives what `background` continues into the holes the texture of what lies around, behind, never of what is in front.
 
 PatchMatch (Barnes et al., SIGGRAPH 2009) finds for the patch around every hole pixel the most similar one that the view
-shows whole; a pixel becomes the mean of what the patches over it say. Of what that changes the fine part is kept, and
-little of the coarse one: texture can be told from what lies around, the place of large things cannot.
+shows whole; a pixel takes the middle of its own: a mean of all patches over it would be as smooth as what it replaces.
+Of what that changes only the fine part is kept: texture can be told from what lies around, the place of large things
+cannot.
 """
 
 from __future__ import annotations
@@ -30,10 +31,8 @@ IN_FRONT_PX = 2.0
 """What is nearer than the hole's surface by more than this is in front of it."""
 HOLE_WEIGHT = np.float32(0.5)
 """Of pixels that were filled, when patches are compared; known ones count 1."""
-LEAST_COST = 1e-4
-"""Mean square difference of patches that are as good as the same."""
-COARSE_SHARE, FINE_SHARE = 0.3, 1.0
-"""How much is kept of what patches change, averaged over a patch, and of the rest."""
+FINE_SHARE = 0.85
+"""So much is kept of how what patches change differs from its mean over a patch."""
 MOST_PIECE_PIXELS = 1 << 12
 """Pixels between two questions whether to stop."""
 
@@ -71,7 +70,7 @@ def fill_patches(
         in_pieces(search, parts, should_stop, threads)
     change, tempered = np.empty((len(targets), 3), np.float32), np.empty((len(targets), 3), np.float32)
     steps: tuple[Callable[[tuple[int, int]], None], ...] = (
-        lambda part: _vote(colors, hole, number, targets, match, cost, *part, change),
+        lambda part: _change(colors, hole, targets, match, *part, change),
         lambda part: _temper(hole, number, targets, change, *part, tempered),
         lambda part: _apply(hole, targets, tempered, *part, colors),
     )
@@ -211,35 +210,19 @@ def _search(
 
 
 @kernel
-def _vote(colors, hole, number, targets, match, cost, first, last, change):
-    """How the mean of what the patches over each hole pixel say, weighted by 1 / their difference, differs from it."""
-    height, width = hole.shape
+def _change(colors, hole, targets, match, first, last, change):
+    """How the middle of the patch that was found differs from each hole pixel, (N, 3)."""
+    width = hole.shape[1]
     for i in range(first, last):
         y, x = targets[i] // width, targets[i] % width
-        change[i, 0], change[i, 1], change[i, 2] = 0.0, 0.0, 0.0
-        if not hole[y, x]:
-            continue
-        total = r = g = b = 0.0
-        for j in range(max(-RADIUS_PX, -y), min(RADIUS_PX + 1, height - y)):
-            for k in range(max(-RADIUS_PX, -x), min(RADIUS_PX + 1, width - x)):
-                over = number[y + j, x + k]
-                if over < 0 or match[over, 0] < 0:
-                    continue
-                v, u = match[over, 0] - j, match[over, 1] - k
-                weight = 1.0 / (cost[over] + LEAST_COST)
-                total += weight
-                r += weight * colors[v, u, 0]
-                g += weight * colors[v, u, 1]
-                b += weight * colors[v, u, 2]
-        if total > 0:
-            change[i, 0] = r / total - colors[y, x, 0]
-            change[i, 1] = g / total - colors[y, x, 1]
-            change[i, 2] = b / total - colors[y, x, 2]
+        for c in range(3):
+            is_found = hole[y, x] and match[i, 0] >= 0
+            change[i, c] = colors[match[i, 0], match[i, 1], c] - colors[y, x, c] if is_found else np.float32(0.0)
 
 
 @kernel
 def _temper(hole, number, targets, change, first, last, tempered):
-    """COARSE_SHARE of a change's mean over a patch's hole pixels and FINE_SHARE of the rest, all (N, 3)."""
+    """FINE_SHARE of how a change differs from its mean over a patch's hole pixels, all (N, 3)."""
     height, width = hole.shape
     coarse = np.empty(3)
     for i in range(first, last):
@@ -255,7 +238,7 @@ def _temper(hole, number, targets, change, first, last, tempered):
                     for c in range(3):
                         coarse[c] += change[number[v, u], c]
         for c in range(3):
-            tempered[i, c] = FINE_SHARE * change[i, c] + (COARSE_SHARE - FINE_SHARE) * coarse[c] / count
+            tempered[i, c] = FINE_SHARE * (change[i, c] - coarse[c] / count)
 
 
 @kernel
