@@ -453,7 +453,7 @@ READS_OR_TELLS = {
     "formats.maps.reader": "read_map read_map_header MapHeader",
     "formats.images.oiio_writer": "write_image_file encode_image_file",
     "formats.images.icc_profile": "icc_profile",
-    "formats.images.metadata": "PictureMetadata read_metadata exif_for xmp_for text_in_xmp unpack_text",
+    "formats.images.metadata": "PictureMetadata read_metadata camera_facts exif_for xmp_for text_in_xmp unpack_text",
     "formats.images.picture_kinds": "PictureKind PictureFormat picture_kind require_picture_format is_float",
     "formats.images.picture_writers": "write_png write_exr write_jpeg write_webp write_avif write_tiff",
     "formats.images.xmp_packet": "value_in parse_packet",

@@ -40,6 +40,7 @@ from viewer.model.state.exporting import CancelExportTask, ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
 from viewer.model.state.optics import ApertureMask, SetApertureShape
+from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
 from viewer.model.state.saving import CancelSaveTask, WriteSidecarTask
 
 
@@ -100,6 +101,8 @@ class SideEffects:
                 self._submit(partial(_read_mask, self._masks[-1]))
             case ReadTruthTask(path):
                 self._submit(partial(read_truth, path))
+            case ReadFactsTask(path):
+                self._submit(partial(_read_facts, path))
             case ListFolderTask(path):
                 self._submit(partial(list_photos, path))
             case SaveTask(what="map"):
@@ -176,8 +179,8 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
     match result.value:
         case ApertureMask() as mask:
             return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
-        case FolderListed() as listed:
-            return [listed]
+        case FolderListed() | FactsRead() as found:
+            return [found]
         case GroundTruth() as truth:
             return [TruthRead(truth)]
         case Path() as sidecar:
@@ -209,6 +212,13 @@ def read_truth(path: str) -> GroundTruth:
     field = open_light_field(Path(os.path.expanduser(path)))
     grid, (height, width) = grid_of(field), common_size(field.views)
     return GroundTruth(path, field.name, grid, width, height)
+
+
+def _read_facts(path: str) -> FactsRead:
+    """Nothing where the file is gone by now."""
+    from iibr_core.formats.images.metadata import camera_facts, read_metadata
+
+    return FactsRead(path, camera_facts(read_metadata(Path(path))))
 
 
 def _read_mask(path: Path) -> ApertureMask:

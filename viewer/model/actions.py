@@ -27,6 +27,7 @@ from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.optics import LensAction
+from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
 
 # The viewpoint
@@ -320,6 +321,7 @@ Action = (
     | HidePanel
     | ShowBefore
     | SetDepthStrength
+    | FactsRead
     | TakeSettings
     | RestoreSession
     | EndGesture

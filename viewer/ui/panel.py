@@ -232,7 +232,7 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout, pa
         "light": lambda: light_section(state, layout),
         "depth": lambda: depth_section(state, scene, layout),
         "inspect": lambda: inspect_section(state, scene, layout),
-        "scene": lambda: [*scene_section(scene, layout), *_recent_elsewhere(state, layout)],
+        "scene": lambda: [*scene_section(scene, state.facts, layout), *_recent_elsewhere(state, layout)],
     }
     is_open = section in state.preferences.open_sections
     toggled: list[Action] = [ToggleSection(section)] if heading(SECTION_WORDS[section], is_open, layout) else []

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import math
 import struct
 import warnings
 import zlib
@@ -226,3 +227,54 @@ def unpack_text(text: str, path: Path) -> str:
         return packed.decompress(base64.b64decode(text[len(PACKED) :]), MOST_UNPACKED_BYTES).decode()
     except (ValueError, binascii.Error, zlib.error) as error:
         raise InputError(f"{path}: its settings are damaged; set them by hand") from error
+
+
+def camera_facts(metadata: PictureMetadata) -> tuple[tuple[str, str], ...]:
+    """What a photo's Exif says about how it was taken, for people: (what, value); without what it does not say."""
+    from PIL import Image
+
+    exif = Image.Exif()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            exif.load(metadata.exif)
+            camera = exif.get_ifd(EXIF_IFD)
+    except EXIF_ERRORS:
+        return ()
+    facts = (
+        ("Camera", " ".join(dict.fromkeys(f"{_words(exif.get(0x010F))} {_words(exif.get(0x0110))}".split()))),
+        ("Lens", _words(camera.get(0xA434))),
+        ("Exposure", ", ".join(filter(None, _exposure(camera)))),
+        ("Taken", _words(camera.get(0x9003))[:16].replace(":", "-", 2)),
+    )
+    return tuple((what, value) for what, value in facts if value)
+
+
+def _exposure(camera: Mapping[int, Any]) -> tuple[str, ...]:
+    """F-number, time, sensitivity and focal length, each "" where it is not known."""
+    number, seconds, iso, focal_mm, equivalent_mm = (
+        _positive(camera.get(tag)) for tag in (0x829D, 0x829A, 0x8827, 0x920A, 0xA405)
+    )
+    time = f"1/{1 / seconds:.0f} s" if 0 < seconds < 0.4 else f"{seconds:g} s"
+    return (
+        f"f/{number:g}" if number else "",
+        time if seconds else "",
+        f"ISO {iso:g}" if iso else "",
+        f"{equivalent_mm:g} mm (35 mm)" if equivalent_mm else f"{focal_mm:g} mm" if focal_mm else "",
+    )
+
+
+def _positive(value: Any) -> float:
+    """A number of Exif; 0 where it is none, or means nothing."""
+    try:
+        number = float(value[0] if isinstance(value, tuple) else value)
+    except (*EXIF_ERRORS,):
+        return 0.0
+    return number if math.isfinite(number) and 0 < number < 1e9 else 0.0
+
+
+def _words(value: Any) -> str:
+    """A text of Exif in one short line."""
+    return (
+        " ".join("".join(c if c.isprintable() else " " for c in value).split())[:60] if isinstance(value, str) else ""
+    )

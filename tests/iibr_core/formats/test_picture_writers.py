@@ -16,7 +16,14 @@ from PIL import Image, ImageCms, PngImagePlugin
 from iibr_core.color import convert, linear_from_srgb
 from iibr_core.formats.images.color_profile import color_profile
 from iibr_core.formats.images.icc_profile import icc_profile
-from iibr_core.formats.images.metadata import PictureMetadata, exif_for, read_metadata, text_in_xmp, xmp_for
+from iibr_core.formats.images.metadata import (
+    PictureMetadata,
+    camera_facts,
+    exif_for,
+    read_metadata,
+    text_in_xmp,
+    xmp_for,
+)
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat
 from iibr_core.formats.images.picture_writers import write_picture
@@ -278,3 +285,28 @@ def test_nothing_is_said_of_what_is_not_there(tmp_path):
     assert read_metadata(tmp_path / "text.jpg").xmp == b""
     assert xmp_for(b"", {}) == b""
     assert text_in_xmp(tmp_path / "text.jpg", "iibr:settings") == ""
+
+
+def test_what_people_ask_of_a_photo(tmp_path):
+    exif = camera_exif()
+    exif.update({MAKE: "Apple", 0x0110: "Apple iPhone 15"})
+    exif.get_ifd(EXIF).update({0x829D: 1.78, 0x8827: 100, 0x9003: "2024:05:06 07:08:09", 0xA434: "wide\nlens"})
+    Image.fromarray(patches()).save(tmp_path / "a.jpg", exif=exif)
+    assert camera_facts(read_metadata(tmp_path / "a.jpg")) == (
+        ("Camera", "Apple iPhone 15"),
+        ("Lens", "wide lens"),
+        ("Exposure", "f/1.78, 1/125 s, ISO 100, 26 mm (35 mm)"),
+        ("Taken", "2024-05-06 07:08"),
+    )
+    assert camera_facts(PictureMetadata()) == ()
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_facts_of_damaged_exif_are_few_words(seed):
+    rng = np.random.default_rng(seed)
+    exif = bytearray(camera_exif().tobytes())
+    for at in rng.integers(6, len(exif), 8):
+        exif[at] = rng.integers(0, 256)
+    for what, value in camera_facts(PictureMetadata(bytes(exif))):
+        assert "\n" not in what + value
+        assert len(value) < 130

@@ -262,3 +262,15 @@ def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
     from viewer.model.state.app_state import PathPrompt
 
     assert reduce(AppState(), AskForPath("mask")).prompt == PathPrompt("mask")
+
+
+def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: Path) -> None:
+    from PIL import Image
+
+    exif = Image.Exif()
+    exif[0x010F] = "Maker"
+    exif.get_ifd(0x8769).update({0x829A: 1 / 60, 0x8827: 200})
+    Image.fromarray(np.full((48, 64, 3), 90, np.uint8)).save(tmp_path / "a.jpg", exif=exif)
+    driver = open_window(tmp_path / "a.jpg", grid=GridShape(1, 1))
+    driver.until(lambda app: app.state.facts.path == str(tmp_path / "a.jpg"))
+    assert driver.app.state.facts.facts == (("Camera", "Maker"), ("Exposure", "1/60 s, ISO 200"))

@@ -84,6 +84,7 @@ from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
+from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
@@ -133,6 +134,8 @@ def reduce(state: AppState, action: Action) -> AppState:
 
 def _file_or_prompt(state: AppState, action: Action) -> AppState:
     match action:
+        case FactsRead() as facts:
+            return replace(state, facts=facts)
         case FolderListed(path, photos):
             return list_folder(state, path, photos)
         case StepPhoto(steps):

@@ -15,6 +15,7 @@ from viewer.model.state.app_state import AppState, History, Motion, Notice, Prog
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.inspection import of_next_scene
+from viewer.model.state.photo_facts import ReadFactsTask
 from viewer.model.window_words import notice_in_window
 
 RECENT_KEPT = 8
@@ -74,7 +75,8 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
     depth = DepthSettings(scene.source.depth.refine)
     if scene.plan is not None:  # a photo: it may have neighbours
-        opened = replace(opened, tasks=(*opened.tasks, ListFolderTask(str(PurePath(scene.source.path).parent))))
+        beside = ListFolderTask(str(PurePath(scene.source.path).parent)), ReadFactsTask(scene.source.path)
+        opened = replace(opened, tasks=(*opened.tasks, *beside))
     return replace(
         opened,
         notices=notices,

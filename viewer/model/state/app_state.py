@@ -21,6 +21,7 @@ from viewer.model.state.exporting import CancelExportTask, Exporting, ExportProm
 from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.optics import CENTRE, Optics
+from viewer.model.state.photo_facts import NO_FACTS, FactsRead, ReadFactsTask
 from viewer.model.state.saving import CancelSaveTask, Saving, WriteSidecarTask
 
 AS_FOUND = DepthSettings()
@@ -328,6 +329,7 @@ Task = (
     | ReadMaskTask
     | ReadTruthTask
     | ListFolderTask
+    | ReadFactsTask
 )
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
@@ -389,7 +391,8 @@ class AppState:
     scene what is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs:
     whether the system has file dialogs. left_field: None where the open scene was left unfinished, or not at all.
     shown_generation: whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a
-    number. folder: the photos beside the one that is open, None before they are known. is_fullscreen,
+    number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
+    of it, perhaps of the one before. is_fullscreen,
     hides_panel: of the window; shows_before: the photo as it was taken stands in place of the picture.
     """
 
@@ -427,6 +430,7 @@ class AppState:
     shown_generation: int = 0
     given_up: int = 0
     folder: PhotoFolder | None = None
+    facts: FactsRead = NO_FACTS
     is_fullscreen: bool = False
     hides_panel: bool = False
     shows_before: bool = False
