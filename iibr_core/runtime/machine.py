@@ -10,6 +10,8 @@ from pathlib import Path
 
 import psutil
 
+THREADS_VARIABLE = "IIBR_THREADS"
+"""Several processes that share a machine are told their parts by it."""
 CGROUPS, OWN_CGROUPS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 USUAL_SHARE = 4
 """This part of the memory is taken where the user says nothing, ..."""
@@ -20,9 +22,11 @@ MAPPED_BYTES = 600 * 2**20
 
 
 def core_count() -> int:
-    """Cores that this process may use at the same time, 1 at least."""
+    """Cores that this process may use at the same time, 1 at least; THREADS_VARIABLE in the environment lowers it."""
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, math.ceil(min(allowed, cgroup_cores())))
+    told = os.environ.get(THREADS_VARIABLE, "")
+    most = int(told) if told.isascii() and told.isdigit() and len(told) < 10 else math.inf
+    return max(1, math.ceil(min(allowed, cgroup_cores(), most)))
 
 
 def memory_bytes() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +12,6 @@ import typer
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.runtime.extras import require_extra
-from iibr_core.runtime.tiling import never
 from iibr_core.types import InputError, ViewOffset
 from viewer.app.exports.registry import export_path, require_export_place, writer_of
 from viewer.cli.lens_options import LensOptions
@@ -162,7 +162,7 @@ def export(
 
     Example: iibr export photo.png --to quilt --device portrait -o photo.png
     """
-    _require_heeded(context, to)
+    require_kind_heeds(context, to)
     from viewer.model.state.app_state import Source
 
     choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
@@ -201,10 +201,10 @@ def export(
     if to.is_drawn:
         _export_drawn(source, depth_strength, lens, require_place, write)
     else:
-        _export_views(source, depth_strength, not to.layout, require_place, write)
+        _export_undrawn(source, depth_strength, not to.layout, require_place, write)
 
 
-def _require_heeded(context: typer.Context, kind: ExportKind) -> None:
+def require_kind_heeds(context: typer.Context, kind: ExportKind) -> None:
     """Raise InputError for options given that this kind would not heed."""
     given = (given_options(context) & set(ABOUT_EXPORTS)) - set(kind.heeds)
     if given:
@@ -221,7 +221,7 @@ def _export_drawn(
     write: Callable[[ExportSource], None],
 ) -> None:
     """Make the scene's views and draw them."""
-    from viewer.app.exports.source import ExportSource
+    from viewer.app.exports.opening import open_drawn
     from viewer.app.headless import HeadlessViewer
 
     def look_at(scene: Scene) -> None:
@@ -230,33 +230,22 @@ def _export_drawn(
 
     with HeadlessViewer() as viewer:
         with show_progress("reading") as show:
-            viewer.open(source, depth_strength, lambda made: show(made.done, made.total, made.doing), on_ready=look_at)
-        viewer.do(*lens.actions())
-        scene = viewer.state.scene
-        assert scene is not None
+            made = open_drawn(viewer, source, depth_strength, lens.actions(), look_at, show)
         with show_progress("exporting") as show:
-            write(ExportSource(scene, viewer.loaded, viewer.state.optics, viewer.draw, show, never))
+            write(replace(made, report_progress=show))
 
 
-def _export_views(
+def _export_undrawn(
     source: Source,
     depth_strength: float,
     needs_disparity: bool,
     require_place: Callable[[Scene], None],
     write: Callable[[ExportSource], None],
 ) -> None:
-    """Make the scene's views, for what is made of them without a graphics card. needs_disparity: of a light field too,
-    which else is taken as it is.
-    """
-    from viewer.app.exports.source import ExportSource, undrawn
-    from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
-    from viewer.model.state.optics import CENTRE, Optics
+    """Make the scene's views, for what is made of them without a graphics card. needs_disparity: see `open_undrawn`."""
+    from viewer.app.exports.opening import open_undrawn
 
-    request = SceneRequest(0, source, depth_strength, takes_drafts=not needs_disparity)
     with show_progress("reading") as show:
-        results = results_of(request, never, lambda: CENTRE, lambda made: show(made.done, made.total, made.doing))
-        ready = next(results)
-    assert isinstance(ready, SceneReady)
-    require_place(ready.scene)
+        made = open_undrawn(source, depth_strength, needs_disparity, require_place, show)
     with show_progress("exporting") as show:
-        write(ExportSource(ready.scene, ready.loaded, Optics(), undrawn, show, never))
+        write(replace(made, report_progress=show))

@@ -9,6 +9,7 @@ import typer
 
 from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import InputError
+from viewer.cli.batch import batch
 from viewer.cli.demo import demo
 from viewer.cli.depth import depth
 from viewer.cli.evaluate import evaluate
@@ -36,7 +37,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (evaluate, view, generate, screenshot, export, depth, plan, train, demo):
+for command in (evaluate, view, generate, screenshot, export, batch, depth, plan, train, demo):
     app.command()(command)
 app.add_typer(models, name="models")
 

@@ -55,17 +55,20 @@ def print_depth(origin: DepthOrigin | None) -> None:
 
 
 @contextmanager
-def show_progress(doing: str) -> Iterator[Callable[..., None]]:
-    """A bar on stderr while the block runs; call what is yielded with (done, total, what is being done)."""
+def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., None]]:
+    """A bar on stderr while the block runs; call what is yielded with (done, total, what is being done). counts: shows
+    the numbers beside the time left.
+    """
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import MofNCompleteColumn, Progress
 
     console = Console(stderr=True)
     if not console.is_terminal:
         # A bar leaves empty lines there, and an error is to be the only line.
         yield lambda *_: None
         return
-    with Progress(console=console, transient=True) as bar:
+    more = (MofNCompleteColumn(),) if counts else ()
+    with Progress(*Progress.get_default_columns(), *more, console=console, transient=True) as bar:
         task = bar.add_task(doing, total=None)
 
         def show(done: int, total: int, now: str = "") -> None:

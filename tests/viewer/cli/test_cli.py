@@ -41,7 +41,7 @@ def run_apart(
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env={**clean, **environment}, timeout=120)
 
 
-@pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "export", "plan", "train", "demo"])
+@pytest.mark.parametrize("command", ["", "view", "generate", "screenshot", "export", "batch", "plan", "train", "demo"])
 def test_help_has_an_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str) -> None:
     assert run(monkeypatch, *[command] if command else [], "--help") == 0
     text = capsys.readouterr().out

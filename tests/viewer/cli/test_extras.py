@@ -23,6 +23,7 @@ EXTRAS = (
     "flip_evaluator",
     "matplotlib",
     "cv2",
+    "distributed",
 )
 START = f"""
 import sys
@@ -60,9 +61,13 @@ def test_viewing_needs_no_extra(tmp_path: Path, words: tuple[object, ...]) -> No
     [
         (("train", "--steps", 1, "--out", "{dir}/w.safetensors"), "torch; install with: pip install 'iibr[train]'"),
         (("evaluate", "{dir}", "--out", "{dir}/report"), "flip_evaluator; install with: pip install 'iibr[evaluate]'"),
+        (
+            ("batch", "{dir}", "--to", "depth", "-o", "{dir}/out"),
+            "pip install 'iibr[batch]'",
+        ),
         (("plan", "{photo}", "--depth-model", "depth-anything-v2-small"), "pip install 'iibr[depth]'"),
     ],
-    ids=["train", "evaluate", "depth model"],
+    ids=["train", "evaluate", "batch", "depth model"],
 )
 def test_what_needs_one_names_it_in_one_line(tmp_path: Path, words: tuple[object, ...], said: str) -> None:
     photo = write_scene(tmp_path)

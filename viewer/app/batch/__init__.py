@@ -1,0 +1,1 @@
+"""Whole archives: every photo of some folders, exported by worker processes on this machine or others."""

@@ -1,0 +1,102 @@
+"""What a worker is told about one photo, what it answers, and the key that says whether the answer is known already."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+
+from iibr_core.depth.sidecar import map_to_read
+from iibr_core.formats.files import open_binary
+from viewer.app.batch.archive import ArchivePhoto
+from viewer.model.export_kinds import EXPORTS, ExportKind
+from viewer.model.state.app_state import Source
+from viewer.model.state.exporting import USUAL_OPTIONS, ExportOptions
+
+MOST_READ_BYTES = 1 << 20
+"""At a time."""
+
+
+@dataclass(frozen=True)
+class BatchSettings:
+    """How every photo is exported. kind: by name. source: for any photo, its path empty. focus, aperture: as `Optics`
+    has them, None for what the window shows.
+    """
+
+    kind: str
+    source: Source
+    depth_strength: float = 1.0
+    options: ExportOptions = USUAL_OPTIONS
+    focus: float | None = None
+    aperture: float | None = None
+
+    @property
+    def export_kind(self) -> ExportKind:
+        """What is written."""
+        return EXPORTS[self.kind]
+
+    @cached_property
+    def digest(self) -> bytes:
+        """Of all that says what is made of a photo: the settings, and this program's version."""
+        return hashlib.sha256(f"{version('iibr')} {self!r}".encode()).digest()
+
+
+@dataclass(frozen=True)
+class PhotoTask:
+    """One photo, in a form that goes to other machines. target: the file or folder to write, before its kind adds to
+    the name. memory_bytes: a worker's share where the settings name none. key: of `key_of`.
+    """
+
+    photo: str
+    target: str
+    key: str
+    settings: BatchSettings
+    memory_bytes: int | None = None
+
+    @property
+    def source(self) -> Source:
+        """What is opened."""
+        source = self.settings.source
+        if source.depth.memory_bytes is None:
+            source = replace(source, depth=replace(source.depth, memory_bytes=self.memory_bytes))
+        return replace(source, path=self.photo)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """output: what was written, or reason: why it could not be. seconds: that it took."""
+
+    output: str = ""
+    reason: str = ""
+    seconds: float = 0.0
+
+
+def target_name(settings: BatchSettings, photo: ArchivePhoto) -> str:
+    """Where a photo's export goes within the folder of all, before its kind adds to the name."""
+    return photo.name + (settings.export_kind.endings or ("",))[0]
+
+
+def key_of(settings: BatchSettings, photo: ArchivePhoto) -> str:
+    """The same as long as the export would be: of the photo's and its map's content, the settings, the version, and
+    the name that is written.
+
+    Raises InputError where the photo or its map cannot be read.
+    """
+    digest = hashlib.sha256(settings.digest + os.fsencode(photo.name) + b"\0")
+    path = Path(photo.path)
+    map_path = map_to_read(path, settings.source.depth)
+    for read in (path, *(() if map_path is None else (map_path,))):
+        # A map counts by what its name says of it, too.
+        digest.update(os.fsencode(read.name) + b"\0" + _digest_of(read))
+    return digest.hexdigest()
+
+
+def _digest_of(path: Path) -> bytes:
+    digest = hashlib.sha256()
+    with open_binary(path) as file:
+        while part := file.read(MOST_READ_BYTES):
+            digest.update(part)
+    return digest.digest()
