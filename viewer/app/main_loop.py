@@ -138,7 +138,7 @@ class App:
         self._filmstrip = FilmstripView(self._gl, wake)
         self._ahead = PhotosAhead(wake)
         self._worker = SceneWorker(wake)
-        self._side_effects = SideEffects(self.scene_view, wake)
+        self._side_effects = SideEffects(self.scene_view, wake, self.window.clipboard_text)
         self._sessions = SessionStore(kept_in, wake)
         self._kept_in = kept_in
         self._kept_recent = self.state.recent

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.images.picture_kinds import is_float
-from iibr_core.formats.outputs import AlreadyThereError
+from iibr_core.formats.images.picture_kinds import AS_USUAL, is_float
+from iibr_core.formats.outputs import AlreadyThereError, make_folder
 from iibr_core.types import FloatImage, InputError
+from viewer.app.clipboard import copied_path, copy_picture
 from viewer.app.full_picture import DrawnFull, FullPicture, FullPictureWorker, encode_light, is_full, needs_smaller
 from viewer.app.image_export import SavedShot, export_picture, shot_of
 from viewer.app.save_places import picture_path
@@ -39,13 +40,14 @@ TOLD_FROM = 0.05
 @dataclass(frozen=True, eq=False)
 class PictureRequest:
     """A picture as it was asked for. views: what it is drawn from, see `_views_of`. full: where it is drawn from the
-    photo at its own size, and from the views only what that needs of them.
+    photo at its own size, and from the views only what that needs of them. is_copied: the clipboard gets the file.
     """
 
     path: Path
     shot: SavedShot
     views: tuple[int, int]
     full: FullPicture | None = None
+    is_copied: bool = False
 
     @property
     def needs_views(self) -> bool:
@@ -88,6 +90,14 @@ class PictureSaver:
         full = _full_picture(self._scene_view, state, task.size_px)
         self._requests.append(PictureRequest(path, shot, _views_of(self._scene_view), full))
         return [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
+
+    def copy(self, state: AppState) -> list[Action]:
+        """Put the present picture into the clipboard, at the size of the views."""
+        if state.scene is None:
+            return [Notify(Notice("There is no picture to copy yet: open a photo."))]
+        shot = shot_of(state, state.scene.size, AS_USUAL)
+        self._requests.append(PictureRequest(copied_path(), shot, _views_of(self._scene_view), is_copied=True))
+        return []
 
     def cancel(self) -> None:
         """Give up the picture that is being drawn. One that is being written is finished."""
@@ -176,7 +186,12 @@ class PictureSaver:
         self._is_writing = True
 
         def work() -> Path:
-            return export_picture(request.path, image() if callable(image) else image, request.shot)
+            if request.is_copied:
+                make_folder(request.path.parent)
+            path = export_picture(request.path, image() if callable(image) else image, request.shot)
+            if request.is_copied:
+                copy_picture(path)
+            return path
 
         self._writer.submit(FileRequest(0, work))
         return []
@@ -186,8 +201,11 @@ class PictureSaver:
         if result is None and not self._writer.is_lost:
             return []
         path, edits = self._requests[0].path, self._requests[0].shot.settings.depth_edits
+        is_copied = self._requests[0].is_copied
         if isinstance(result, Done):
             self._next()
+            if is_copied:
+                return [Notify(Notice("Copied the picture."))]
             return [Notify(Notice(f"Saved {path}")), EditsSaved(edits)]
         return self._fail(result.message if result is not None else f"{path}: writing it stopped unexpectedly")
 

@@ -13,6 +13,7 @@ from typing import Any
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import FloatImage, InputError
+from viewer.app.clipboard import Pasted, paste_picture
 from viewer.app.dialogs import Dialog, SaveDialog, has_dialogs
 from viewer.app.exporter import Exporter
 from viewer.app.image_export import export_map, settings_of
@@ -23,7 +24,7 @@ from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.background.photo_folder import list_photos
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, ShowPrompt, TaskTaken
+from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, OpenPath, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import (
     AppState,
@@ -35,21 +36,23 @@ from viewer.model.state.app_state import (
     SavePrompt,
     SaveTask,
     Task,
+    source_beside,
 )
 from viewer.model.state.exporting import CancelExportTask, ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
 from viewer.model.state.optics import ApertureMask, SetApertureShape
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
-from viewer.model.state.saving import CancelSaveTask, WriteSidecarTask
+from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, WriteSidecarTask
 
 
 class SideEffects:
     """Takes tasks up in the window's thread and has them carried out beside it; a file dialog is asked each turn."""
 
-    def __init__(self, scene_view: SceneView, wake: Callable[[], None]) -> None:
-        """wake: called, in another thread, when something came of a task."""
+    def __init__(self, scene_view: SceneView, wake: Callable[[], None], clipboard_text: Callable[[], str]) -> None:
+        """wake: called, in another thread, when something came of a task. clipboard_text: what it holds, "" without."""
         self._scene_view = scene_view
+        self._clipboard_text = clipboard_text
         self._saver = PictureSaver(scene_view, wake)
         self._exporter = Exporter(scene_view, wake)
         self._files = FileWorker("iibr-files", wake)
@@ -116,6 +119,10 @@ class SideEffects:
             case WriteSidecarTask() if state.scene is not None and is_scene_open(state):
                 settings = settings_of(state, state.scene.size)
                 self._submit(partial(write_sidecar, Path(state.scene.source.path), settings))
+            case CopyTask():
+                return self._saver.copy(state)
+            case PasteTask():
+                self._submit(partial(paste_picture, self._clipboard_text()))
             case CancelSaveTask():
                 self._saver.cancel()
         return []
@@ -181,6 +188,8 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
         case FolderListed() | FactsRead() as found:
             return [found]
+        case Pasted(path):
+            return [OpenPath(source_beside(state.source, path))]
         case GroundTruth() as truth:
             return [TruthRead(truth)]
         case Path() as sidecar:

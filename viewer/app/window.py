@@ -144,6 +144,13 @@ class Window:
         dropped, self._dropped = self._dropped, []
         return dropped
 
+    def clipboard_text(self) -> str:
+        """The text that the system's clipboard holds, "" without."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that it holds something else, or nothing, is no news
+            text: Any = glfw.get_clipboard_string(self.handle)
+        return (text or b"").decode(errors="replace")
+
     def gamepad(self) -> Gamepad | None:
         """What is held on the first gamepad; None without one."""
         for joystick in range(glfw.JOYSTICK_LAST + 1):

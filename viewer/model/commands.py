@@ -61,7 +61,7 @@ from viewer.model.state.inspection import (
     ShowValues,
 )
 from viewer.model.state.optics import ApplyPreset, ResetOptics
-from viewer.model.state.saving import WriteSidecarTask
+from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 
 FONT_STEP = 1.1
 RECENT_SHOWN = 4
@@ -152,6 +152,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
     Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
     Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
+    Command("Copy the picture", _always(DoTask(CopyTask())), (Chord("c", ctrl=True),)),
+    Command("Paste a picture, or the path of one", _always(DoTask(PasteTask())), (Chord("v", ctrl=True),)),
     Command("Keep these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
     Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),)),
     Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),)),

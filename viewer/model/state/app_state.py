@@ -22,7 +22,7 @@ from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.optics import CENTRE, Optics
 from viewer.model.state.photo_facts import NO_FACTS, FactsRead, ReadFactsTask
-from viewer.model.state.saving import CancelSaveTask, Saving, WriteSidecarTask
+from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, Saving, WriteSidecarTask
 
 AS_FOUND = DepthSettings()
 AS_USUAL = DepthChoice()
@@ -323,6 +323,8 @@ Task = (
     | ChoosePlaceTask
     | SaveTask
     | CancelSaveTask
+    | CopyTask
+    | PasteTask
     | WriteSidecarTask
     | ExportTask
     | CancelExportTask

@@ -26,6 +26,16 @@ class SavingChanged:
 
 
 @dataclass(frozen=True)
+class CopyTask:
+    """Put the picture, at the size of the views, into the system's clipboard."""
+
+
+@dataclass(frozen=True)
+class PasteTask:
+    """Open what the system's clipboard holds: a picture, or the path of one."""
+
+
+@dataclass(frozen=True)
 class WriteSidecarTask:
     """Keep what the photo is left with beside it too, for other machines."""
 

@@ -1,0 +1,119 @@
+"""Copying and pasting with the system's clipboard, in a real window."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.types import GridShape, InputError
+from tests.viewer.conftest import Driver, write_scene
+from viewer.app.clipboard import MOST_KEPT, paste_picture
+from viewer.model.actions import DismissNotices, DoTask
+from viewer.model.state.optics import SetAperture
+from viewer.model.state.saving import CopyTask, PasteTask
+
+Opener = Callable[..., Driver]
+CLIPBOARD = ["xclip", "-selection", "clipboard"]
+
+
+def a_picture() -> bytes:
+    """A PNG file."""
+    data = BytesIO()
+    Image.fromarray(np.random.default_rng(0).integers(0, 256, (30, 40, 3), np.uint8)).save(data, "PNG")
+    return data.getvalue()
+
+
+@pytest.fixture
+def viewer(open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Driver:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    return driver
+
+
+def put(data: bytes, kind: str = "UTF8_STRING") -> None:
+    """Into the clipboard, by another program."""
+    quiet = subprocess.DEVNULL
+    subprocess.run([*CLIPBOARD, "-t", kind, "-i"], input=data, stdout=quiet, stderr=quiet, check=True)
+
+
+def says(driver: Driver, text: str) -> None:
+    driver.until(lambda app: any(text in notice.text for notice in app.state.notices))
+
+
+def test_the_picture_is_copied_as_it_is_drawn_and_pasted_again(viewer: Driver) -> None:
+    viewer.app.do(SetAperture(2.0))
+    viewer.until_idle()
+    viewer.send("key", "ctrl+c")
+    says(viewer, "Copied")
+    data = subprocess.run([*CLIPBOARD, "-t", "image/png", "-o"], capture_output=True, check=True).stdout
+    copied = np.asarray(Image.open(BytesIO(data)).convert("RGB"))
+    assert copied.shape == (64, 96, 3)
+    assert not viewer.app.state.saving
+    viewer.until_idle()
+    viewer.send("key", "ctrl+v")
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name.startswith("pasted-"))
+    assert viewer.app.state.source is not None
+    with Image.open(viewer.app.state.source.path) as pasted:
+        assert np.array_equal(np.asarray(pasted.convert("RGB")), copied)
+
+
+@pytest.mark.parametrize("form", ["{}", "file://{}\r\n"])
+def test_a_path_in_the_clipboard_opens(viewer: Driver, tmp_path: Path, form: str) -> None:
+    other = write_scene(tmp_path, "other", seed=1)
+    put(form.format(other).encode())
+    viewer.send("key", "ctrl+v")
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
+    assert viewer.app.state.source is not None
+    assert viewer.app.state.source.path == str(other)
+
+
+def test_words_are_no_picture(viewer: Driver) -> None:
+    put(b"some words")
+    before = viewer.app.state.source
+    viewer.send("key", "ctrl+v")
+    says(viewer, "neither a picture")
+    assert viewer.app.state.source is before
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "neither"),
+        (b"\x00\xff\xfe" * 9, "neither"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(40), "neither"),
+        (a_picture()[:-40], "cannot be read"),
+    ],
+)
+def test_damaged_pictures_are_one_line(display: str, data: bytes, words: str) -> None:
+    put(data, "image/png")
+    with pytest.raises(InputError, match=words):
+        paste_picture("/no/such/file")
+
+
+def test_what_is_lacking_is_named(viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for task in (CopyTask(), PasteTask()):
+        viewer.app.do(DismissNotices(), DoTask(task))
+        says(viewer, "install xclip")
+
+
+def test_old_pasted_pictures_go(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    put(a_picture(), "image/png")
+    pasted = [paste_picture("").path for _ in range(MOST_KEPT + 2)]
+    assert [Path(path).exists() for path in pasted] == [False] * 2 + [True] * MOST_KEPT
+
+
+def test_a_cache_that_cannot_be_written_is_told(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("in the way")
+    put(a_picture(), "image/png")
+    with pytest.raises(InputError, match="cannot be kept there"):
+        paste_picture("")
