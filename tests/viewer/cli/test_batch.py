@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -61,6 +63,34 @@ def test_an_archive_is_exported_once(archive: Path, tmp_path: Path) -> None:
     again = run_batch(*words)
     assert (again.returncode, again.stdout) == (0, f"{out}: 0 written, 3 there before, 0 failed\n"), again.stderr
     assert before == {name: (out / name).stat().st_mtime_ns for name in written}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_an_interruption_is_one_line_and_the_next_run_goes_on(archive: Path, tmp_path: Path) -> None:
+    photo = (archive / "a.png").read_bytes()
+    shutil.rmtree(archive)
+    archive.mkdir()
+    for number in range(60):
+        (archive / f"{number}.png").write_bytes(photo)
+    out = tmp_path / "out"
+    words = (archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
+    manifest = out / "manifest.jsonl"
+    command = [sys.executable, "-P", "-m", "viewer", "batch", *map(str, words)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as run:
+        while run.poll() is None and not (manifest.is_file() and manifest.stat().st_size):
+            time.sleep(0.01)
+        os.killpg(run.pid, signal.SIGINT)  # as a terminal does, to the workers too
+        _, said = run.communicate(timeout=120)
+    assert (run.returncode, said) == (130, "iibr: interrupted\n")
+
+    finished = {json.loads(line)["name"] for line in manifest.read_text().splitlines()}
+    left = [path for path in sorted(archive.iterdir()) if path.stem not in finished]
+    assert finished
+    assert left
+    for path in left[1:]:
+        path.unlink()
+    again = run_batch(*words)
+    assert again.stdout == f"{out}: 1 written, {len(finished)} there before, 0 failed\n", again.stderr
 
 
 def deadly_or_not(task: PhotoTask) -> Outcome:
