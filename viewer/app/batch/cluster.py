@@ -6,6 +6,7 @@ worker dies, only what it was working at is suspected of it.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import signal
 from collections.abc import Callable, Iterable, Iterator
@@ -77,9 +78,9 @@ def _loop_deaf_to_interruption() -> Iterator[Any]:
 @contextmanager
 def remote_workers(address: str) -> Iterator[Client]:
     """Those of a scheduler; a photo takes one of a worker's threads. Raises InputError where it cannot be reached."""
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    logging.disable(logging.CRITICAL)  # each of Dask's loggers has a level of its own
     try:
-        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+        client = Client(address, timeout=CONNECT_S)
     except (OSError, ValueError) as error:
         raise InputError(f"{address}: no Dask scheduler answers there; start one with: dask scheduler") from error
     with client:
@@ -118,13 +119,18 @@ def outcomes_of(
             task_of[future] = task
             running.add(future)
 
-    submit()
-    while task_of:
-        future = next(running)
-        task = task_of.pop(future)
-        yield task, _outcome(future)
-        del future
+    try:
         submit()
+        while task_of:
+            future = next(running)
+            task = task_of.pop(future)
+            yield task, _outcome(future)
+            del future
+            submit()
+    except (InputError, GeneratorExit):
+        raise
+    except (Exception, asyncio.CancelledError) as error:  # whatever Dask says where nobody answers any more
+        raise _lost(error) from error
 
 
 def _outcome(future: Any) -> Outcome:
@@ -134,4 +140,8 @@ def _outcome(future: Any) -> Outcome:
         return outcome
     if isinstance(error, KilledWorker):
         return Outcome(reason=f"killed its worker, {ALLOWED_FAILURES + 1} times: too little memory, or a fault")
-    raise InputError(f"the workers were lost ({type(error).__name__}); give the same command again, and it goes on")
+    raise _lost(error)
+
+
+def _lost(error: BaseException) -> InputError:
+    return InputError(f"the workers were lost ({type(error).__name__}); give the same command again, and it goes on")
