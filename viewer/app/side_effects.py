@@ -22,6 +22,7 @@ from viewer.app.save_places import inputs_of_scene, map_path
 from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
+from viewer.background.model_download import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.background.photo_folder import list_photos
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, OpenPath, ShowPrompt, TaskTaken
@@ -41,6 +42,14 @@ from viewer.model.state.app_state import (
 from viewer.model.state.exporting import CancelExportTask, ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
+from viewer.model.state.model_download import (
+    CancelGetTask,
+    Downloading,
+    DownloadingChanged,
+    GetModelTask,
+    ListModelsTask,
+    ModelsPrompt,
+)
 from viewer.model.state.optics import ApertureMask, SetApertureShape
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
 from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, WriteSidecarTask
@@ -56,6 +65,7 @@ class SideEffects:
         self._saver = PictureSaver(scene_view, wake)
         self._exporter = Exporter(scene_view, wake)
         self._files = FileWorker("iibr-files", wake)
+        self._downloads = ModelDownloads(wake)
         self._ids = count(1)
         self._under_way: set[int] = set()
         self._masks: list[Path] = []
@@ -73,7 +83,7 @@ class SideEffects:
 
     def run(self, state: AppState) -> list[Action]:
         """Take up the state's tasks and say what came of earlier ones, and of a dialog that was closed."""
-        actions = self._take_results(state) + self._take_answer(state)
+        actions = self._take_results(state) + self._take_downloads(state) + self._take_answer(state)
         for task in state.tasks:
             if isinstance(task, ReadTruthTask) and not is_scene_open(state):
                 continue  # what it must fit is not known yet
@@ -89,6 +99,7 @@ class SideEffects:
         """Finish the files that are being written; give up everything else."""
         self._saver.close()
         self._exporter.close()
+        self._downloads.close()
         self._files.close(cancels=False)
 
     def _begin(self, task: Task, state: AppState) -> list[Action]:
@@ -119,6 +130,13 @@ class SideEffects:
             case WriteSidecarTask() if state.scene is not None and is_scene_open(state):
                 settings = settings_of(state, state.scene.size)
                 self._submit(partial(write_sidecar, Path(state.scene.source.path), settings))
+            case ListModelsTask():
+                self._submit(list_models)
+            case GetModelTask(name):
+                self._downloads.submit(ModelRequest(name))
+            case CancelGetTask():
+                self._downloads.cancel()
+                return [DownloadingChanged(None)]
             case CopyTask():
                 return self._saver.copy(state)
             case PasteTask():
@@ -162,6 +180,14 @@ class SideEffects:
             actions.append(Notify(Notice("Reading or writing a file stopped unexpectedly.", is_error=True)))
         return actions
 
+    def _take_downloads(self, state: AppState) -> list[Action]:
+        actions: list[Action] = []
+        while (result := self._downloads.next_result()) is not None:
+            actions += _actions_from_download(result, state)
+        if self._downloads.is_lost and state.downloading is not None:
+            actions += [DownloadingChanged(None), Notify(Notice("The download stopped unexpectedly.", is_error=True))]
+        return actions
+
     def _take_answer(self, state: AppState) -> list[Action]:
         answer = self._dialog.answer() if self._dialog is not None else None
         if self._dialog is None or answer is None:
@@ -188,6 +214,8 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
         case FolderListed() | FactsRead() as found:
             return [found]
+        case ModelsPrompt() as prompt:
+            return [ShowPrompt(prompt)]
         case Pasted(path):
             return [OpenPath(source_beside(state.source, path))]
         case GroundTruth() as truth:
@@ -197,6 +225,20 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
         case SavedMap(sentence, edits):
             return [Notify(Notice(sentence)), EditsSaved(edits)]
     raise AssertionError(f"nothing comes of {result.value!r}")
+
+
+def _actions_from_download(result: DownloadResult, state: AppState) -> list[Action]:
+    """A model that came is used at once, if it can be."""
+    match result:
+        case Downloading() as downloading:
+            return [DownloadingChanged(downloading)]
+        case Failed(_, message):
+            return [DownloadingChanged(None), Notify(Notice(message, is_error=True))]
+        case Downloaded(model):
+            said: list[Action] = [DownloadingChanged(None), Notify(Notice(f"{model.title} is here. {model.lacks}"))]
+            uses = state.source is not None and not model.lacks
+            return [*said, action_for_path("model", model.name, state)] if uses else said
+    raise AssertionError(f"nothing comes of {result!r}")
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.model_download import DownloadingChanged
 from viewer.model.state.optics import LensAction
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
@@ -340,6 +341,7 @@ Action = (
     | AskToSave
     | AskToExport
     | ExportingChanged
+    | DownloadingChanged
     | SetHover
     | Notify
     | DismissNotice

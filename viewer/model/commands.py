@@ -60,6 +60,7 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
+from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.optics import ApplyPreset, ResetOptics
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 
@@ -175,6 +176,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Invert depth", _invert_depth),
     Command("Reset depth edits", _always(ResetDepth())),
     Command("Open a depth map…", _always(DoTask(ChooseTask("map")))),
+    Command("Get a depth model…", _always(DoTask(ListModelsTask()))),
     Command("Open a depth model…", _always(DoTask(ChooseTask("model")))),
     Command("Save the depth map…", _always(AskToSave("map"))),
     Command("EPI strips", lambda s: ShowEpis(not s.inspection.shows_epis), (Chord("e"),)),

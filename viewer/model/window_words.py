@@ -10,7 +10,7 @@ import re
 from iibr_core.depth.choice import BETTER_WAYS
 from viewer.model.state.app_state import Notice
 
-DEPTH_COMMANDS = ("Open a depth map…", "Open a depth model…")
+DEPTH_COMMANDS = ("Open a depth map…", "Get a depth model…", "Open a depth model…")
 """What helps where depth is guessed or missing, by the names of commands."""
 
 _WORDS = (
@@ -28,7 +28,7 @@ _WORDS = (
     (r"--([a-z]+)-([a-z]+)", r"\1 \2"),
     (r"--([a-z]+)", r"\1"),
 )
-_ASKS_FOR_DEPTH = re.compile(r"--disparity FILE|--depth-model|--depth model|" + re.escape(BETTER_WAYS))
+_ASKS_FOR_DEPTH = re.compile(r"--disparity FILE|--depth-model|iibr models get|--depth model|" + re.escape(BETTER_WAYS))
 
 
 def notice_in_window(text: str, is_error: bool = False) -> Notice:

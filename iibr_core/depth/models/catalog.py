@@ -12,12 +12,14 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.files import is_file, is_folder, reason_of
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.runtime.extras import is_installed
-from iibr_core.types import InputError
+from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
+from iibr_core.types import InputError, ReportProgress
 
 TRANSFORMERS = "transformers"
 INSTALL_HINT = "pip install 'iibr[depth]'"
@@ -190,11 +192,12 @@ def bytes_of(folder: Path) -> int:
     return sum(path.stat().st_size for path in weight_files(folder))
 
 
-def fetch(model: KnownModel) -> Path:
-    """Download a model into the local Hugging Face cache, its bars on stderr: one commit, written down with what came.
-    Returns its folder, named by the commit.
+def fetch(model: KnownModel, report_progress: ReportProgress | None = None, should_stop: ShouldStop = never) -> Path:
+    """Download a model into the local Hugging Face cache: one commit, written down with what came. Returns its folder,
+    named by the commit.
 
-    Raises InputError where that fails: no network, no right to it, no safetensors.
+    report_progress: told bytes that are here and bytes in all; None shows bars on stderr. Raises InputError where it
+    fails: no network, no right to it, no safetensors; Cancelled once should_stop is true: the next one goes on there.
     """
     if not is_installed("huggingface_hub"):
         raise InputError(f"downloading needs the package huggingface_hub: {INSTALL_HINT}")
@@ -206,7 +209,10 @@ def fetch(model: KnownModel) -> Path:
         if not _is_commit(commit):
             raise ValueError(f"{commit} is no commit")
         patterns = ["*.json", "*.safetensors"]
-        folder = Path(snapshot_download(model.repository, revision=commit, allow_patterns=patterns))
+        bars = None if report_progress is None else _counting_bars(report_progress, should_stop)
+        folder = Path(snapshot_download(model.repository, revision=commit, allow_patterns=patterns, tqdm_class=bars))
+    except Cancelled:
+        raise
     except GatedRepoError as error:
         raise InputError(
             f"{model.repository}: its owner asks you to accept a licence on huggingface.co first"
@@ -221,6 +227,25 @@ def fetch(model: KnownModel) -> Path:
         raise InputError(f"{model.repository} publishes no safetensors weights; pickled ones are not taken")
     _write_lock(folder)
     return folder
+
+
+def _counting_bars(report_progress: ReportProgress, should_stop: ShouldStop) -> type[Any]:
+    """Progress bars for the hub library that show nothing: they count, and stop the download."""
+    from tqdm import tqdm  # type: ignore[import-untyped]
+
+    class CountingBar(tqdm):  # type: ignore[misc]
+        def __init__(self, *args: Any, **options: Any) -> None:
+            self._counts_bytes = options.get("unit") == "B"
+            super().__init__(*args, **{**options, "disable": True})
+
+        def update(self, n: float | None = 1) -> None:
+            if should_stop():
+                raise Cancelled
+            self.n += n or 0
+            if self._counts_bytes:
+                report_progress(self.n, self.total or 0, "downloading")
+
+    return CountingBar
 
 
 def require_unchanged(folder: Path) -> None:

@@ -83,6 +83,7 @@ from viewer.model.state.depth_editing import DepthAction, DepthSettings
 from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.model_download import DownloadingChanged
 from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
@@ -177,6 +178,8 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return ask_to_export(state)
         case ExportingChanged(exporting):
             return replace(state, exporting=exporting)
+        case DownloadingChanged(downloading):
+            return replace(state, downloading=downloading)
         case SavingChanged(saving):
             return replace(state, saving=saving)
         case SetHover(hover):

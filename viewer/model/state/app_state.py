@@ -20,6 +20,7 @@ from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.exporting import CancelExportTask, Exporting, ExportPrompt, ExportTask
 from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
 from viewer.model.state.inspection import Inspection
+from viewer.model.state.model_download import CancelGetTask, Downloading, GetModelTask, ListModelsTask, ModelsPrompt
 from viewer.model.state.optics import CENTRE, Optics
 from viewer.model.state.photo_facts import NO_FACTS, FactsRead, ReadFactsTask
 from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, Saving, WriteSidecarTask
@@ -275,7 +276,7 @@ class PalettePrompt:
     selected: int = 0
 
 
-Prompt = PathPrompt | SavePrompt | ExportPrompt | PalettePrompt | Literal["help", "quit"]
+Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "quit"]
 """quit: whether to close although depth edits are saved nowhere."""
 
 
@@ -332,6 +333,9 @@ Task = (
     | ReadTruthTask
     | ListFolderTask
     | ReadFactsTask
+    | ListModelsTask
+    | GetModelTask
+    | CancelGetTask
 )
 """What the state asks of the outside world; the loop does it and says what came of it by an action."""
 
@@ -396,6 +400,7 @@ class AppState:
     number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
     of it, perhaps of the one before. is_fullscreen,
     hides_panel: of the window; shows_before: the photo as it was taken stands in place of the picture.
+    downloading: None without.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -424,6 +429,7 @@ class AppState:
     saved_edits: DepthEdits = UNEDITED
     saving: Saving | None = None
     exporting: Exporting | None = None
+    downloading: Downloading | None = None
     has_chosen_focus: bool = False
     has_chosen_aperture: bool = False
     told_aperture: bool = False

@@ -1,5 +1,5 @@
 """The newest notice, over the lower left of the picture, with buttons that take it away or do what it advises; the one
-before comes up after it. Above it the picture that is being saved.
+before comes up after it. Above it what is being saved, exported, downloaded.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState, Notice
 from viewer.model.state.exporting import CancelExportTask, Exporting
+from viewer.model.state.model_download import CancelGetTask, Downloading
 from viewer.model.state.saving import CancelSaveTask, Saving
 from viewer.ui.style import palette_of
 
@@ -29,7 +30,7 @@ _FLAGS = (
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
     """Build the newest notice; what was pressed comes back as actions."""
-    if not state.notices and state.saving is None and state.exporting is None:
+    if not (state.notices or state.saving or state.exporting or state.downloading):
         return []
     margin = MARGIN * layout.ui_scale
     right, bottom = layout.panel.x - margin, layout.window.height - margin
@@ -49,6 +50,8 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     actions = _saving(state.saving, layout) if state.saving is not None else []
     if state.exporting is not None:
         actions += _exporting(state.exporting, layout)
+    if state.downloading is not None:
+        actions += _downloading(state.downloading, layout)
     if state.notices:
         actions += _notice(state.notices[-1], state)
     imgui.end()
@@ -92,6 +95,17 @@ def _exporting(exporting: Exporting, layout: Layout) -> list[Action]:
     imgui.same_line()
     imgui.align_text_to_frame_padding()
     imgui.text_wrapped(exporting_text(exporting))
+    return actions
+
+
+def _downloading(downloading: Downloading, layout: Layout) -> list[Action]:
+    """A bar, and a button to give it up."""
+    share = downloading.done / max(downloading.total, 1)
+    imgui.progress_bar(share, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+    actions: list[Action] = [DoTask(CancelGetTask())] if imgui.button("Cancel##download") else []
+    imgui.same_line()
+    imgui.align_text_to_frame_padding()
+    imgui.text_wrapped(f"Downloading {downloading.title}: {downloading.done:,} of {downloading.total:,} MB")
     return actions
 
 

@@ -27,6 +27,7 @@ from viewer.model.state.app_state import (
     SaveTask,
 )
 from viewer.model.state.exporting import ANIMATIONS, ExportPrompt, ExportTask
+from viewer.model.state.model_download import GetModelTask, ModelsPrompt
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, gap, label, quiet
 
@@ -94,6 +95,8 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
             return _export(prompt, state, layout)
         case PathPrompt():
             return _path(prompt, state, layout)
+        case ModelsPrompt():
+            return _models(prompt, state, layout)
         case PalettePrompt():
             return _palette(prompt, state, layout)
         case "quit":
@@ -233,6 +236,34 @@ def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
     return _prompt_actions(closed, replace(prompt, path=path), prompt)
 
 
+def _models(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list[Action]:
+    """Depth models to be had, with size and licence: one is chosen, and downloaded unless it is here."""
+    imgui.text("Get a depth model")
+    gap(layout, 2)
+    selected = prompt.selected
+    if imgui.begin_table("models", 3, imgui.TableFlags_.sizing_stretch_prop):
+        for i, model in enumerate(prompt.models):
+            imgui.table_next_column()
+            if imgui.selectable(model.title, i == selected, imgui.SelectableFlags_.span_all_columns)[0]:
+                selected = i
+            imgui.table_next_column()
+            imgui.text_disabled("here" if model.is_here else f"{model.megabytes:,} MB")
+            imgui.table_next_column()
+            imgui.text_disabled(model.licence.partition(" (")[0])
+        imgui.end_table()
+    model = prompt.models[selected]
+    gap(layout, 2)
+    quiet(f"From huggingface.co/{model.repository}, licence {model.licence}. {model.lacks}")
+    word = "Use it" if model.is_here else f"Download {model.megabytes:,} MB"
+    is_enabled = state.downloading is None if not model.is_here else state.source is not None and not model.lacks
+    pressed, closed = _buttons(word, layout, is_enabled)
+    if pressed and model.is_here:
+        return [ShowPrompt(None), action_for_path("model", model.name, state)]
+    if pressed:
+        return [ShowPrompt(None), DoTask(GetModelTask(model.name))]
+    return _prompt_actions(closed, replace(prompt, selected=selected), prompt)
+
+
 def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
     """Commands that match what was typed; the arrow keys select one of them, Enter runs it."""
     _focus_on_appearing()
@@ -307,10 +338,10 @@ def _prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action
     return [ShowPrompt(edited)] if edited != prompt else []
 
 
-def _buttons(word: str, layout: Layout) -> tuple[bool, bool]:
+def _buttons(word: str, layout: Layout, is_enabled: bool = True) -> tuple[bool, bool]:
     """(pressed, cancelled)."""
     gap(layout, 2)
-    pressed = button(word, layout)
+    pressed = button(word, layout, is_enabled=is_enabled)
     imgui.same_line()
     return pressed, button("Cancel", layout)
 
