@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import write_image
-from viewer.app.batch.cluster import ALLOWED_FAILURES, local_workers, outcomes_of
+from viewer.app.batch.cluster import ALLOWED_FAILURES, local_workers, outcomes_of, remote_workers
 from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask
 from viewer.model.state.app_state import Source
 
@@ -132,6 +132,12 @@ def test_photos_wait_outside_until_there_is_a_worker(client: Any) -> None:
     for _ in outcomes_of(client, tasks(), deadly_or_not):
         finished += 1
     assert (taken, finished) == (40, 40)
+
+
+def test_a_scheduler_elsewhere_lends_its_workers(client: Any) -> None:
+    with remote_workers(client.scheduler.address) as other:
+        outcomes = dict(outcomes_of(other, map(task, ("a.png", "b.png", "c.png")), deadly_or_not))
+    assert sorted(outcome.output for outcome in outcomes.values()) == ["a.png", "b.png", "c.png"]
 
 
 def test_a_worker_that_is_killed_costs_no_photo_and_a_deadly_photo_is_named(client: Any) -> None:

@@ -76,24 +76,37 @@ def _loop_deaf_to_interruption() -> Iterator[Any]:
 
 
 @contextmanager
+def _silent() -> Iterator[None]:
+    """What goes wrong is said once, in our words. Each of Dask's loggers has a level of its own."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+@contextmanager
 def remote_workers(address: str) -> Iterator[Client]:
     """Those of a scheduler; a photo takes one of a worker's threads. Raises InputError where it cannot be reached."""
-    logging.disable(logging.CRITICAL)  # each of Dask's loggers has a level of its own
-    try:
-        client = Client(address, timeout=CONNECT_S)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{address}: no Dask scheduler answers there; start one with: dask scheduler") from error
-    with client:
+    with _silent():
         try:
-            client.wait_for_workers(1, timeout=CONNECT_S)
-        except TimeoutError as error:
-            raise InputError(f"{address}: the scheduler has no workers; start some: dask worker {address}") from error
-        client.register_plugin(ThreadsOfWorker(1))
-        try:
-            yield client
-        finally:
-            with suppress(Exception):  # it may be gone
-                client.unregister_worker_plugin(ThreadsOfWorker.name)
+            client = Client(address, timeout=CONNECT_S)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{address}: no Dask scheduler answers there; start one with: dask scheduler") from error
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=CONNECT_S)
+            except TimeoutError as error:
+                raise InputError(
+                    f"{address}: the scheduler has no workers; start some: dask worker {address}"
+                ) from error
+            client.register_plugin(ThreadsOfWorker(1))
+            try:
+                yield client
+            finally:
+                with suppress(Exception):  # it may be gone
+                    client.unregister_worker_plugin(ThreadsOfWorker.name)
 
 
 def warm_workers(client: Client, settings: BatchSettings, memory_bytes: int | None) -> None:
