@@ -152,6 +152,7 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "shows_filmstrip": _yes_or_no,
     "folder_order": _folder_order,
     "units": _units,
+    "told_sessions": _yes_or_no,
 }
 
 

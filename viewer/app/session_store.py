@@ -5,6 +5,7 @@ by what is in the photo's file, so that it may be moved and renamed. Written whi
 from __future__ import annotations
 
 import hashlib
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,13 +13,14 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
+from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed
-from viewer.model.actions import Action, Notify, RestoreSession
+from viewer.model.actions import Action, Notify, RestoreSession, SessionsKept, TellSessions
 from viewer.model.state.app_state import AppState, Notice, SavedSettings, Scene, Source
 
 FOLDER = "sessions"
@@ -49,7 +51,7 @@ class SessionStore:
         self._files = FileWorker("iibr-sessions", wake)
         self._ids = count(1)
         self._scene: Scene | None = None
-        self._is_known = False
+        self._is_known = self._can_write = False
         self._kept: SavedSettings | None = None
         self._latest: SavedSettings | None = None
         self._changed_at = 0.0
@@ -69,7 +71,15 @@ class SessionStore:
             self._submit(partial(_find, self._folder, scene))
         elif self._is_known and state.stroke is None:
             self._follow(settings_of(state, scene.size))
-        return actions
+        return self._tell(state)
+
+    def _tell(self, state: AppState) -> list[Action]:
+        """Whether closing loses nothing, where that changed; once, that it does not."""
+        are_kept = self._is_known and self._can_write and not self._has_failed
+        if are_kept != state.keeps_sessions:
+            return [SessionsKept(are_kept)]
+        is_edited = state.depth.edits not in (UNEDITED, state.saved_edits)
+        return [TellSessions()] if are_kept and is_edited and not state.preferences.told_sessions else []
 
     def close(self, state: AppState) -> None:
         """Keep what is there now, and wait until it is written."""
@@ -109,6 +119,7 @@ class SessionStore:
 
     def _take_up(self, found: SessionFound, state: AppState) -> list[Action]:
         self._is_known, self._kept, self._latest = True, None, None
+        self._can_write = self._folder is not None and _can_write(self._folder)
         if found.problem:
             return [Notify(Notice(found.problem))]
         is_open = state.scene is not None and state.scene.source is found.scene.source
@@ -140,6 +151,12 @@ def _find(folder: Path, scene: Scene) -> SessionFound:
         except InputError as error:
             return SessionFound(scene, None, str(error))
     return SessionFound(scene, None)
+
+
+def _can_write(folder: Path) -> bool:
+    """Whether files can be made in a folder, or in the one that it will be made in."""
+    there = next(place for place in (folder, *folder.parents) if os.path.lexists(place))
+    return there.is_dir() and os.access(there, os.W_OK)
 
 
 def _keep(folder: Path, source: Source, settings: SavedSettings) -> None:

@@ -305,6 +305,18 @@ class EditsSaved:
     edits: DepthEdits
 
 
+@dataclass(frozen=True)
+class SessionsKept:
+    """Whether what the open photo is left with is kept for the next time, so that closing loses nothing."""
+
+    are_kept: bool
+
+
+@dataclass(frozen=True)
+class TellSessions:
+    """Say that depth edits are kept: once, for whoever looks for a way to save them."""
+
+
 MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
 PreferencesAction = SetTheme | SetFontScale | SetUnits | ToggleSection | PlaceWindow
@@ -325,6 +337,8 @@ Action = (
     | FactsRead
     | TakeSettings
     | RestoreSession
+    | SessionsKept
+    | TellSessions
     | EndGesture
     | Undo
     | Redo

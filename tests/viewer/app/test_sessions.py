@@ -13,7 +13,8 @@ from iibr_core.depth.editing.edits import UNEDITED, Stroke
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver
 from viewer.app.session_store import sidecar_of
-from viewer.model.actions import DoTask, Undo
+from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
+from viewer.model.reducers.root import EDITS_KEPT
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 from viewer.model.state.saving import WriteSidecarTask
@@ -131,3 +132,35 @@ def test_a_folder_that_cannot_be_written_is_told_once(open_window: Opener, photo
     (tmp_path / "kept" / "sessions").write_text("a file is in the way")
     change(driver)
     driver.until(lambda app: any("not kept" in notice.text for notice in app.state.notices))
+
+
+def test_closing_asks_nothing_where_the_edits_are_kept_and_says_so_once(
+    open_window: Opener, photo_path: Path, tmp_path: Path
+) -> None:
+    kept = tmp_path / "kept"
+    first = open_window(photo_path, kept_in=kept, grid=ONE)
+    first.until(lambda app: app.state.keeps_sessions)
+    first.app.do(ShowPrompt(None), SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
+    first.until(lambda app: any(notice.text == EDITS_KEPT for notice in app.state.notices))
+    first.app.do(Quit())
+    assert first.app.state.should_quit
+    first.app.close()
+    second = open_window(photo_path, kept_in=kept, grid=ONE)
+    second.until(lambda app: told(second) and app.state.keeps_sessions)
+    assert second.app.state.depth.edits.gamma == 1.5
+    second.app.do(SetTone(replace(UNEDITED, gamma=2.0), is_finished=True))
+    second.until_idle()
+    assert second.app.state.preferences.told_sessions
+    assert not any(notice.text == EDITS_KEPT for notice in second.app.state.notices)
+
+
+def test_closing_asks_where_the_edits_cannot_be_kept(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "sessions").write_text("a file is in the way")
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    driver.until_idle()
+    driver.app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
+    driver.until_idle()
+    driver.app.do(Quit())
+    assert driver.app.state.prompt == "quit"
+    assert not driver.app.state.should_quit

@@ -28,6 +28,7 @@ from viewer.model.actions import (
     RestoreSession,
     ResumeWork,
     ReturnHome,
+    SessionsKept,
     SetDepthStrength,
     SetFontScale,
     SetFullscreen,
@@ -42,6 +43,7 @@ from viewer.model.actions import (
     StopWork,
     TakeSettings,
     TaskTaken,
+    TellSessions,
     Tick,
     ToggleSection,
     Undo,
@@ -89,6 +91,7 @@ from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
+EDITS_KEPT = "Depth edits are kept: the photo opens as you leave it. Save the depth map for other programs."
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
 
 
@@ -119,6 +122,11 @@ def reduce(state: AppState, action: Action) -> AppState:
             return record_edit(state, _take_settings(state, settings), "TakeSettings")
         case RestoreSession(settings):
             return record_edit(state, _restore(state, settings), "RestoreSession")
+        case SessionsKept(are_kept):
+            return replace(state, keeps_sessions=are_kept)
+        case TellSessions():
+            told = replace(state, preferences=replace(state.preferences, told_sessions=True))
+            return add_notice(told, Notice(EDITS_KEPT))
         case EndGesture():
             return release_divider(end_gesture(end_stroke(state)))
         case Undo():

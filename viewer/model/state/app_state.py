@@ -350,7 +350,7 @@ SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "depth", 
 @dataclass(frozen=True)
 class Preferences:
     """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
-    whether it filled the screen then.
+    whether it filled the screen then. told_sessions: that depth edits are kept.
     """
 
     theme: Theme = "dark"
@@ -361,6 +361,7 @@ class Preferences:
     shows_filmstrip: bool = False
     folder_order: FolderOrder = "name"
     units: Units = "photographic"
+    told_sessions: bool = False
 
 
 @dataclass(frozen=True)
@@ -400,7 +401,7 @@ class AppState:
     number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
     of it, perhaps of the one before. is_fullscreen,
     hides_panel: of the window; shows_before: the photo as it was taken stands in place of the picture.
-    downloading: None without.
+    downloading: None without. keeps_sessions: whether the photo opens as it is left.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -442,6 +443,7 @@ class AppState:
     is_fullscreen: bool = False
     hides_panel: bool = False
     shows_before: bool = False
+    keeps_sessions: bool = False
 
     @property
     def shown_optics(self) -> Optics:
@@ -455,7 +457,9 @@ class AppState:
 
     @property
     def has_unsaved_edits(self) -> bool:
-        """Whether closing would lose what was done to the depth."""
+        """Whether closing would lose what was done to the depth: no file has it, nor is it kept for the next time."""
+        if self.keeps_sessions:
+            return False
         return self.stroke is not None or self.depth.edits not in (UNEDITED, self.saved_edits)
 
 
