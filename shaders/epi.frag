@@ -7,6 +7,7 @@ const int MAX_VIEWS = 128;
 uniform int layers[MAX_VIEWS];  // of the views from the first band to the last; -1: not there yet
 uniform int view_count;
 uniform float line;             // texture coordinate of the line in the views
+uniform vec2 span;              // what of it is shown: where it begins, and how much
 
 in vec2 uv;
 out vec4 color;
@@ -19,9 +20,9 @@ void main() {
 #endif
     int layer = layers[clamp(int(across * float(view_count)), 0, view_count - 1)];
 #ifdef UPRIGHT
-    vec2 at = vec2(line, along);
+    vec2 at = vec2(line, span.x + along * span.y);
 #else
-    vec2 at = vec2(along, line);
+    vec2 at = vec2(span.x + along * span.y, line);
 #endif
     vec3 root = textureLod(colors, vec3(at, float(max(layer, 0))), 0.0).rgb;
     color = vec4(layer < 0 ? missing() : shown(root), 1.0);

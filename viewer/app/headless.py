@@ -146,9 +146,9 @@ class HeadlessViewer:
         box = letterbox(Rect(0, 0, width, height), scene.size)
         assert box is not None
         layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
-        assert layout.picture_px is not None
-        x, y, box_width, box_height = layout.picture_px
-        box_size = layout.picture_px.size
+        assert layout.frame_px is not None
+        x, y, box_width, box_height = layout.frame_px
+        box_size = layout.frame_px.size
         require_size(box_size)
         if is_full(scene, self.state.optics, box_size):
             light = self._full_picture(scene, box_size, report_progress)
@@ -210,8 +210,15 @@ class HeadlessViewer:
         scene, preferences = self.state.scene, self.state.preferences
         look = Look(preferences.font_scale, preferences.theme)
         picture_size = scene.size if scene else None
-        layout = layout_of(size, picture_size, ui_scale=look.ui_scale, beside=beside_of(self.state))
-        has_picture = layout.picture_px and self._scene_view.converge(self.state, layout.picture_px.size)
+        layout = layout_of(
+            size,
+            picture_size,
+            ui_scale=look.ui_scale,
+            beside=beside_of(self.state),
+            zoom=self.state.zoom,
+            own_width=self.own_size.width if scene else None,
+        )
+        has_picture = layout.frame_px and self._scene_view.converge(self.state, layout.frame_px.size, layout.part)
         texture = self._scene_view.texture if has_picture else None
         textures = self._draw_inspection(layout) if has_picture else NO_INSPECTION_TEXTURES
         target = self._gl.ctx.simple_framebuffer(size, 4)

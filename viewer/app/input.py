@@ -28,6 +28,7 @@ from viewer.model.state.app_state import AppState, Hover, ReadTruthTask, Scene, 
 from viewer.model.state.depth_editing import DropStroke, Paint, SetBrush
 from viewer.model.state.inspection import MoveDivider, ShowGrid
 from viewer.model.state.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, SetFocus
+from viewer.model.zoom import SetZoom
 
 DRAG_THRESHOLD = 4.0
 """A press that moved farther than this (window units) is a drag, not a click."""
@@ -56,7 +57,9 @@ class Pointer:
     """The mouse as seen in one frame, in window units; steps are how far it moved since the frame before.
 
     drag_distance: the farthest from where it was pressed, the frame of its release included. becomes_drag: whether it
-    has been no drag before this frame.
+    has been no drag before this frame. pulls: the middle button is down, or the left one was pressed with Space held:
+    the drag moves the picture; used_space: so it did since Space went down. holds_ctrl: Ctrl is down, or was at the
+    frame's beginning.
     """
 
     x: float = 0.0
@@ -73,6 +76,9 @@ class Pointer:
     clicks: int = 0
     wheel: float = 0.0
     is_over_panel: bool = False
+    holds_ctrl: bool = False
+    pulls: bool = False
+    used_space: bool = False
 
 
 NO_POINTER = Pointer()
@@ -96,19 +102,22 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     scene, picture = state.scene, layout.picture
     if scene is None or picture is None or pointer.is_over_panel:
         return []
+    frame = layout.frame or picture
     if state.inspection.shows_grid:
-        return _on_sheet(pointer, layout, scene, picture)
+        return _on_sheet(pointer, layout, scene, frame)
+    if pointer.pulls or _zooms(pointer, layout, frame):
+        return _zoom_actions(pointer, layout, frame)
     if is_brushing(state):
         return _paint_actions(pointer, layout, state, scene, picture, pick)
-    if pointer.wheel and picture.contains(pointer.x, pointer.y):
+    if pointer.wheel and frame.contains(pointer.x, pointer.y):
         low, high = focus_limits(scene)
         return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
-    if not picture.contains(pointer.pressed_x, pointer.pressed_y):
+    if not frame.contains(pointer.pressed_x, pointer.pressed_y):
         return []
     if (pointer.is_down or pointer.is_released) and pointer.drag_distance > DRAG_THRESHOLD:
         return _drag(pointer, layout, state, scene, picture, pick)
     if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
-        if _grabs_divider(pointer, layout, state, picture):
+        if _grabs_divider(pointer, layout, state, frame):
             return []
         if pointer.clicks > 1:
             return [ReturnHome()]
@@ -135,9 +144,11 @@ def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: 
     is_pointing = (
         not pointer.is_over_panel
         and not state.inspection.shows_grid
+        and not (pointer.pulls or _is_on_minimap(layout, pointer.x, pointer.y))
         and (is_brushing(state) or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
     )
-    if scene is not None and picture is not None and is_pointing and picture.contains(pointer.x, pointer.y):
+    frame = layout.frame
+    if scene is not None and picture and frame and is_pointing and frame.contains(pointer.x, pointer.y):
         x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
         hover = Hover(x_px, y_px, pick(x_px, y_px))
     return [SetHover(hover)] if hover != state.hover else []
@@ -193,13 +204,39 @@ def is_brushing(state: AppState) -> bool:
     return state.brush.is_on and state.scene is not None and state.scene.plan is not None
 
 
+def _zooms(pointer: Pointer, layout: Layout, frame: Rect) -> bool:
+    """Whether the wheel zooms, or the press was on the small picture."""
+    if pointer.wheel and pointer.holds_ctrl:
+        return frame.contains(pointer.x, pointer.y)
+    is_held = pointer.is_down or pointer.is_released
+    return is_held and _is_on_minimap(layout, pointer.pressed_x, pointer.pressed_y)
+
+
+def _is_on_minimap(layout: Layout, x: float, y: float) -> bool:
+    return layout.minimap is not None and layout.minimap.contains(x, y)
+
+
+def _zoom_actions(pointer: Pointer, layout: Layout, frame: Rect) -> list[Action]:
+    """Larger or smaller about the pointer; else the picture follows the hand, or shows what is under it on the small
+    picture.
+    """
+    if pointer.wheel and pointer.holds_ctrl and frame.contains(pointer.x, pointer.y):
+        return [SetZoom(layout.zoomed(pointer.wheel, pointer.x, pointer.y))]
+    if not pointer.pulls:
+        return [SetZoom(layout.shown_on_minimap(pointer.x, pointer.y))]
+    if not layout.is_zoomed or not (pointer.step_x or pointer.step_y):
+        return []
+    return [SetZoom(layout.pulled(pointer.step_x, pointer.step_y))]
+
+
 def _paint_actions(
     pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
 ) -> list[Action]:
     """Paint on the surface under the pointer, wherever it lies in the photo; the wheel makes the brush larger."""
-    if pointer.wheel and picture.contains(pointer.x, pointer.y):
+    frame = layout.frame or picture
+    if pointer.wheel and frame.contains(pointer.x, pointer.y):
         return [SetBrush(replace(state.brush, radius=state.brush.radius * BRUSH_NOTCH**pointer.wheel))]
-    begins = pointer.is_pressed and picture.contains(pointer.pressed_x, pointer.pressed_y)
+    begins = pointer.is_pressed and frame.contains(pointer.pressed_x, pointer.pressed_y)
     if not pointer.is_down or not (begins or state.stroke is not None):
         return []
     x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
@@ -210,8 +247,9 @@ def _paint_actions(
 
 def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:
     """The divider or a tilt handle where one was taken, else the viewpoint."""
-    if _grabs_divider(pointer, layout, state, picture):
-        return [MoveDivider((pointer.x - picture.x) / picture.width)]
+    frame = layout.frame or picture
+    if _grabs_divider(pointer, layout, state, frame):
+        return [MoveDivider((pointer.x - frame.x) / frame.width)]
     index = _grabbed_handle(pointer, layout, state, picture)
     if index is not None:
         at = pixel_at(picture, scene.size, pointer.x, pointer.y)
@@ -219,19 +257,19 @@ def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, pictu
     return _eye_drag(pointer, layout, scene, state.optics.eye)
 
 
-def _grabs_divider(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> bool:
+def _grabs_divider(pointer: Pointer, layout: Layout, state: AppState, frame: Rect) -> bool:
     """Whether the press was close to the divider, or it is dragged already."""
     inspection = state.inspection
     if inspection.comparison is None:
         return False
-    x = picture.x + inspection.divider * picture.width
+    x = frame.x + inspection.divider * frame.width
     return inspection.divider_taken or abs(pointer.pressed_x - x) <= DIVIDER_REACH * layout.ui_scale
 
 
-def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, picture: Rect) -> list[Action]:
+def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, frame: Rect) -> list[Action]:
     """Go to the view that was clicked."""
     is_click = pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD
-    view = view_at(picture, scene.grid, layout.ui_scale, pointer.x, pointer.y) if is_click else None
+    view = view_at(frame, scene.grid, layout.ui_scale, pointer.x, pointer.y) if is_click else None
     return [] if view is None else [MoveEye(scene.grid.offset(*view))]
 
 
@@ -265,11 +303,12 @@ def units_per_view(layout: Layout, scene: Scene) -> float:
     """Window units of drag for one view step.
 
     As far as the nearest surface moves on screen, so that it sticks to the pointer; but no finer than crosses the grid
-    in `DRAG_ACROSS_GRID` of the picture, or scenes of little parallax would be too touchy.
+    in `DRAG_ACROSS_GRID` of what is seen of the picture, or scenes of little parallax would be too touchy.
     """
     assert layout.picture is not None
+    assert layout.frame is not None
     nearest = scene.disparity_range_px[1] * layout.picture.width / scene.width
-    return max(nearest, DRAG_ACROSS_GRID * layout.picture.width / max(scene.grid.columns - 1, 1))
+    return max(nearest, DRAG_ACROSS_GRID * layout.frame.width / max(scene.grid.columns - 1, 1))
 
 
 def read_pointer(before: Pointer = NO_POINTER) -> Pointer:
@@ -281,11 +320,20 @@ def read_pointer(before: Pointer = NO_POINTER) -> Pointer:
     # ImGui leaves out the frame of the release, in which a quick drag may have gone all its way.
     drag_distance = max(float(io.mouse_drag_max_distance_sqr[0]) ** 0.5, math.hypot(moved.x, moved.y))
     was_drag = before.is_down and not io.mouse_clicked[0] and before.drag_distance > DRAG_THRESHOLD
+    ctrl_keys = imgui.Key.left_ctrl, imgui.Key.right_ctrl, imgui.Key.left_super, imgui.Key.right_super
+    holds_space = imgui.is_key_down(imgui.Key.space) and not io.want_text_input
+    is_held = bool(io.mouse_down[0] or io.mouse_released[0])
+    pulls_left = is_held and (holds_space if io.mouse_clicked[0] else before.pulls and before.is_down)
+    middle = imgui.MouseButton_.middle
+    pulls_middle = imgui.is_mouse_down(middle) or imgui.is_mouse_released(middle)
+    # In the frame of the press the mouse still moved to where it was pressed.
+    is_start = bool(io.mouse_clicked[0]) if pulls_left else bool(io.mouse_clicked[middle])
+    pulls = pulls_left or pulls_middle
     return Pointer(
         x=io.mouse_pos.x,
         y=io.mouse_pos.y,
-        step_x=io.mouse_delta.x,
-        step_y=io.mouse_delta.y,
+        step_x=0.0 if pulls and is_start else io.mouse_delta.x,
+        step_y=0.0 if pulls and is_start else io.mouse_delta.y,
         drag_distance=drag_distance,
         becomes_drag=drag_distance > DRAG_THRESHOLD and not was_drag,
         pressed_x=io.mouse_pos.x - moved.x,
@@ -296,11 +344,17 @@ def read_pointer(before: Pointer = NO_POINTER) -> Pointer:
         clicks=int(io.mouse_clicked_last_count[0]),
         wheel=io.mouse_wheel,
         is_over_panel=io.want_capture_mouse,
+        # The wheel may have turned in the frame in which Ctrl was let go.
+        holds_ctrl=any(imgui.is_key_down(key) or imgui.is_key_released(key) for key in ctrl_keys),
+        pulls=pulls,
+        used_space=(pulls_left or before.used_space) and (holds_space or imgui.is_key_released(imgui.Key.space)),
     )
 
 
-def read_keys() -> Keys:
-    """The keys of this ImGui frame; none while a text field has them."""
+def read_keys(used_space: bool = False) -> Keys:
+    """The keys of this ImGui frame; none while a text field has them. used_space: the mouse was dragged with Space
+    held: no more comes of it. That is known only when Space is let go.
+    """
     from imgui_bundle import imgui
 
     io = imgui.get_io()
@@ -312,6 +366,8 @@ def read_keys() -> Keys:
 
     def is_struck(chord: Chord) -> bool:
         holds = bool(io.key_ctrl or io.key_super) == chord.ctrl and bool(io.key_shift) == chord.shift
+        if chord.key == "space":
+            return holds and imgui.is_key_released(imgui.Key.space) and not used_space
         return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key))
 
     down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)

@@ -170,7 +170,7 @@ class App:
         self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
         self._preview_depth()
         layout, look = self.layout(), self.look()
-        picture = self.scene_view.draw(self.state, layout.picture_px.size) if layout.picture_px else None
+        picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
         if picture and self.scene_view.report != self.state.report:
             self.do(PictureDrawn(self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
@@ -206,10 +206,17 @@ class App:
     def layout(self) -> Layout:
         """Where things lie in the window as it is now."""
         scene = self.state.scene
-        size = scene.size if scene else None
-        beside = beside_of(self.state)
         ratio, scale = self.window.pixel_ratio, self.look().ui_scale
-        return layout_of(self.window.size, size, ratio, scale, beside, has_panel=not self.state.hides_panel)
+        return layout_of(
+            self.window.size,
+            scene.size if scene else None,
+            ratio,
+            scale,
+            beside_of(self.state),
+            has_panel=not self.state.hides_panel,
+            zoom=self.state.zoom,
+            own_width=scene.own_size.width if scene and scene.own_size else None,
+        )
 
     def look(self) -> Look:
         """Theme, and size of text and widgets on this display."""
@@ -321,7 +328,7 @@ class App:
         pick = partial(self.scene_view.pick, self.state.optics.eye)
         actions = actions_from_pointer(pointer, layout, self.state, pick)
         actions += actions_from_hover(pointer, layout, self.state, pick)
-        actions += actions_from_keys(read_keys(), self.state)
+        actions += actions_from_keys(read_keys(pointer.used_space), self.state)
         actions += gesture_end(pointer)
         return [*actions, Quit()] if self.window.take_closing() else actions
 

@@ -21,7 +21,7 @@ from viewer.background.comparison_worker import (
     PairScored,
 )
 from viewer.background.jobs import Failed
-from viewer.display.scene_view import SceneView
+from viewer.display.scene_view import SceneView, window_of
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle, SheetCell
 from viewer.gpu.light_field_texture import LightFieldTexture
@@ -36,7 +36,7 @@ from viewer.model.inspection_request import (
     sheet_cells,
     view_near,
 )
-from viewer.model.layout import Layout, Rect, ScreenSize
+from viewer.model.layout import WHOLE, Layout, Rect, ScreenSize
 from viewer.model.state.app_state import AppState, Hover, Notice, Scene
 from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
 
@@ -83,21 +83,23 @@ class InspectionView:
     def draw(self, state: AppState, layout: Layout) -> InspectionTextures:
         """Draw what changed and say where it is."""
         scene, field = state.scene, self._scene_view.renderer.field
-        if scene is None or field is None or layout.picture_px is None or not field.present.any():
+        if scene is None or field is None or layout.frame_px is None or not field.present.any():
             return NO_INSPECTION_TEXTURES
         exposure = 2.0**state.optics.exposure_stops
         base = _ViewImage(
             self._scene_view.generation, self._scene_view.views_uploaded, exposure, self._scene_view.previews
         )
         if field.grid != scene.grid:  # only the photo's own view is there, or what is being done to its depth
-            overlay = self._overlay(state, scene, field, layout.picture_px.size, base)
-            return InspectionTextures(overlay=overlay, shown=(self._drawn["overlay"][0],) if overlay else ())
+            names = {"overlay": self._overlay(state, scene, field, layout, base)}
+            names["minimap"] = self._minimap(field, layout, base)
+            return self._textures(names)
         names = self._strips(state, scene, field, layout, base)
+        names["minimap"] = self._minimap(field, layout, base)
         names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
-        names["overlay"] = self._overlay(state, scene, field, layout.picture_px.size, base)
+        names["overlay"] = self._overlay(state, scene, field, layout, base)
         names |= self._comparison_images(state, scene, field, base)
-        names |= self._kept_images(state, layout.picture_px.size, base)
-        return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
+        names |= self._kept_images(state, layout.frame_px.size, layout.part, base)
+        return self._textures(names)
 
     def probe(self, state: AppState) -> Probe | None:
         """What is known of the picture under the pointer, where that is asked for."""
@@ -152,6 +154,18 @@ class InspectionView:
         """Free the GL objects."""
         self._passes.release()
 
+    def _textures(self, names: dict[str, int | None]) -> InspectionTextures:
+        return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
+
+    def _minimap(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int | None:
+        """The photo, very small."""
+        row, column = field.grid.centre
+        if layout.minimap is None or not field.present[row, column]:
+            return None
+        size_px = layout.in_pixels(layout.minimap).size
+        draw = partial(self._passes.draw_view, field, row, column, "minimap", base.exposure, size_px)
+        return self._once("minimap", (base.generation, base.exposure, size_px), draw)
+
     def _once(self, name: str, record: object, draw: Callable[[], int]) -> int:
         """The image of this name, drawn anew only if its record changed."""
         if name not in self._drawn or self._drawn[name][0] != record:
@@ -164,10 +178,10 @@ class InspectionView:
         names: dict[str, int | None] = {"strip_across": None, "strip_down": None}
         x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
         row, column = view_near(state.optics.eye, scene.grid)
-        lines = (
-            ("strip_across", layout.strip_across, Line(row, (y + 0.5) / scene.height)),
-            ("strip_down", layout.strip_down, Line(column, (x + 0.5) / scene.width, is_upright=True)),
-        )
+        part = layout.part
+        across = Line(row, (y + 0.5) / scene.height, span=(part.x, part.width))
+        down = Line(column, (x + 0.5) / scene.width, is_upright=True, span=(part.y, part.height))
+        lines = (("strip_across", layout.strip_across, across), ("strip_down", layout.strip_down, down))
         for name, rect, line in lines:
             if rect is not None:
                 size_px = layout.in_pixels(rect).size
@@ -177,8 +191,8 @@ class InspectionView:
 
     def _sheet(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int:
         """All views; those that came since the last time, or came again, are drawn."""
-        assert layout.picture is not None
-        size_px = layout.in_pixels(layout.picture).size
+        assert layout.frame_px is not None
+        size_px = layout.frame_px.size
         record = base.generation, base.exposure, size_px, field.stride
         there = frozenset((view, int(uploads)) for view, uploads in np.ndenumerate(field.uploads) if uploads)
         old = self._drawn.get("sheet")
@@ -195,8 +209,10 @@ class InspectionView:
         return name
 
     def _overlay(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, size_px: ScreenSize, base: _ViewImage
+        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _ViewImage
     ) -> int | None:
+        assert layout.frame_px is not None
+        size_px, part = layout.frame_px.size, layout.part
         kind, optics = state.inspection.overlay, state.optics
         row, column = view_near(optics.eye, field.grid)
         view: ViewIndex = tuple(nearest_present(field.present)[row, column].tolist())
@@ -214,13 +230,13 @@ class InspectionView:
         colors = (INPAINTED_RGB,) * len(VIRIDIS) if kind == "inpainted" else VIRIDIS
         ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
         ends = ends if ends[1] > ends[0] else (ends[0] - 0.5, ends[0] + 0.5)
-        record = base, kind, view, optics.eye, optics.dolly, size_px, state.inspection.opacity, looked_up
+        record = base, kind, view, optics.eye, optics.dolly, size_px, part, state.inspection.opacity, looked_up
         if not field.present[view]:
             return None
 
         def draw() -> int:
             style = OverlayStyle(colors, ends, state.inspection.opacity, is_mask=kind == "inpainted")
-            return self._passes.draw_overlay(field, optics, view, size_px, style, values)
+            return self._passes.draw_overlay(field, optics, view, size_px, style, values, part)
 
         return self._once("overlay", record, draw)
 
@@ -245,14 +261,14 @@ class InspectionView:
         right = self._once("right", (pair.request, "right"), lambda: self._passes.show("right", pair.right))
         return {"left": left, "right": right}
 
-    def _kept_images(self, state: AppState, size_px: ScreenSize, base: _ViewImage) -> dict[str, int | None]:
+    def _kept_images(self, state: AppState, size_px: ScreenSize, part: Rect, base: _ViewImage) -> dict[str, int | None]:
         """The picture as it was kept, or how far the present one is from it once that is finished."""
         kind, optics = state.inspection.comparison, state.inspection.kept
         if optics is None or kind not in ("kept", "difference"):
             return {}
-        record = base.generation, base.views, base.previews, optics, size_px
+        record = base.generation, base.views, base.previews, optics, size_px, part
         if self._kept is None or self._kept[0] != record:
-            self._kept = record, self._scene_view.picture(optics, size_px)
+            self._kept = record, self._scene_view.picture(optics, size_px, part=window_of(part))
         kept = self._kept[1]
         if kind == "kept":
             return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}
@@ -274,7 +290,9 @@ class InspectionView:
             shows = self._passes.seen_in(field, state.optics.eye, hover.x_px, hover.y_px, hover.disparity)
             seen = int(shows.sum())
         at = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
-        rgb = self._scene_view.renderer.read_pixel(*at)
+        drawn = self._scene_view.picture_drawn
+        part = drawn.part if drawn is not None else WHOLE
+        rgb = self._scene_view.renderer.read_pixel((at[0] - part.x) / part.width, (at[1] - part.y) / part.height)
         return Probe(rgb, seen, int(field.present.sum()), self._origin(hover, state, scene, field))
 
     def _origin(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Origin:

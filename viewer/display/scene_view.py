@@ -21,7 +21,7 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.layout import ScreenSize
+from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.app_state import AppState, DrawReport, Picture, Scene
 from viewer.model.state.optics import CENTRE, Optics
 
@@ -167,17 +167,21 @@ class SceneView:
         """Disparity seen at a pixel of the picture; None where the scene has none."""
         return pick_disparity(self._disparities, eye, x_px, y_px)
 
-    def draw(self, state: AppState, size_px: ScreenSize) -> Picture | None:
-        """Draw the picture this state asks for, unless it is there already; return its record, None without views."""
+    def draw(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
+        """Draw the picture this state asks for, or a part of it, stretched to size_px, unless it is there already;
+        return its record, None without views.
+        """
         if self.views_uploaded == 0:
             return None
-        wanted = Picture(self.generation, self.views_uploaded, state.shown_optics, size_px, previews=self.previews)
+        wanted = Picture(
+            self.generation, self.views_uploaded, state.shown_optics, size_px, previews=self.previews, part=part
+        )
         budget_s = self._gl.frame_budget_s
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             # A picture that only new views change is seen on: it must not become softer.
             is_still = self._differs_by_views_only(wanted)
             passes, budget_s = (self._passes_shown, STILL_BUDGET_S) if is_still else (0, budget_s)
-            self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, passes)
+            self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, passes, window_of(part))
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
             self._drawn = replace(wanted, samples=self.report.samples)
@@ -190,9 +194,9 @@ class SceneView:
             self.renderer.prepare(self._unprepared.pop())
         return self._drawn
 
-    def converge(self, state: AppState, size_px: ScreenSize) -> Picture | None:
+    def converge(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
         """Like `draw`, with every sample the picture will ever get, however long that takes."""
-        if self.draw(state, size_px) is not None:
+        if self.draw(state, size_px, part) is not None:
             self.renderer.refine()
         return self._drawn
 
@@ -268,3 +272,8 @@ class SceneView:
     def release(self) -> None:
         """Free the GL objects."""
         self.renderer.release()
+
+
+def window_of(part: Rect) -> TargetWindow:
+    """A part of the picture, as the renderer wants it."""
+    return TargetWindow(part.x, part.y, part.width, part.height)

@@ -13,7 +13,7 @@ from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, sr
 from iibr_core.types import SRGB, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
-from viewer.model.layout import ScreenSize
+from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.optics import Optics
 
 MAX_VIEWS = 128
@@ -38,12 +38,14 @@ class OverlayStyle(NamedTuple):
 class Line(NamedTuple):
     """What an EPI shows.
 
-    view: index of the row of views (across) or column (upright); at: texture coordinate in them.
+    view: index of the row of views (across) or column (upright); at: texture coordinate in them. span: what of the
+    line is shown: where it begins, and how much, as shares of it.
     """
 
     view: int
     at: float
     is_upright: bool = False
+    span: tuple[float, float] = (0.0, 1.0)
 
 
 class SheetCell(NamedTuple):
@@ -82,6 +84,7 @@ class InspectionPasses:
         layers = [_layer(field, *place) for place in places[:MAX_VIEWS]]
         self._use_colors(program, field, exposure)
         program.set_uniforms(layers=layers + [-1] * (MAX_VIEWS - len(layers)), view_count=len(layers), line=line.at)
+        program.set_uniforms(span=line.span)
         texture = self._use_image(name, size_px)
         quad.render(moderngl.TRIANGLES, vertices=3)
         return texture
@@ -100,9 +103,17 @@ class InspectionPasses:
         self._draw_stored(field, _layer(field, row, column), ScreenSize(cell.width, cell.height), exposure)
         framebuffer.viewport = (0, 0, *framebuffer.size)
 
-    def draw_view(self, field: LightFieldTexture, row: int, column: int, name: str, exposure: float) -> int:
-        """One stored view as it is, as the image `name`."""
-        size_px = ScreenSize(field.width, field.height)
+    def draw_view(
+        self,
+        field: LightFieldTexture,
+        row: int,
+        column: int,
+        name: str,
+        exposure: float,
+        size_px: ScreenSize | None = None,
+    ) -> int:
+        """One stored view as it is, or smaller, as the image `name`."""
+        size_px = size_px or ScreenSize(field.width, field.height)
         texture = self._use_image(name, size_px)
         self._draw_stored(field, _layer(field, row, column), size_px, exposure)
         return texture
@@ -132,10 +143,11 @@ class InspectionPasses:
         size_px: ScreenSize,
         style: OverlayStyle,
         values: NDArray[np.uint8] | None = None,
+        part: Rect = WHOLE,
     ) -> int:
         """What a stored view knows at every pixel of the picture: its disparity, or `values` (H, W), 255 = 1.
 
-        The view needs a disparity.
+        part: of the picture, as a share of it. The view needs a disparity.
         """
         switches = (*(("VALUES",) if values is not None else ()), *(("MASK",) if style.is_mask else ()))
         program, quad = self._programs.get("overlay.frag", switches)
@@ -150,6 +162,7 @@ class InspectionPasses:
         program.set_uniforms(search_steps=min(max(math.ceil(distance * (near - far)), 2), MAX_SEARCH_STEPS))
         colors = [tuple(value / 255 for value in color) for color in style.color_map]
         program.set_uniforms(color_map=colors, map_ends=style.map_ends, opacity=style.opacity)
+        program.set_uniforms(part=(part.x, part.y, part.width, part.height))
         if values is not None:
             self._texture("values", np.ascontiguousarray(values)[..., None]).use(2)
             program.set_uniforms(values=2)

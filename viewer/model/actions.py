@@ -30,6 +30,7 @@ from viewer.model.state.model_download import DownloadingChanged
 from viewer.model.state.optics import LensAction
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
+from viewer.model.zoom import SetZoom
 
 # The viewpoint
 
@@ -333,6 +334,7 @@ Action = (
     | SetFullscreen
     | HidePanel
     | ShowBefore
+    | SetZoom
     | SetDepthStrength
     | FactsRead
     | TakeSettings

@@ -63,6 +63,7 @@ from viewer.model.state.inspection import (
 from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.optics import ApplyPreset, ResetOptics
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
+from viewer.model.zoom import SetZoom, Zoom
 
 FONT_STEP = 1.1
 RECENT_SHOWN = 4
@@ -70,6 +71,7 @@ KEY_WORDS = {
     "equal": "+",
     "minus": "−",
     "_0": "0",
+    "_1": "1",
     "space": "Space",
     "page_down": "Page down",
     "page_up": "Page up",
@@ -140,6 +142,14 @@ def _toggle_brush(state: AppState) -> Action:
     return SetBrush(replace(state.brush, is_on=not state.brush.is_on))
 
 
+def _own_pixels(state: AppState) -> Action:
+    """About the pointer, where it is over the picture, else about what is in the middle."""
+    scene, hover, centre = state.scene, state.hover, (0.5, 0.5) if state.zoom is None else state.zoom.centre
+    if scene is not None and hover is not None and state.zoom is None:
+        centre = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
+    return SetZoom(Zoom(1.0, centre))
+
+
 def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
     return lambda state: SetBrush(replace(state.brush, tool=tool, is_on=True))
 
@@ -192,6 +202,8 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
     Command("Stop making views", _always(StopWork())),
+    Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
+    Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),
     Command("Full screen", lambda s: SetFullscreen(not s.is_fullscreen), (Chord("f11"),)),
     Command("Hide or show the panel", lambda s: HidePanel(not s.hides_panel), (Chord("tab"),)),
     Command("Before and after", lambda s: ShowBefore(not s.shows_before), (Chord("backslash"),)),

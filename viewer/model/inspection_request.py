@@ -43,6 +43,7 @@ class InspectionTextures:
     left: int | None = None
     right: int | None = None
     difference: int | None = None
+    minimap: int | None = None
     shown: tuple[object, ...] = ()
 
 

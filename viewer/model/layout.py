@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from viewer.model.zoom import MOST_ZOOM, Zoom
+
 BACKGROUND = 0.07, 0.07, 0.08, 1.0
 """Behind the picture, where the theme is dark."""
 PANEL_WIDTH = 300.0
@@ -50,6 +52,28 @@ class Rect:
         """Whether the point lies inside."""
         return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
 
+    def within(self, other: Rect) -> Rect:
+        """What of it lies in another one."""
+        x, y = max(self.x, other.x), max(self.y, other.y)
+        far_x, far_y = (
+            min(self.x + self.width, other.x + other.width),
+            min(self.y + self.height, other.y + other.height),
+        )
+        return Rect(x, y, max(far_x - x, 0.0), max(far_y - y, 0.0))
+
+
+WHOLE = Rect(0.0, 0.0, 1.0, 1.0)
+"""All of the picture, as a share of it."""
+
+MINIMAP_SIDE = 150.0
+"""The longer side of the small picture that says which part is seen."""
+
+ZOOM_NOTCH = 1.25
+"""A notch of the wheel makes the picture so many times as large."""
+
+NEAR_FIT = 1.02
+"""What is only so much larger or smaller than fits, fits."""
+
 
 STRIP_UNITS_PER_VIEW = 9.0
 LEAST_STRIP, MOST_STRIP = 45.0, 130.0
@@ -76,9 +100,10 @@ NOTHING_BESIDE = Beside()
 class Layout:
     """Rectangles in window units; pixel_ratio: framebuffer pixels per window unit; ui_scale: size of text and widgets.
 
-    picture is None where no picture is open or no room is left for it. strip_across, strip_down: the EPIs, as wide and
-    as high as the picture; status: a line below; filmstrip: a row of small pictures at the bottom. None where they are
-    not shown.
+    picture: where all of it lies, None where no picture is open or no room is left for it. room: there is for it, None:
+    all it takes. is_zoomed: whether it is another size than fits, cut to its room. scale: pixels of the screen a pixel
+    of the photo; fit: as much as fits. strip_across, strip_down: the EPIs, as wide and as high as what is seen of the
+    picture; status: a line below; filmstrip: a row of small pictures at the bottom. None where they are not shown.
     """
 
     window: Rect
@@ -90,11 +115,75 @@ class Layout:
     strip_down: Rect | None = None
     status: Rect | None = None
     filmstrip: Rect | None = None
+    room: Rect | None = None
+    is_zoomed: bool = False
+    scale: float = 1.0
+    fit: float = 1.0
 
     @property
-    def picture_px(self) -> PixelRect | None:
-        """The picture in framebuffer pixels, y counted from the top."""
-        return None if self.picture is None else self.in_pixels(self.picture)
+    def frame(self) -> Rect | None:
+        """What is seen of the picture."""
+        if self.picture is None or self.room is None or not self.is_zoomed:
+            return self.picture
+        return self.picture.within(self.room)
+
+    @property
+    def frame_px(self) -> PixelRect | None:
+        """The same in framebuffer pixels, y counted from the top."""
+        return None if self.frame is None else self.in_pixels(self.frame)
+
+    @property
+    def part(self) -> Rect:
+        """The part of the picture that these pixels hold, as a share of it."""
+        if self.picture is None or self.frame_px is None or not self.is_zoomed:
+            return WHOLE
+        x, y, width, height = (value / self.pixel_ratio for value in self.frame_px)
+        picture = self.picture
+        left, top = (x - picture.x) / picture.width, (y - picture.y) / picture.height
+        return Rect(left, top, width / picture.width, height / picture.height)
+
+    @property
+    def minimap(self) -> Rect | None:
+        """The small picture in the lower right corner that says which part is seen; None where all is, or no room."""
+        frame = self.frame
+        if self.picture is None or frame is None or frame == self.picture:
+            return None
+        share = MINIMAP_SIDE * self.ui_scale / max(self.picture.width, self.picture.height)
+        width, height, gap = share * self.picture.width, share * self.picture.height, STRIP_GAP * self.ui_scale
+        if 2 * width > frame.width or 2 * height > frame.height:
+            return None
+        return Rect(frame.x + frame.width - width - gap, frame.y + frame.height - height - gap, width, height)
+
+    def zoomed(self, notches: float, x: float, y: float) -> Zoom | None:
+        """The zoom after so many notches of the wheel: what lies at (x, y) stays there. None: it fits."""
+        low, high = min(self.fit, 1.0), MOST_ZOOM * max(self.fit, 1.0)
+        scale = min(max(self.scale * ZOOM_NOTCH**notches, low), high)
+        passes_fit = (scale - self.fit) * (self.scale - self.fit) < 0
+        if self.picture is None or passes_fit or 1 / NEAR_FIT < scale / self.fit < NEAR_FIT:
+            return None
+        larger = scale / self.scale
+        return self._zoom_to(scale, x + (self.picture.x - x) * larger, y + (self.picture.y - y) * larger, larger)
+
+    def pulled(self, step_x: float, step_y: float) -> Zoom | None:
+        """The zoom after the picture was pulled so far; None where it fits."""
+        if self.picture is None or not self.is_zoomed:
+            return None
+        return self._zoom_to(self.scale, self.picture.x + step_x, self.picture.y + step_y, 1.0)
+
+    def shown_on_minimap(self, x: float, y: float) -> Zoom | None:
+        """The zoom that shows what lies at (x, y) on the small picture; None without it."""
+        at = self.minimap
+        if at is None:
+            return None
+        return Zoom(self.scale, ((x - at.x) / at.width, (y - at.y) / at.height))
+
+    def _zoom_to(self, scale: float, left: float, top: float, larger: float) -> Zoom:
+        """With the picture's corner there, and so many times as large as it is."""
+        assert self.picture is not None
+        room = self.room or self.picture
+        x = (room.x + room.width / 2 - left) / (self.picture.width * larger)
+        y = (room.y + room.height / 2 - top) / (self.picture.height * larger)
+        return Zoom(scale, (x, y))
 
     def in_pixels(self, rect: Rect) -> PixelRect:
         """A rectangle in framebuffer pixels, at least one each way."""
@@ -110,8 +199,13 @@ def layout_of(
     ui_scale: float = 1.0,
     beside: Beside = NOTHING_BESIDE,
     has_panel: bool = True,
+    zoom: Zoom | None = None,
+    own_width: int | None = None,
 ) -> Layout:
-    """Panel at the right, picture as large as it fits beside it and what is beside it. Sizes are (width, height)."""
+    """Panel at the right, picture as large as it fits beside it and what is beside it. Sizes are (width, height).
+
+    zoom: a part of the picture that is seen in its place. own_width: of the photo, where the picture is a smaller one.
+    """
     width, window_height = window_size
     filmstrip_height = FILMSTRIP_HEIGHT * ui_scale if beside.has_filmstrip else 0.0
     height = max(window_height - filmstrip_height, 0)
@@ -122,6 +216,11 @@ def layout_of(
     room_height = height - 2 * margin - (across + gap if across else 0) - status_height
     room = Rect(margin, margin, width - panel_width - 2 * margin - (down + gap if down else 0), room_height)
     picture = letterbox(room, picture_size) if picture_size else None
+    fit = scale = picture.width * pixel_ratio / (own_width or picture_size[0]) if picture and picture_size else 1.0
+    is_zoomed = zoom is not None and picture is not None
+    if zoom is not None and picture is not None:
+        scale = zoom.scale
+        picture = _zoomed(picture, zoom, fit, room, pixel_ratio)
     layout = Layout(
         window=Rect(0, 0, width, window_height),
         panel=Rect(width - panel_width, 0, panel_width, window_height),
@@ -129,14 +228,19 @@ def layout_of(
         pixel_ratio=pixel_ratio,
         ui_scale=ui_scale,
         filmstrip=Rect(0, height, width - panel_width, filmstrip_height) if filmstrip_height else None,
+        room=room,
+        is_zoomed=is_zoomed,
+        scale=scale,
+        fit=fit,
     )
-    if picture is None:
+    frame = layout.frame
+    if frame is None:
         return layout
-    below = picture.y + picture.height
+    below = frame.y + frame.height
     return replace(
         layout,
-        strip_across=Rect(picture.x, below + gap, picture.width, across) if across else None,
-        strip_down=Rect(picture.x + picture.width + gap, picture.y, down, picture.height) if down else None,
+        strip_across=Rect(frame.x, below + gap, frame.width, across) if across else None,
+        strip_down=Rect(frame.x + frame.width + gap, frame.y, down, frame.height) if down else None,
         status=Rect(margin, height - margin - status_height, room.width, status_height) if status_height else None,
     )
 
@@ -155,6 +259,20 @@ def letterbox(room: Rect, picture_size: ScreenSize) -> Rect | None:
     x = room.x + (room.width - width * scale) / 2
     y = room.y + (room.height - height * scale) / 2
     return Rect(x, y, width * scale, height * scale)
+
+
+def _zoomed(fitting: Rect, zoom: Zoom, fit: float, room: Rect, pixel_ratio: float) -> Rect:
+    """Where all of the picture lies, on whole pixels: it fills the room where it is larger, else is in its middle."""
+    larger = zoom.scale / fit
+    width, height = fitting.width * larger, fitting.height * larger
+
+    def place(low: float, size: float, length: float, centre: float) -> float:
+        at = low + size / 2 - centre * length
+        at = min(max(at, low + size - length), low) if length > size else low + (size - length) / 2
+        return round(at * pixel_ratio) / pixel_ratio
+
+    x = place(room.x, room.width, width, zoom.centre[0])
+    return Rect(x, place(room.y, room.height, height, zoom.centre[1]), width, height)
 
 
 def pixel_at(picture: Rect, picture_size: ScreenSize, x: float, y: float) -> tuple[float, float]:

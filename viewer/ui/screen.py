@@ -14,6 +14,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
 from viewer.ui.overlays.filmstrip import filmstrip
 from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
+from viewer.ui.overlays.minimap import draw_minimap
 from viewer.ui.overlays.notices import notices
 from viewer.ui.overlays.prompts import prompts
 from viewer.ui.overlays.reticle import overlays
@@ -42,14 +43,16 @@ def build_screen(
         draw_beside_picture(state, layout, textures)
         if not state.inspection.shows_grid:
             overlays(state, layout)
+            if textures.minimap is not None:
+                draw_minimap(layout, textures.minimap)
     actions = filmstrip(state, layout, thumbnails)
     return actions + panel(state, layout) + notices(state, layout) + prompts(state, layout)
 
 
 def _picture(layout: Layout, texture: int) -> None:
     """Pixel for pixel: the rectangle is the one whose pixels were drawn."""
-    assert layout.picture_px is not None
-    x, y, width, height = (value / layout.pixel_ratio for value in layout.picture_px)
+    assert layout.frame_px is not None
+    x, y, width, height = (value / layout.pixel_ratio for value in layout.frame_px)
     imgui.get_background_draw_list().add_image(
         imgui.ImTextureRef(texture), imgui.ImVec2(x, y), imgui.ImVec2(x + width, y + height), (0, 1), (1, 0)
     )

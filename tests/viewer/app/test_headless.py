@@ -57,8 +57,8 @@ def test_panels_stand_beside_the_same_picture(viewer: HeadlessViewer) -> None:
     viewer.do(MoveEye(ViewOffset(0.5, 1)), SetAperture(2))
     screen = viewer.screen(size)
     layout = layout_of(size, (WIDTH, HEIGHT))
-    assert layout.picture_px is not None
-    x, y, width, height = layout.picture_px
+    assert layout.frame_px is not None
+    x, y, width, height = layout.frame_px
     box = screen[y : y + height, x : x + width].astype(int)
     notices_are_below = height - 120  # the notice about the scene may lie over the lower edge
     expected = viewer.picture((width, height)).astype(int)

@@ -238,13 +238,13 @@ def test_the_picture_keeps_its_shape_and_stays_beside_the_panel(window: tuple[in
 def test_pixels_of_a_dense_display() -> None:
     plain, dense = layout_of((1280, 800), (600, 400)), layout_of((1280, 800), (600, 400), pixel_ratio=2.0)
     assert plain.picture == dense.picture
-    assert plain.picture_px is not None
-    assert dense.picture_px == pytest.approx([2 * value for value in plain.picture_px], abs=1)
+    assert plain.frame_px is not None
+    assert dense.frame_px == pytest.approx([2 * value for value in plain.frame_px], abs=1)
 
 
 def test_no_room_for_the_picture() -> None:
     assert letterbox(R(0, 0, -5, 10), (4, 3)) is None
-    assert layout_of((0, 0), (4, 3)).picture_px is None
+    assert layout_of((0, 0), (4, 3)).frame_px is None
 
 
 def test_picture_corners_are_half_a_pixel_outside_the_first_and_last_pixel() -> None:

@@ -114,43 +114,54 @@ class Renderer:
         size_px: ScreenSize,
         framebuffer: moderngl.Framebuffer | None = None,
         level: QualityLevel = BEST_QUALITY,
+        part: TargetWindow = WHOLE_PICTURE,
     ) -> None:
         """Draw the picture at once, stretched to size_px = (width, height), with every view the aperture sees.
 
         framebuffer: drawn into its current viewport, which should have that size; None draws into the renderer's own
-        image (`image_texture`, `read_image`). level: what to leave out, except for its scale. Before the first view the
+        image (`image_texture`, `read_image`). level: what to leave out, except for its scale. part: what of the picture
+        is drawn, stretched to size_px. Before the first view the
         picture is black. The framebuffer stays bound.
         """
-        self._accumulation = self._accumulation_of(optics, size_px, level)
+        self._accumulation = self._accumulation_of(optics, size_px, level, part)
         self._draw(math.inf, passes=1)
         self._finish(framebuffer)
         self._errors.begin(level)
 
-    def render_in_time(self, optics: Optics, size_px: ScreenSize, budget_s: float, passes: int = 0) -> None:
+    def render_in_time(
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        budget_s: float,
+        passes: int = 0,
+        part: TargetWindow = WHOLE_PICTURE,
+    ) -> None:
         """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
 
         Its own image may then be smaller than size_px. passes: draw so many of the best picture, whatever time they
-        take; 0: what there is time for.
+        take; 0: what there is time for. part: what of the picture is drawn, stretched to size_px.
         """
         start = time.perf_counter()
         programs_before = len(self.programs)
         self._level = (
             0
             if passes
-            else choose_quality_level(partial(self._work, optics, size_px), self._frame_time, budget_s, self._level)
+            else choose_quality_level(
+                partial(self._work, optics, size_px, part), self._frame_time, budget_s, self._level
+            )
         )
         level = QUALITY_LEVELS[self._level]
-        self.render(optics, scale_size(size_px, level.scale), level=level)
+        self.render(optics, scale_size(size_px, level.scale), level=level, part=part)
         if passes > 1:
             self._draw(math.inf, min(passes, len(self._current().places)))
             self._finish(None)
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs_before and passes <= 1:
-            self._frame_time.learn(self._work(optics, size_px, level), seconds)
+            self._frame_time.learn(self._work(optics, size_px, part, level), seconds)
         drawn = self._current().done
         if level != BEST_QUALITY:
-            self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY)
+            self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
         self._learn(drawn, seconds)
 
     def refine(self, budget_s: float = math.inf) -> None:
@@ -323,9 +334,9 @@ class Renderer:
             self._picture.stop()
             self._picture = None
 
-    def _work(self, optics: Optics, size_px: ScreenSize, level: QualityLevel) -> DrawCost:
+    def _work(self, optics: Optics, size_px: ScreenSize, part: TargetWindow, level: QualityLevel) -> DrawCost:
         field = self._open_field()
-        lens = lens_of(optics, field, round(size_px[0] * level.scale), self.prefilter, level)
+        lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), self.prefilter, level)
         samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []
         return DrawCost(
             samples=len(samples),

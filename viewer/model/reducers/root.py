@@ -89,6 +89,7 @@ from viewer.model.state.model_download import DownloadingChanged
 from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
+from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
 EDITS_KEPT = "Depth edits are kept: the photo opens as you leave it. Save the depth map for other programs."
@@ -204,9 +205,19 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, hides_panel=is_hidden)
         case ShowBefore(is_shown):
             return replace(state, shows_before=is_shown and state.scene is not None)
+        case SetZoom(zoom):
+            return replace(state, zoom=_checked_zoom(zoom) if state.scene is not None else None)
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state
+
+
+def _checked_zoom(zoom: Zoom | None) -> Zoom | None:
+    """One that shows something of the picture; None where it says nothing."""
+    if zoom is None or not all(map(math.isfinite, (zoom.scale, *zoom.centre))):
+        return None
+    x, y = (clamp(at, 0.0, 1.0) for at in zoom.centre)
+    return Zoom(max(zoom.scale, LEAST_ZOOM), (x, y))
 
 
 def _step_photo(state: AppState, steps: int) -> AppState:

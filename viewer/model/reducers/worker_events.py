@@ -72,7 +72,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     motion = Motion(speed=state.motion.speed)
     recent = remember_recent(state.recent, scene.source.path)
     inspection = of_next_scene(state.inspection)
-    opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection)
+    opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection, zoom=None)
     depth = DepthSettings(scene.source.depth.refine)
     if scene.plan is not None:  # a photo: it may have neighbours
         beside = ListFolderTask(str(PurePath(scene.source.path).parent)), ReadFactsTask(scene.source.path)

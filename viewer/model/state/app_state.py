@@ -15,7 +15,7 @@ from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ViewOffset
-from viewer.model.layout import ScreenSize
+from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.exporting import CancelExportTask, Exporting, ExportPrompt, ExportTask
 from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
@@ -24,6 +24,7 @@ from viewer.model.state.model_download import CancelGetTask, Downloading, GetMod
 from viewer.model.state.optics import CENTRE, Optics
 from viewer.model.state.photo_facts import NO_FACTS, FactsRead, ReadFactsTask
 from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, Saving, WriteSidecarTask
+from viewer.model.zoom import Zoom
 
 AS_FOUND = DepthSettings()
 AS_USUAL = DepthChoice()
@@ -393,6 +394,7 @@ class AppState:
 
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
+    zoom: None where the whole picture is seen.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
     file has them. saving, exporting: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this
     scene what is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs:
@@ -424,6 +426,7 @@ class AppState:
     recent: tuple[str, ...] = ()
     report: DrawReport | None = None
     inspection: Inspection = field(default_factory=Inspection)
+    zoom: Zoom | None = None
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None
@@ -468,7 +471,8 @@ class Picture:
     """Everything the picture depends on: the scene's generation, how many views were uploaded, the optics, its size in
     pixels.
 
-    samples: how far it has come on its way to the converged picture. previews: of edited depth shown so far.
+    samples: how far it has come on its way to the converged picture. previews: of edited depth shown so far. part: what
+    is drawn of it, as a share of it.
     """
 
     generation: int
@@ -477,3 +481,4 @@ class Picture:
     size_px: ScreenSize
     samples: int = 0
     previews: int = 0
+    part: Rect = WHOLE

@@ -38,22 +38,22 @@ BLACK: Color = (0.0, 0.0, 0.0, 1.0)
 
 def draw_over_picture(state: AppState, layout: Layout, textures: InspectionTextures) -> None:
     """Draw overlay, comparison and sheet over the picture. Colours do not follow the theme: below is a photo."""
-    scene, picture = state.scene, layout.picture
-    if scene is None or picture is None:
+    scene, frame = state.scene, layout.frame
+    if scene is None or frame is None:
         return
     if textures.overlay is not None:
-        _image(textures.overlay, picture)
-        _draw_legend(state, scene, layout, picture)
+        _image(textures.overlay, frame)
+        _draw_legend(state, scene, layout, frame)
     if state.shows_before:
-        _words("before", picture.x + 8 * layout.ui_scale, picture.y + 8 * layout.ui_scale, layout.ui_scale)
+        _words("before", frame.x + 8 * layout.ui_scale, frame.y + 8 * layout.ui_scale, layout.ui_scale)
     if textures.difference is not None:
-        _image(textures.difference, picture)
+        _image(textures.difference, frame)
         words = f"difference to the kept state, × {DIFFERENCE_GAIN}"
-        _words(words, picture.x + 8 * layout.ui_scale, picture.y + 8 * layout.ui_scale, layout.ui_scale)
+        _words(words, frame.x + 8 * layout.ui_scale, frame.y + 8 * layout.ui_scale, layout.ui_scale)
     if textures.left is not None:
-        _draw_comparison(state, scene, layout, picture, textures)
+        _draw_comparison(state, scene, layout, frame, textures)
     if textures.sheet is not None:
-        _draw_sheet(state, scene, layout, picture, textures.sheet)
+        _draw_sheet(state, scene, layout, frame, textures.sheet)
 
 
 def draw_beside_picture(state: AppState, layout: Layout, textures: InspectionTextures) -> None:
@@ -103,10 +103,10 @@ def _words(words: str, x: float, y: float, scale: float, align: float = 0.0) -> 
     draw.add_text(imgui.ImVec2(left + room, y + room / 2), pack_color(DARK.text), words)
 
 
-def _draw_legend(state: AppState, scene: Scene, layout: Layout, picture: Rect) -> None:
+def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> None:
     """The colours and their values, and where among them the pointer is."""
     kind, scale = state.inspection.overlay, layout.ui_scale
-    x, y, room = picture.x + 8 * scale, picture.y + 8 * scale, 5 * scale
+    x, y, room = frame.x + 8 * scale, frame.y + 8 * scale, 5 * scale
     if kind == "inpainted":
         _words("inpainted", x, y, scale)
         return
@@ -136,42 +136,42 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, picture: Rect) -
         _line(at, top - 2 * scale, at, top + height + 2 * scale, pack_color(DARK.text), 1.5 * scale)
 
 
-def _draw_comparison(
-    state: AppState, scene: Scene, layout: Layout, picture: Rect, textures: InspectionTextures
-) -> None:
+def _draw_comparison(state: AppState, scene: Scene, layout: Layout, frame: Rect, textures: InspectionTextures) -> None:
     """Left image, right image, the divider between them, and what each is."""
     kind, scale, draw = state.inspection.comparison, layout.ui_scale, imgui.get_background_draw_list()
     assert kind is not None
-    x, bottom = picture.x + state.inspection.divider * picture.width, picture.y + picture.height
-    for texture, left, right in ((textures.left, picture.x, x), (textures.right, x, picture.x + picture.width)):
+    assert layout.picture is not None
+    whole = frame if kind == "kept" else layout.picture
+    x, bottom = frame.x + state.inspection.divider * frame.width, frame.y + frame.height
+    for texture, left, right in ((textures.left, frame.x, x), (textures.right, x, frame.x + frame.width)):
         if texture is not None:
-            draw.push_clip_rect(imgui.ImVec2(left, picture.y), imgui.ImVec2(right, bottom), True)
-            _image(texture, picture)
+            draw.push_clip_rect(imgui.ImVec2(left, frame.y), imgui.ImVec2(right, bottom), True)
+            _image(texture, whole)
             draw.pop_clip_rect()
-    _line(x, picture.y, x, bottom, pack_color(DARK.text), 1.5 * scale)
-    knob = imgui.ImVec2(x, picture.y + picture.height / 2)
+    _line(x, frame.y, x, bottom, pack_color(DARK.text), 1.5 * scale)
+    knob = imgui.ImVec2(x, frame.y + frame.height / 2)
     draw.add_circle_filled(knob, 9 * scale, pack_color(BLACK, 0.55))
     draw.add_circle_filled(knob, 7.5 * scale, pack_color(DARK.text))
     for side in (-1, 1):
         tip, back = knob.x + side * 5 * scale, knob.x + side * 1.5 * scale
         corners = imgui.ImVec2(back, knob.y - 3 * scale), imgui.ImVec2(back, knob.y + 3 * scale)
         draw.add_triangle_filled(imgui.ImVec2(tip, knob.y), *corners, pack_color(DARK.background))
-    names, top = SIDES[kind], picture.y + 8 * scale
-    draw.push_clip_rect(imgui.ImVec2(picture.x, picture.y), imgui.ImVec2(picture.x + picture.width, bottom), True)
+    names, top = SIDES[kind], frame.y + 8 * scale
+    draw.push_clip_rect(imgui.ImVec2(frame.x, frame.y), imgui.ImVec2(frame.x + frame.width, bottom), True)
     _words(names[0], x - 10 * scale, top, scale, align=1.0)
     _words(names[1], x + 10 * scale, top, scale)
     pair = state.inspection.pair
     if pair is not None and kind not in ("photo", "kept"):
         words = view_label(pair.view, grid_to_compare(scene, kind, state.inspection.truth))
-        _words(words, picture.x + 8 * scale, bottom - imgui.get_text_line_height() - 13 * scale, scale)
+        _words(words, frame.x + 8 * scale, bottom - imgui.get_text_line_height() - 13 * scale, scale)
     draw.pop_clip_rect()
 
 
-def _draw_sheet(state: AppState, scene: Scene, layout: Layout, picture: Rect, texture: int) -> None:
+def _draw_sheet(state: AppState, scene: Scene, layout: Layout, frame: Rect, texture: int) -> None:
     """All views; a frame around the one the eye is nearest to, a finer one around the one under the pointer."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
-    _image(texture, picture)
-    cells = sheet_cells(picture, scene.grid, scale)
+    _image(texture, frame)
+    cells = sheet_cells(frame, scene.grid, scale)
     row, column = view_near(state.optics.eye, scene.grid)
     mouse = imgui.get_io().mouse_pos
     for i, cell in enumerate(cells):
@@ -195,7 +195,7 @@ def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, t
     draw = imgui.get_background_draw_list()
     for rect in (across, down):
         draw.push_clip_rect(imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height), True)
-        _draw_marks(state, scene, rect, scale, is_upright=rect is down)
+        _draw_marks(state, scene, rect, layout, is_upright=rect is down)
         draw.pop_clip_rect()
     x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
     quiet = pack_color(palette_of(state.preferences.theme).quiet)
@@ -204,19 +204,20 @@ def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, t
         draw.add_text(imgui.ImVec2(text.x, text.y + i * line), quiet, words)
 
 
-def _draw_marks(state: AppState, scene: Scene, rect: Rect, scale: float, is_upright: bool) -> None:
+def _draw_marks(state: AppState, scene: Scene, rect: Rect, layout: Layout, is_upright: bool) -> None:
     """A line along the eye's place among the views, one across at the pointer, and the slope of what lies there."""
     x_px, y_px = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
     eye: ViewOffset = state.optics.eye
+    part, scale = layout.part, layout.ui_scale
     if is_upright:
         views, at_view, size, pixel = scene.grid.rows, eye.t, scene.height, y_px
-        long_side, short_side = rect.height, rect.width
+        long_side, short_side, start, span = rect.height, rect.width, part.y, part.height
     else:
         views, at_view, size, pixel = scene.grid.columns, eye.s, scene.width, x_px
-        long_side, short_side = rect.width, rect.height
+        long_side, short_side, start, span = rect.width, rect.height, part.x, part.width
     band = short_side / views
     eye_at = (at_view + views // 2 + 0.5) * band
-    pointer_at = (pixel + 0.5) / size * long_side
+    pointer_at = ((pixel + 0.5) / size - start) / span * long_side
 
     def line(along0: float, across0: float, along1: float, across1: float, color: int, width: float) -> None:
         first, second = (along0, across0), (along1, across1)
@@ -227,7 +228,7 @@ def _draw_marks(state: AppState, scene: Scene, rect: Rect, scale: float, is_upri
     line(0, eye_at, long_side, eye_at, pack_color(DARK.accent), 2 * scale)
     line(pointer_at, 0, pointer_at, short_side, pack_color(DARK.text, 0.8), scale)
     if state.hover is not None and state.hover.disparity is not None:
-        slope = -state.hover.disparity / size * long_side / band
+        slope = -state.hover.disparity / size / span * long_side / band
         ends = [pointer_at + slope * (end - eye_at) for end in (0.0, short_side)]
         line(ends[0], 0, ends[1], short_side, pack_color(DARK.warning, 0.9), 1.5 * scale)
 

@@ -21,9 +21,12 @@ SHARP_WITHIN = 0.04
 
 def overlays(state: AppState, layout: Layout) -> None:
     """Draw everything that lies over the picture. Colours do not follow the theme: what is below is a photo."""
-    scene, picture = state.scene, layout.picture
-    if scene is None or picture is None:
+    scene, picture, frame = state.scene, layout.picture, layout.frame
+    if scene is None or picture is None or frame is None:
         return
+    draw = imgui.get_background_draw_list()
+    far = imgui.ImVec2(frame.x + frame.width, frame.y + frame.height)
+    draw.push_clip_rect(imgui.ImVec2(frame.x, frame.y), far, True)
     if state.tilt_handles is not None:
         _draw_handles(state.tilt_handles, layout, picture)
     if state.brush.is_on and scene.plan is not None:
@@ -31,6 +34,7 @@ def overlays(state: AppState, layout: Layout) -> None:
             _draw_brush(state, scene, state.hover, layout, picture)
     elif state.hover is not None and state.hover.disparity is not None:
         _draw_reticle(state, scene, state.hover, layout, picture)
+    draw.pop_clip_rect()
 
 
 def hover_text(optics: Optics, scene: Scene, hover: Hover, units: Units = "photographic") -> str:
@@ -73,13 +77,13 @@ def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, p
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
     y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
-    radius = RETICLE_RADIUS * scale
+    radius, frame = RETICLE_RADIUS * scale, layout.frame or picture
     _ring(draw, x, y, radius, scale, pack_color(DARK.text))
     words = hover_text(state.optics, scene, hover, state.preferences.units)
     size, room = imgui.calc_text_size(words), 6 * scale
-    left = x + radius + room if x + radius + 3 * room + size.x <= picture.x + picture.width else x - radius - size.x
-    left = max(left - (room if left < x else 0), picture.x + room)
-    top = min(max(y - size.y / 2, picture.y + room), picture.y + picture.height - size.y - room)
+    left = x + radius + room if x + radius + 3 * room + size.x <= frame.x + frame.width else x - radius - size.x
+    left = max(left - (room if left < x else 0), frame.x + room)
+    top = min(max(y - size.y / 2, frame.y + room), frame.y + frame.height - size.y - room)
     corners = imgui.ImVec2(left - room, top - room / 2), imgui.ImVec2(left + size.x + room, top + size.y + room / 2)
     draw.add_rect_filled(*corners, pack_color(DARK.background, 0.72), 4 * scale)
     draw.add_text(imgui.ImVec2(left, top), pack_color(DARK.text), words)
