@@ -34,7 +34,7 @@ from viewer.ui.widgets import button, gap, label, quiet
 Choice = TypeVar("Choice", bound=str)
 Option = TypeVar("Option")
 ANY_DISPLAY = "any"
-PROMPT_WIDTH, HELP_WIDTH = 460.0, 860.0
+PROMPT_WIDTH, MODELS_WIDTH, HELP_WIDTH = 460.0, 490.0, 860.0
 ROWS_SHOWN = 12
 LARGEST_SIDE = 65536
 MOUSE = (
@@ -76,7 +76,8 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     prompt = state.prompt
     if prompt is None:
         return []
-    width = min((HELP_WIDTH if prompt == "help" else PROMPT_WIDTH) * layout.ui_scale, layout.window.width)
+    usual = HELP_WIDTH if prompt == "help" else MODELS_WIDTH if isinstance(prompt, ModelsPrompt) else PROMPT_WIDTH
+    width = min(usual * layout.ui_scale, layout.window.width)
     middle = imgui.ImVec2(max(layout.panel.x, width) / 2, layout.window.height / 2)
     imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
@@ -244,7 +245,7 @@ def _models(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list[Actio
     imgui.text("Get a depth model")
     gap(layout, 2)
     selected = prompt.selected
-    if imgui.begin_table("models", 3, imgui.TableFlags_.sizing_stretch_prop):
+    if imgui.begin_table("models", 3, imgui.TableFlags_.sizing_fixed_fit):
         for i, model in enumerate(prompt.models):
             imgui.table_next_column()
             if imgui.selectable(model.title, i == selected, imgui.SelectableFlags_.span_all_columns)[0]:
