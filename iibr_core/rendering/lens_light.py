@@ -131,7 +131,7 @@ def bring_to(
     for _ in range(ROUNDS):
 
         def lack(first: int, last: int) -> None:
-            _mean_of_areas(light, part.top, part.left, step_y, step_x, top, left, first, last, missing)
+            _mean_of_areas(light, float(part.top), float(part.left), step_y, step_x, top, left, first, last, missing)
             missing[first:last] = smaller[top + first : top + last, left:right] - missing[first:last]
 
         def give(first: int, last: int) -> None:
@@ -141,16 +141,26 @@ def bring_to(
         in_bands(give, part.size, should_stop)
 
 
-def mean_of_areas(light: FloatImage, size: ImageSize, should_stop: ShouldStop = never) -> FloatImage:
+def mean_of_areas(
+    light: FloatImage,
+    size: ImageSize,
+    should_stop: ShouldStop = never,
+    area: tuple[float, float, float, float] | None = None,
+) -> FloatImage:
     """Light (h, w, 3) at another (height, width): the mean over each pixel's area; the same array where it has that
-    size. Raises Cancelled once should_stop is true.
+    size. area: what of the light it shows, top, left, height and width in pixels of it; None: all. Raises Cancelled
+    once should_stop is true.
     """
-    if image_size(light) == size:
+    everything = 0.0, 0.0, float(light.shape[0]), float(light.shape[1])
+    top, left, height, width = area or everything
+    if image_size(light) == size and (top, left, height, width) == everything:
         return light
     means = np.empty((*size, 3), np.float32)
-    step_y, step_x = light.shape[0] / size.height, light.shape[1] / size.width
+    step_y, step_x = height / size.height, width / size.width
     in_bands(
-        lambda first, last: _mean_of_areas(light, 0, 0, step_y, step_x, 0, 0, first, last, means), size, should_stop
+        lambda first, last: _mean_of_areas(light, -top, -left, step_y, step_x, 0, 0, first, last, means),
+        size,
+        should_stop,
     )
     return means
 

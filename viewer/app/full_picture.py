@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear
 from iibr_core.generation.memory_model import budget_of, require_own_size
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.rendering.large_views import whole
+from iibr_core.rendering.large_views import LargePhoto, Part, whole
 from iibr_core.rendering.lens_light import CENTRE, draw_large, mean_of_areas
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, in_bands, never
 from iibr_core.types import (
@@ -32,7 +33,7 @@ from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.large_photo import complete_fills, load_large
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.display.large_lens import large_lens
-from viewer.model.layout import ScreenSize
+from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.app_state import Progress, Scene
 from viewer.model.state.optics import Optics
 
@@ -44,7 +45,7 @@ MOST_PIXELS = 100_000_000
 @dataclass(frozen=True, eq=False)
 class FullPicture:
     """A picture as it was asked for. size: of what comes out. smaller: (H, W, 3) linear light of the same picture at
-    the scene's size, needed where `needs_smaller`.
+    the scene's size, needed where `needs_smaller`. part: what of the picture is drawn, as a share of it.
     """
 
     scene: Scene
@@ -53,6 +54,7 @@ class FullPicture:
     optics: Optics
     size: ScreenSize
     smaller: FloatImage | None = None
+    part: Rect = WHOLE
 
     def with_smaller(self, smaller: FloatImage) -> FullPicture:
         """The same with what it needs."""
@@ -63,13 +65,38 @@ class FullPicture:
         once should_stop is true.
         """
         report_progress(0, 0, "reading the photo at its own size")
-        photo = load_large(self.scene.source, self.loaded, self.plan, MOST_PIXELS, should_stop)
-        lens = large_lens(self.optics, self.scene, photo.size.width / self.scene.width)
-        if any(offset != CENTRE for offset in lens.offsets):
-            photo = photo.with_fills(complete_fills(self.scene.source, self.loaded, self.plan, should_stop))
+        photo = self.load(should_stop)
+        if self.needs_fills:
+            photo = photo.with_fills(self.fill(should_stop))
+        return self.draw_from(photo, should_stop, report_progress)
+
+    @property
+    def needs_fills(self) -> bool:
+        """Whether it shows what the photo hides."""
+        return any(offset != CENTRE for offset in large_lens(self.optics, self.scene, 1.0).offsets)
+
+    def load(self, should_stop: ShouldStop = never) -> LargePhoto:
+        """What it is drawn from, without fills. Raises as `draw` does."""
+        return load_large(self.scene.source, self.loaded, self.plan, MOST_PIXELS, should_stop)
+
+    def fill(self, should_stop: ShouldStop = never) -> RaySet | None:
+        """What the photo hides. Raises as `draw` does."""
+        return complete_fills(self.scene.source, self.loaded, self.plan, should_stop)
+
+    def draw_from(
+        self, photo: LargePhoto, should_stop: ShouldStop = never, report_progress: ReportProgress = ignore_progress
+    ) -> FloatImage:
+        """The same as `draw`, of what was loaded for a picture of the same photo."""
+        height, width = photo.size
+        lens = large_lens(self.optics, self.scene, width / self.scene.width)
+        top, left = self.part.y * height, self.part.x * width
+        down, across = self.part.height * height, self.part.width * width
+        pixels = Part(math.floor(top), math.ceil(top + down), math.floor(left), math.ceil(left + across))
+        pixels = pixels.grown(0, whole(photo.size))
         with ViewSynthesis(should_stop) as synthesis:
-            light = draw_large(photo, lens, whole(photo.size), synthesis, self.smaller, should_stop, report_progress)
-        return mean_of_areas(light, ImageSize(self.size.height, self.size.width), should_stop)
+            light = draw_large(photo, lens, pixels, synthesis, self.smaller, should_stop, report_progress)
+        size = ImageSize(self.size.height, self.size.width)
+        return mean_of_areas(light, size, should_stop, (top - pixels.top, left - pixels.left, down, across))
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ from viewer.app.input import (
 )
 from viewer.app.preferences_store import PREFERENCES_FILE, load_preferences, store_preferences
 from viewer.app.session_store import SessionStore
+from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
@@ -97,7 +98,7 @@ EMPTY = AppState()
 @dataclass(frozen=True)
 class Frame:
     """Everything the window shows: picture and what inspection adds, panels (as a digest), where they lie, their look,
-    repairs asked for.
+    repairs asked for. sharp: GL name of what stands in the picture's place, None without.
     """
 
     picture: Picture | None
@@ -106,6 +107,7 @@ class Frame:
     layout: Layout
     look: Look
     damages: int
+    sharp: int | None = None
 
 
 class App:
@@ -132,6 +134,7 @@ class App:
             raise
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
+        self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self._depth = DepthPreview(self.scene_view)
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
@@ -178,17 +181,29 @@ class App:
         self._pointer = pointer = read_pointer(self._pointer)
         actions = gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
-        actions += build_screen(self.state, layout, self.scene_view.texture if picture else None, textures, thumbnails)
+        sharp = self.sharpener.texture(picture) if picture else None
+        texture = sharp or (self.scene_view.texture if picture else None)
+        actions += build_screen(self.state, layout, texture, textures, thumbnails)
         actions += self._input(pointer, layout)
-        self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages))
+        self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))
+        is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
         self.do(*self._side_effects.draw(SAVE_BUDGET_S))
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
-        self._is_busy |= bool(actions) or self._side_effects.is_drawing
+        self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
+        self._is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self._direct_worker()
         self._read_ahead()
         self._keep_recent()
         self._took_s.append(time.perf_counter() - start)
+
+    @property
+    def _is_resting(self) -> bool:
+        """Whether nothing moves, every view is there and nothing is being drawn for a file."""
+        state, is_made = self.state, self.state.progress.is_complete or self.state.stopped == self.state.generation
+        is_shown = self.scene_view.generation == state.generation and self.scene_view.renderer.is_converged
+        is_edited = state.motion.is_running or state.stroke is not None
+        return is_made and is_shown and not is_edited and not self._side_effects.is_drawing
 
     @property
     def wait_s(self) -> float:
@@ -234,6 +249,7 @@ class App:
         self._side_effects.close()
         self._ui.release()
         self._filmstrip.release()
+        self.sharpener.close()
         self.inspection_view.release()
         self.scene_view.release()
         self._gl.release()

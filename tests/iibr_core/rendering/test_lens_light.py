@@ -116,3 +116,11 @@ def test_tiny_photos_and_huge_parallax(size: tuple[int, int], monkeypatch: pytes
     with ViewSynthesis() as synthesis:
         light = draw_large(photo, lens, whole(photo.size), synthesis, np.ones((1, 1, 3), np.float32))
     assert np.isfinite(light).all()
+
+
+def test_the_mean_of_a_part_counts_the_shares_of_its_border() -> None:
+    light = np.random.default_rng(3).random((5, 6, 3), np.float32)
+    fine = light.repeat(4, 0).repeat(4, 1)
+    part = mean_of_areas(light, ImageSize(3, 4), area=(0.5, 1.25, 3.0, 4.0))
+    expected = fine[2:14, 5:21].reshape(3, 4, 4, 4, 3).mean((1, 3))
+    np.testing.assert_allclose(part, expected, rtol=1e-5)

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.types import GridShape
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import NEAR, Driver
 from viewer.model.layout import Rect
+from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.zoom import SetZoom, Zoom
 
 Opener = Callable[..., Driver]
@@ -21,6 +23,15 @@ def viewer(open_window: Opener, photo_path: Path) -> Driver:
     driver = open_window(photo_path, grid=GridShape(3, 3))
     driver.until_idle()
     return driver
+
+
+def until_sharp(viewer: Driver) -> np.ndarray:
+    """The part that is seen, from the photo's own pixels, once it is shown."""
+    viewer.until(lambda app: app.sharpener.pixels is not None)
+    viewer.until_idle()
+    pixels = viewer.app.sharpener.pixels
+    assert pixels is not None
+    return pixels.astype(int)
 
 
 def part_of(viewer: Driver) -> Rect:
@@ -103,3 +114,41 @@ def test_a_click_in_the_zoomed_picture_focuses_on_what_is_seen_there(viewer: Dri
     viewer.send("mousemove", round(frame.x + 0.1 * frame.width), round(frame.y + frame.height / 2), "click", 1)
     near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
     viewer.until(lambda app: app.state.optics.focus_disparity == pytest.approx(near, abs=0.2))
+
+
+def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window: Opener, photo_path: Path) -> None:
+    viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
+    viewer.until_idle()
+    app, photo = viewer.app, read_photo(photo_path).pixels * 255
+    app.do(SetZoom(Zoom(1.0)))
+    sharp = until_sharp(viewer)
+    assert sharp.shape == photo.shape
+    assert np.abs(sharp - photo).max() <= 1
+    assert np.abs(viewer.image().astype(int) - photo).mean() > 3  # the views hold less
+    app.do(SetZoom(Zoom(2.0, (0.3, 0.6))))
+    viewer.until(lambda app: app.layout().scale == 2.0 and app.sharpener.pixels is not None)
+    app.do(MoveEye(ViewOffset(0.0, 0.5)))
+    viewer.until(lambda app: app.sharpener.pixels is None)
+    moved = until_sharp(viewer)
+    assert np.abs(moved - viewer.image()).mean() < 12
+    app.do(SetZoom(None))
+    viewer.until(lambda app: app.sharpener.pixels is None)
+
+
+def test_what_is_blurred_stays_so_where_it_is_sharpened(open_window: Opener, photo_path: Path) -> None:
+    viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
+    viewer.until_idle()
+    viewer.app.do(SetAperture(2.5), SetZoom(Zoom(1.0)))
+    sharp = until_sharp(viewer)
+    assert np.abs(sharp - viewer.image()).mean() < 12
+
+
+def test_a_photo_that_is_gone_is_said_and_the_views_are_seen_on(open_window: Opener, photo_path: Path) -> None:
+    viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
+    viewer.until_idle()
+    photo_path.unlink()
+    viewer.app.do(SetZoom(Zoom(1.0)))
+    viewer.until(lambda app: any("own pixels" in notice.text for notice in app.state.notices))
+    viewer.until_idle()
+    assert viewer.app.sharpener.pixels is None
+    assert viewer.image().std() > 10

@@ -1,0 +1,150 @@
+"""The part of the picture that is seen, drawn anew from the photo at its own size while nothing moves.
+
+It takes the place of the one drawn from the views as soon as it is there, and gives it back when anything changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.rendering.large_views import LargePhoto
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import SRGB
+from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
+from viewer.background.jobs import Failed, Job, JobThread
+from viewer.background.loaded_photo import LoadedPhoto
+from viewer.display.scene_view import SceneView
+from viewer.gpu.context import GLContext
+from viewer.gpu.inspection_passes import InspectionPasses
+from viewer.gpu.refocus.picture_drawing import PictureDrawing
+from viewer.model.actions import Action, Notify
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import AppState, Notice, Picture
+
+
+@dataclass(frozen=True, eq=False)
+class SharpPart:
+    """A part of a picture, drawn: (height, width, 3), sRGB-encoded."""
+
+    pixels: NDArray[np.uint8]
+
+
+class Sharpener:
+    """Everything is called from the one GL thread. pixels: of what is shown sharp, None without."""
+
+    def __init__(self, gl: GLContext, scene_view: SceneView, wake: Callable[[], None]) -> None:
+        """wake: called, in the drawing thread, when a part is drawn."""
+        self.pixels: NDArray[np.uint8] | None = None
+        self._scene_view = scene_view
+        self._passes = InspectionPasses(gl.ctx, scene_view.renderer.programs)
+        self._worker: JobThread[FullPicture, SharpPart | Failed[None]] = JobThread(
+            "iibr-sharp", wake, self._draw, lambda request, message: Failed(None, message)
+        )
+        self._wanted: Picture | None = None
+        self._request: FullPicture | None = None
+        self._drawing: PictureDrawing | None = None
+        self._texture: int | None = None
+        self._refused: LoadedPhoto | None = None
+        self._photo: tuple[LoadedPhoto, LargePhoto] | None = None
+
+    @property
+    def is_drawing(self) -> bool:
+        """Whether `advance` has something to draw here."""
+        return self._drawing is not None
+
+    def texture(self, picture: Picture) -> int | None:
+        """GL name of the sharp part (rows bottom-up) that takes the place of this picture; None while there is none."""
+        return self._texture if self._texture is not None and _key(picture) == self._wanted else None
+
+    def advance(self, picture: Picture | None, state: AppState, is_resting: bool, budget_s: float) -> list[Action]:
+        """Draw what is to be drawn here, for about that long, have the rest drawn, and say what went wrong.
+
+        is_resting: nothing moves, and nothing else is being drawn.
+        """
+        key = None if picture is None else _key(picture)
+        if key != self._wanted or (self._drawing is not None and not is_resting):
+            self._stop()
+        if picture is None or state.zoom is None:
+            self._photo = None
+        request = self._request_of(picture, state) if picture is not None and is_resting else None
+        if self._wanted is None and request is not None:
+            self._wanted, self._request = key, request
+            self._start(request)
+        if self._drawing is not None and self._request is not None:
+            self._draw_smaller(self._request, self._drawing, budget_s)
+        return self._take()
+
+    def close(self) -> None:
+        """Stop drawing and free the texture."""
+        self._stop()
+        self._worker.close()
+        self._passes.release()
+
+    def _request_of(self, picture: Picture, state: AppState) -> FullPicture | None:
+        """None where the photo has no more to show than the views."""
+        scene, loaded = state.scene, self._scene_view.loaded
+        if scene is None or scene.plan is None or loaded is None or scene.own_size is None or state.zoom is None:
+            return None
+        is_finer = picture.size_px.width / picture.part.width > scene.width
+        if not is_finer or loaded is self._refused or not is_full(scene, picture.optics, scene.own_size):
+            return None
+        return FullPicture(scene, scene.plan, loaded, picture.optics, ScreenSize(*picture.size_px), part=picture.part)
+
+    def _start(self, request: FullPicture) -> None:
+        if not needs_smaller(request.optics):
+            self._worker.submit(request)
+            return
+        scene = request.scene
+        self._drawing = self._scene_view.start_picture(
+            request.optics, scene.size, is_linear=True, color_space=scene.color_space
+        )
+
+    def _draw_smaller(self, request: FullPicture, drawing: PictureDrawing, budget_s: float) -> None:
+        """What of the picture is blurred, from the views."""
+        if drawing.is_stopped:  # for another one, or by other views
+            self._stop()
+            return
+        drawing.advance(budget_s)
+        if drawing.is_done:
+            drawing.stop()
+            self._drawing = None
+            self._worker.submit(request.with_smaller(np.asarray(drawing.image, np.float32)))
+
+    def _take(self) -> list[Action]:
+        result = self._worker.next_result()
+        match result:
+            case SharpPart(pixels):
+                self.pixels = pixels
+                self._texture = self._passes.show("sharp", np.ascontiguousarray(pixels[::-1]))
+            case Failed():
+                self._refused = self._scene_view.loaded  # it would fail again
+                return [Notify(Notice(f"Not shown at the photo's own pixels. {result.message}", is_error=True))]
+        return []
+
+    def _stop(self) -> None:
+        self._worker.cancel()
+        if self._drawing is not None:
+            self._drawing.stop()
+        self._wanted = self._request = self._drawing = self._texture = self.pixels = None
+
+    def _draw(self, job: Job[FullPicture, SharpPart | Failed[None]]) -> Iterator[SharpPart]:
+        """In the drawing thread. The photo is kept: the next part of it is then drawn at once."""
+        request, kept = job.request, self._photo
+        with suppress(Cancelled):
+            photo = kept[1] if kept is not None and kept[0] is request.loaded else request.load(job.should_stop)
+            self._photo = request.loaded, photo
+            if request.needs_fills and photo.fills is None:
+                photo = photo.with_fills(request.fill(job.should_stop))
+                self._photo = request.loaded, photo
+            light = request.draw_from(photo, job.should_stop)
+            yield SharpPart(encode_light(light, False, SRGB, request.scene.color_space, job.should_stop))
+
+
+def _key(picture: Picture) -> Picture:
+    """What the sharp part depends on: not on how many views there are, nor how far they have come."""
+    return replace(picture, views_uploaded=0, samples=0)
