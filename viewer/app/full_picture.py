@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,6 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear
 from iibr_core.generation.memory_model import budget_of, require_own_size
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.rendering.large_views import LargePhoto, Part, whole
-from iibr_core.rendering.lens_light import CENTRE, draw_large, mean_of_areas
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, in_bands, never
 from iibr_core.types import (
     ColorSpace,
@@ -30,12 +26,15 @@ from iibr_core.types import (
     image_size,
 )
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
-from viewer.background.large_photo import complete_fills, load_large
 from viewer.background.loaded_photo import LoadedPhoto
-from viewer.display.large_lens import large_lens
 from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.app_state import Progress, Scene
 from viewer.model.state.optics import Optics
+
+if TYPE_CHECKING:
+    # What draws is imported by the thread that draws: the window comes first.
+    from iibr_core.rendering.large_views import LargePhoto
+    from iibr_core.rendering.ray_set import RaySet
 
 TELL_EVERY_S = 0.1
 MOST_PIXELS = 100_000_000
@@ -73,20 +72,32 @@ class FullPicture:
     @property
     def needs_fills(self) -> bool:
         """Whether it shows what the photo hides."""
+        from iibr_core.rendering.lens_light import CENTRE
+        from viewer.display.large_lens import large_lens
+
         return any(offset != CENTRE for offset in large_lens(self.optics, self.scene, 1.0).offsets)
 
     def load(self, should_stop: ShouldStop = never) -> LargePhoto:
         """What it is drawn from, without fills. Raises as `draw` does."""
+        from viewer.background.large_photo import load_large
+
         return load_large(self.scene.source, self.loaded, self.plan, MOST_PIXELS, should_stop)
 
     def fill(self, should_stop: ShouldStop = never) -> RaySet | None:
         """What the photo hides. Raises as `draw` does."""
+        from viewer.background.large_photo import complete_fills
+
         return complete_fills(self.scene.source, self.loaded, self.plan, should_stop)
 
     def draw_from(
         self, photo: LargePhoto, should_stop: ShouldStop = never, report_progress: ReportProgress = ignore_progress
     ) -> FloatImage:
         """The same as `draw`, of what was loaded for a picture of the same photo."""
+        from iibr_core.rendering.large_views import Part, whole
+        from iibr_core.rendering.lens_light import draw_large, mean_of_areas
+        from iibr_core.rendering.view_synthesis import ViewSynthesis
+        from viewer.display.large_lens import large_lens
+
         height, width = photo.size
         lens = large_lens(self.optics, self.scene, width / self.scene.width)
         top, left = self.part.y * height, self.part.x * width

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.large_views import LargePhoto
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import SRGB
 from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
@@ -25,6 +25,9 @@ from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.model.actions import Action, Notify
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState, Notice, Picture
+
+if TYPE_CHECKING:
+    from iibr_core.rendering.large_views import LargePhoto
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,16 +7,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.generation.memory_model import Budget, budget_of, require_field
 from iibr_core.runtime.machine import memory_bytes
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewUpdate
 from viewer.model.state.app_state import Progress, Scene, Source
+
+if TYPE_CHECKING:
+    from iibr_core.formats.light_fields.scene import MultiView
 
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Where to look for the focus in a light field that says nothing about disparity."""

@@ -68,7 +68,7 @@ def test_focal_length_and_profile(tmp_path):
     photo = read_photo(save(tmp_path / "a.avif", patch, exif=exif.tobytes(), icc_profile=profile_bytes()))
     assert photo.focal_px == pytest.approx(50 / np.hypot(36, 24) * 80)
     assert np.abs(255 * photo.pixels - (216, 69, 50)).max() < 3
-    assert "converted" in photo.notes[0]
+    assert photo.notes[0] == "Colours are those of the photo's profile, 'made here'."
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.1, 0.5, 0.9])

@@ -31,7 +31,7 @@ def test_a_name_without_an_ending_gets_one(tmp_path: Path) -> None:
     assert map_path(SaveTask(f"{tmp_path}/a", (8, 8)), ()) == tmp_path / "a.pfm"
 
 
-@pytest.mark.parametrize("name", ["", "a.jpg", "missing-folder/a.png"])
+@pytest.mark.parametrize("name", ["", "a.bmp", "missing-folder/a.png"])
 def test_places_that_cannot_be_written_are_told_before_anything_is_drawn(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError):
         picture_path(SaveTask(str(tmp_path / name) if name else "", (8, 8)), ())
