@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.tiling import Cancelled
-from iibr_core.types import SRGB
+from iibr_core.types import SRGB, FloatImage
 from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto
@@ -23,7 +23,7 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.model.actions import Action, Notify
-from viewer.model.layout import ScreenSize
+from viewer.model.layout import WHOLE, ScreenSize
 from viewer.model.state.app_state import AppState, Notice, Picture
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ class Sharpener:
         self._request: FullPicture | None = None
         self._drawing: PictureDrawing | None = None
         self._texture: int | None = None
+        self._smaller: tuple[Picture, FloatImage] | None = None
         self._refused: LoadedPhoto | None = None
         self._photo: tuple[LoadedPhoto, LargePhoto] | None = None
 
@@ -73,7 +74,7 @@ class Sharpener:
         if key != self._wanted or (self._drawing is not None and not is_resting):
             self._stop()
         if picture is None or state.zoom is None:
-            self._photo = None
+            self._photo = self._smaller = None
         request = self._request_of(picture, state) if picture is not None and is_resting else None
         if self._wanted is None and request is not None:
             self._wanted, self._request = key, request
@@ -102,6 +103,9 @@ class Sharpener:
         if not needs_smaller(request.optics):
             self._worker.submit(request)
             return
+        if self._smaller is not None and self._wanted is not None and self._smaller[0] == _whole(self._wanted):
+            self._worker.submit(request.with_smaller(self._smaller[1]))  # another part of the same picture
+            return
         scene = request.scene
         self._drawing = self._scene_view.start_picture(
             request.optics, scene.size, is_linear=True, color_space=scene.color_space
@@ -116,7 +120,10 @@ class Sharpener:
         if drawing.is_done:
             drawing.stop()
             self._drawing = None
-            self._worker.submit(request.with_smaller(np.asarray(drawing.image, np.float32)))
+            assert self._wanted is not None
+            smaller = np.asarray(drawing.image, np.float32)
+            self._smaller = _whole(self._wanted), smaller
+            self._worker.submit(request.with_smaller(smaller))
 
     def _take(self) -> list[Action]:
         result = self._worker.next_result()
@@ -151,3 +158,8 @@ class Sharpener:
 def _key(picture: Picture) -> Picture:
     """What the sharp part depends on: not on how many views there are, nor how far they have come."""
     return replace(picture, views_uploaded=0, samples=0)
+
+
+def _whole(picture: Picture) -> Picture:
+    """All of the picture, at no size."""
+    return replace(picture, part=WHOLE, size_px=ScreenSize(0, 0))
