@@ -27,6 +27,7 @@ from viewer.model.layout import Rect as R
 from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, History, Hover, Scene, Source, TiltHandles
 from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, Optics, ResetOptics, SetFocus
+from viewer.model.zoom import SetZoom, Zoom
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
 STATE = AppState(source=SCENE.source, scene=SCENE)
@@ -251,3 +252,35 @@ def test_picture_corners_are_half_a_pixel_outside_the_first_and_last_pixel() -> 
     rect = R(10, 20, 300, 200)
     assert pixel_at(rect, (600, 400), 10, 20) == (-0.5, -0.5)
     assert pixel_at(rect, (600, 400), 310, 220) == (599.5, 399.5)
+
+
+ZOOMED = layout_of((1280, 800), (600, 400), zoom=Zoom(4.0), own_width=600)
+
+
+def test_ctrl_and_the_wheel_zoom_over_the_picture() -> None:
+    (action,) = asked(replace(OVER_PICTURE, wheel=1.0, holds_ctrl=True))
+    assert isinstance(action, SetZoom)
+    assert action.zoom is not None
+    assert action.zoom.scale > LAYOUT.fit
+    assert asked(replace(OVER_PICTURE, x=1, y=1, wheel=1.0, holds_ctrl=True)) == []
+
+
+def test_a_press_on_the_small_picture_moves_the_large_one_and_points_at_nothing() -> None:
+    at = ZOOMED.minimap
+    assert at is not None
+    x, y = at.x + 0.8 * at.width, at.y + 0.3 * at.height
+    pointer = Pointer(x=x, y=y, pressed_x=x, pressed_y=y)
+    for held in (replace(pointer, is_down=True), replace(pointer, is_released=True, clicks=2)):
+        (action,) = asked(held, layout=ZOOMED)
+        assert isinstance(action, SetZoom)
+        assert action.zoom is not None
+        assert action.zoom.centre == pytest.approx((0.8, 0.3))
+    assert actions_from_hover(pointer, ZOOMED, STATE, lambda x, y: 1.5) == []
+
+
+def test_pulling_moves_the_zoomed_picture_and_nothing_else() -> None:
+    pulling = replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=5.0, pulls=True)
+    (action,) = asked(pulling, layout=ZOOMED)
+    assert isinstance(action, SetZoom)
+    assert asked(pulling) == []  # all of it is seen
+    assert asked(replace(pulling, is_down=False, is_released=True, step_x=0.0, drag_distance=0.0), layout=ZOOMED) == []
