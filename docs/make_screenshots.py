@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import DismissNotice, SetHover
+from viewer.model.actions import DismissNotices, SetHover
 from viewer.model.state.app_state import Hover, Section, Source
 from viewer.model.state.inspection import SetOverlay, ShowEpis, ShowValues
 from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetApertureShape, SetFocus
@@ -32,7 +32,6 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     with HeadlessViewer() as viewer:
         viewer.open(Source(str(resource_folder("assets") / "motorcycle" / "motorcycle.png")), 1.0, lambda _: None)
-        viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
         write(folder / "screenshot.png", whole_window(viewer))
         write(folder / "inspection.png", inspection(viewer))
 
@@ -44,7 +43,7 @@ def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
     pointed = hover_at(viewer, *TANK)
     assert pointed.disparity is not None
     viewer.do(SetFocus(pointed.disparity), SetAperture(6.0), SetApertureShape(ApertureShape("polygon", blades=7)))
-    viewer.do(SetHover(pointed))
+    viewer.do(DismissNotices(), SetHover(pointed))
     return viewer.screen(SIZE)
 
 
