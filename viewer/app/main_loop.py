@@ -121,7 +121,7 @@ class App:
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
         if kept_in and not (kept_in / PREFERENCES_FILE).exists():
-            self.state = replace(self.state, prompt="help")  # the first start
+            self.state = replace(self.state, prompt="welcome")  # the first start
         self._window_slot = WindowSlot(kept_in)
         preferences = self.state.preferences
         place = self._window_slot.shift(preferences.window)

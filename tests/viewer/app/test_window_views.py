@@ -99,7 +99,7 @@ def shown(viewer: Driver, name: str) -> np.ndarray:
 def test_help_is_shown_on_the_first_start_and_not_again(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
     first = open_window(photo_path, kept_in=tmp_path / "kept", grid=GridShape(1, 1))
     first.until_idle()
-    assert first.app.state.prompt == "help"
+    assert first.app.state.prompt == "welcome"
     first.app.do(ShowPrompt(None))
     first.close()
     second = open_window(photo_path, kept_in=tmp_path / "kept", grid=GridShape(1, 1))

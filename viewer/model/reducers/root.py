@@ -100,6 +100,7 @@ def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
     if isinstance(action, LensAction):
         state = replace(state, shows_before=False) if state.shows_before else state
+        state = replace(state, prompt=None) if state.prompt == "welcome" else state  # who moves has understood
         moves = isinstance(action, MoveEye | SetDolly | ResetOptics)
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
         edited = reduce_lens(still, action)

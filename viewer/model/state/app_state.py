@@ -277,7 +277,7 @@ class PalettePrompt:
     selected: int = 0
 
 
-Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "quit"]
+Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "welcome", "quit"]
 """quit: whether to close although depth edits are saved nowhere."""
 
 

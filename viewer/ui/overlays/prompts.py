@@ -52,6 +52,8 @@ MOUSE = (
     ("Gamepad", "Viewpoint, focus; triggers: aperture"),
     ("Esc", "Close what is open, put the brush away"),
 )
+FIRST_GESTURES = 5
+"""So many are told at the first start, in a pad that leaves the photo to be seen."""
 PICTURE_ENDINGS = "The name's ending decides: .png, .jpg, .tif, .webp, .avif, or .exr in linear light."
 MAP_ENDINGS = "The name's ending decides: .pfm, .exr, .npy, or .png (16 bits, scaled)."
 PATH_WORDS = {
@@ -78,8 +80,9 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
         return []
     usual = HELP_WIDTH if prompt == "help" else MODELS_WIDTH if isinstance(prompt, ModelsPrompt) else PROMPT_WIDTH
     width = min(usual * layout.ui_scale, layout.window.width)
-    middle = imgui.ImVec2(max(layout.panel.x, width) / 2, layout.window.height / 2)
-    imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
+    down = 0.0 if prompt == "welcome" else 0.5
+    middle = imgui.ImVec2(max(layout.panel.x, width) / 2, down * layout.window.height)
+    imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, down))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
     imgui.begin(f"prompt {type(prompt).__name__}", None, _FLAGS)
     # A field that is typed in takes Esc for itself; one Esc is to close all of it.
@@ -106,7 +109,9 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case "quit":
             return _quit(layout)
         case "help":
-            return _help(layout)
+            return _help(layout, [*MOUSE, *((c.chords[0].words, c.name) for c in COMMANDS if c.chords)])
+        case "welcome":
+            return _help(layout, [*MOUSE[:FIRST_GESTURES], ("F1", "All of mouse and keys")])
 
 
 def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
@@ -305,10 +310,10 @@ def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -
     return pressed
 
 
-def _help(layout: Layout) -> list[Action]:
+def _help(layout: Layout, rows: list[tuple[str, str]]) -> list[Action]:
+    """What the mouse and the keys do, in two columns where there is room."""
     imgui.text("Mouse and keys")
     gap(layout, 2)
-    rows = [*MOUSE, *((c.chords[0].words, c.name) for c in COMMANDS if c.chords)]
     across = 2 if imgui.get_content_region_avail().x > 1.5 * PROMPT_WIDTH * layout.ui_scale else 1
     down = -(-len(rows) // across)
     if imgui.begin_table("keys", 2 * across, imgui.TableFlags_.sizing_fixed_fit):
