@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,7 +56,7 @@ def showings_of_folder(
     read: list[ViewUpdate] = [next(views)]
     scene = _scene_as_read(source, field, grid, read[0], disparity_range(field))
     if (scene.has_view_disparity and given is None) or max(grid) == 1:
-        yield Showing(scene, _chain(read, views))
+        yield Showing(scene, chain(read, views))
         return
     if takes_drafts:
         yield Showing(scene, _keep(read, views))
@@ -162,11 +163,6 @@ def _keep(read: list[ViewUpdate], views: Iterator[ViewUpdate]) -> Iterator[ViewU
     for view in views:
         read.append(view)
         yield view
-
-
-def _chain(read: list[ViewUpdate], views: Iterator[ViewUpdate]) -> Iterator[ViewUpdate]:
-    yield from read
-    yield from views
 
 
 def _range_of(values: FloatImage) -> tuple[float, float]:

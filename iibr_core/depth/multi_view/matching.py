@@ -162,9 +162,9 @@ def _match(textures, offsets, disparity, most, parts):
                 elif t > 0:
                     lower += cost
                     lowers += 1
-            mean = everything / everyone if everyone >= max(seen, np.float32(1)) else most
-            parts[4, y, x] = mean
             is_seen = everyone >= max(seen, np.float32(1))
+            mean = everything / everyone if is_seen else most
+            parts[4, y, x] = mean
             parts[0, y, x] = left / lefts if is_seen and lefts > 0 else mean
             parts[1, y, x] = right / rights if is_seen and rights > 0 else mean
             parts[2, y, x] = upper / uppers if is_seen and uppers > 0 else mean
