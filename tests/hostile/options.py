@@ -90,6 +90,7 @@ _export = [
         (("--to", "mp4", "-o", "new.mp4", "--size", "33x24", "--grid", "1"), "32x24"),
         (("--to", "sbs", "-o", "new.png", "--size", "0x4"), "--size"),
         (("--to", "sbs", "-o", "new.png", "--literal"), "--grid"),
+        (("--to", "hci", "-o", "new", "--literal", "--grid", "3", "--depth-strength", "2"), "--depth-strength"),
         (("--to", "anaglyph", "-o", "photo.png", "--force"), "photo.png"),
         (("--to", "epi", "-o", "new.png", "--row", "999", "--grid", "1"), "row 999"),
         (("--to", "splats", "-o", "new.ply", "--depth", "flat"), "flat"),
@@ -207,6 +208,10 @@ _others = [
         (("plan", "--", "--fly"), "--fly"),
         (("--fly",), "--fly"),
         (("generate", "photo.png", "--grid", "3", "--out", "new", "--format", "mp4"), "mp4"),
+        (
+            ("generate", "photo.png", "--disparity", "map.pfm", "--grid", "3", "--out", "new", "--depth-strength", "2"),
+            "--depth-strength",
+        ),
         (("generate", "photo.png", "--grid", "99", "--out", "new", "--memory", "1K"), "--memory"),
         (("view", "photo.png", "--ground-truth", "missing"), "missing"),
         (("view", "photo.png", "--ground-truth", "photo.png"), "photo.png"),

@@ -9,41 +9,28 @@ from typing import Annotated
 
 import typer
 
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import GridShape
+from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
-    DepthFrom,
-    DepthModel,
-    DepthStrength,
-    DisparityFile,
-    DisparityScale,
     Force,
-    Inpaint,
     LightFieldFormat,
-    MaxPixels,
-    Memory,
     PhotoPath,
-    QualityChoice,
-    Refine,
-    depth_choice,
     grid_from_text,
     inputs_with_sidecar,
     require_existing,
     require_memory,
     require_model,
 )
+from viewer.cli.scene_options import SceneOptions
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
 
+@with_option_records
 def generate(
     photo: PhotoPath,
     grid: Annotated[GridShape, typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.")],
-    disparity: DisparityFile = None,
-    disparity_scale: DisparityScale = 1.0,
-    depth: DepthFrom = "auto",
-    depth_model: DepthModel = None,
-    refine: Refine = 1.0,
+    scene: SceneOptions,
     format: LightFieldFormat = "hci",
     literal: Annotated[
         bool | None,
@@ -53,12 +40,7 @@ def generate(
             show_default="literal with --disparity",
         ),
     ] = None,
-    depth_strength: DepthStrength = 1.0,
     with_disparity: Annotated[bool, typer.Option("--with-disparity", help="A disparity map for every view.")] = False,
-    max_pixels: MaxPixels = None,
-    memory: Memory = None,
-    quality: QualityChoice = None,
-    inpaint: Inpaint = DEFAULT_INPAINTER,
     force: Force = False,
 ) -> None:
     """Write the light field of a photo: a disparity map that is named counts as it is, in px from view to view; found
@@ -66,17 +48,14 @@ def generate(
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
     """
-    require_memory(memory, keeps_views=False)
+    require_memory(scene.memory, keeps_views=False)
     from iibr_core.formats.light_fields.registry import writer_for
-    from viewer.model.state.app_state import Source
 
-    choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
-    is_literal = disparity is not None if literal is None else literal
-    source = Source(str(photo), choice, grid, max_pixels=max_pixels, quality=quality, is_literal=is_literal)
+    source = scene.source(photo, grid, is_literal=scene.disparity is not None if literal is None else literal)
     require_existing(source)
     new_writer = writer_for(format)
     new_writer.require_place(out, inputs_with_sidecar(source), force)
-    require_model(choice)
+    require_model(source.depth)
 
     from iibr_core.color import photo_in_srgb
     from iibr_core.generation.light_field import generate as generated
@@ -85,14 +64,16 @@ def generate(
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
     photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
-    plan = make_plan(source, loaded, depth_strength, keeps_views=False)
+    plan = make_plan(source, loaded, scene.depth_strength, keeps_views=False)
     total = grid.rows * grid.columns
     disparity_read = plan.field_disparity(loaded.disparity)
     with (
         new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
         show_progress("making views") as show,
         closing(
-            generated(photo_read, disparity_read, plan, inpaint=inpaint, aids=inpainting_aids(source, loaded, show))
+            generated(
+                photo_read, disparity_read, plan, inpaint=source.inpaint, aids=inpainting_aids(source, loaded, show)
+            )
         ) as views,
     ):
         seconds = 0.0

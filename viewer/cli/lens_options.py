@@ -3,23 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from iibr_core.types import InputError, ViewOffset
+from viewer.cli.options import not_negative_from_text, number_option, view_from_text
 
 if TYPE_CHECKING:
     from viewer.model.actions import Action
     from viewer.model.state.app_state import Scene
     from viewer.model.state.optics import Optics
 
+View = Annotated[
+    ViewOffset | None,
+    typer.Option(
+        parser=view_from_text, metavar="S,T", help="Viewpoint in view steps, right and down.", show_default="0,0"
+    ),
+]
+Focus = Annotated[
+    float | None,
+    number_option("Disparity that is sharp (the panel's Focus) and lies in a display's screen, px per view step."),
+]
+Aperture = Annotated[
+    float | None, typer.Option(parser=not_negative_from_text, metavar="X", help="Aperture diameter in view steps.")
+]
+
 
 @dataclass(frozen=True)
 class LensOptions:
     """What the options say about the lens, None where they say nothing."""
 
-    view: ViewOffset | None = None
-    focus: float | None = None
-    aperture: float | None = None
+    view: View = None
+    focus: Focus = None
+    aperture: Aperture = None
 
     def actions(self) -> list[Action]:
         """What sets the lens so."""

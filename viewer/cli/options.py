@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.formats.files import is_folder, status_of
+from iibr_core.formats.files import status_of
 from iibr_core.formats.light_fields.registry import WRITERS
 from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
 from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
@@ -23,12 +23,6 @@ MAX_GRID = 99
 MOST = 2**62
 """Of bytes and pixels: what adds a few to it still fits into 64 bits."""
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
-
-
-NOT_FOR_LIGHT_FIELDS = {
-    "depth", "depth_model", "refine", "depth_strength", "focus_disparity", "grid", "max_pixels", "quality", "inpaint",
-}  # fmt: skip
-"""Parameters about how views are made: a light field brings its own. Its centre view's disparity may be given."""
 
 SCREEN_SIZE = ScreenSize(1280, 800)
 """Of the window in pictures, unless another is asked for."""
@@ -104,32 +98,6 @@ def given_options(context: typer.Context) -> set[str]:
     sources = {name: context.get_parameter_source(name) for name in context.params}
     names = {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
     return names | {"memory_bytes"} if "memory" in names else names
-
-
-def depth_choice(
-    file: Path | None, file_scale: float, start: DepthStart, model: str | None, refine: float, memory_bytes: int | None
-) -> DepthChoice:
-    """What the options about depth say, in the order of their declarations below; a model that is named is asked first.
-
-    Raises InputError where they contradict each other.
-    """
-    if file is not None and (start != "auto" or model is not None):
-        raise InputError("--disparity names the depth already: leave out --depth and --depth-model")
-    if model is not None and start not in ("auto", "model"):
-        raise InputError(f"--depth {start} asks no model: leave out --depth-model")
-    start = start if model is None else "model"
-    return DepthChoice(start, str(file) if file else None, file_scale, model, refine, memory_bytes)
-
-
-def require_heeded(context: typer.Context, path: Path) -> None:
-    """Raise InputError for options given that a light field at `path` would not heed."""
-    given = given_options(context)
-    # A scale says nothing without the map that it is of.
-    given &= NOT_FOR_LIGHT_FIELDS if "disparity" in given else NOT_FOR_LIGHT_FIELDS | {"disparity_scale"}
-    if not given or not is_folder(path):
-        return
-    options = [parameter.opts[0] for parameter in context.command.params if parameter.name in given]
-    raise InputError(f"{' and '.join(options)}: {path} is a folder, and its views are taken as they are; leave it out")
 
 
 def require_memory(memory_bytes: int | None, keeps_views: bool) -> None:

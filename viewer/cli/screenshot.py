@@ -12,39 +12,25 @@ import typer
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import ColorSpace, InputError, ViewOffset
+from iibr_core.types import ColorSpace, InputError
 from viewer.cli.lens_options import NO_LENS_OPTIONS, LensOptions
+from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
     SCREEN_SIZE,
-    DepthFrom,
-    DepthModel,
-    DepthStrength,
-    DisparityFile,
-    DisparityScale,
     FocusDisparity,
     Force,
     Grid,
-    Inpaint,
-    MaxPixels,
-    Memory,
-    QualityChoice,
-    Refine,
     ScenePath,
-    depth_choice,
     given_options,
     inputs_with_sidecar,
-    not_negative_from_text,
-    number_option,
     require_existing,
-    require_heeded,
     require_memory,
     require_model,
     require_picture_memory,
     require_utf8,
     size_from_text,
-    view_from_text,
 )
+from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.model.layout import ScreenSize
 
@@ -86,6 +72,7 @@ def profile_from_text(text: str) -> ColorSpace:
     return PROFILES[text]
 
 
+@with_option_records
 def screenshot(
     context: typer.Context,
     path: ScenePath,
@@ -98,19 +85,8 @@ def screenshot(
             show_default=False,
         ),
     ] = None,
-    view: Annotated[
-        ViewOffset | None,
-        typer.Option(
-            parser=view_from_text, metavar="S,T", help="Viewpoint in view steps, right and down.", show_default="0,0"
-        ),
-    ] = None,
-    focus: Annotated[
-        float | None, number_option("Disparity that is sharp, px per view step (the panel's Focus).")
-    ] = None,
-    aperture: Annotated[
-        float | None,
-        typer.Option(parser=not_negative_from_text, metavar="X", help="Aperture diameter in view steps."),
-    ] = None,
+    *,
+    lens: LensOptions,
     size: Annotated[
         ScreenSize | None,
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
@@ -135,18 +111,9 @@ def screenshot(
     gps: Annotated[bool, typer.Option("--gps", help="Keep the place where the photo was taken.")] = False,
     ui: Annotated[bool, typer.Option("--ui", help="With the panels, as in the window.")] = False,
     backend: Annotated[Backend, typer.Option(help="Where OpenGL comes from.")] = Backend.auto,
-    disparity: DisparityFile = None,
-    disparity_scale: DisparityScale = 1.0,
-    depth: DepthFrom = "auto",
-    depth_model: DepthModel = None,
-    refine: Refine = 1.0,
-    depth_strength: DepthStrength = 1.0,
+    scene: SceneOptions,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
-    max_pixels: MaxPixels = None,
-    memory: Memory = None,
-    quality: QualityChoice = None,
-    inpaint: Inpaint = DEFAULT_INPAINTER,
     force: Force = False,
 ) -> None:
     """Render one picture without a display; its settings are saved in it.
@@ -156,24 +123,22 @@ def screenshot(
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
     from viewer.app.save_places import require_picture_place
-    from viewer.model.state.app_state import Source
 
-    choice = depth_choice(disparity, disparity_scale, depth, depth_model, refine, memory)
-    shot = _Shot(Source(str(path), choice, grid, focus_disparity, max_pixels, quality, inpaint), depth_strength, size)
+    shot = _Shot(scene.source(path, grid, focus_disparity), scene.depth_strength, size)
     require_heeded(context, path)
-    require_memory(memory, keeps_views=True)
+    require_memory(scene.memory, keeps_views=True)
     require_existing(shot.source)
     if full and (ui or size is not None):
         raise InputError(f"--full: gives the picture its size, leave {'--ui' if ui else '--size'} away")
     if ui:
-        require_utf8(path, disparity, depth_model)
+        require_utf8(path, scene.disparity, scene.depth_model)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
     form = PictureFormat(bits, picture_quality, profile, gps)
     require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force, form)
     require_picture_memory(shot.size, shot.source.depth.memory_bytes, is_float(output, form))
-    require_model(choice)
-    shot = replace(shot, lens=LensOptions(view, focus, aperture), is_full=full, form=form)
+    require_model(shot.source.depth)
+    shot = replace(shot, lens=lens, is_full=full, form=form)
     notes, origin = _write(shot, output, ui, backend)
     print(output)
     print_depth(origin)

@@ -1,0 +1,107 @@
+"""What the options of `export` and `batch` say: what is written, and what some kinds of export are told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from iibr_core.formats.quilts import DEVICES
+from iibr_core.runtime.extras import require_extra
+from iibr_core.types import InputError
+from viewer.cli.lens_options import LensOptions
+from viewer.cli.options import given_options, not_negative_from_text, size_from_text
+from viewer.model.export_kinds import EXPORTS, ExportKind, export_kind
+from viewer.model.layout import ScreenSize
+from viewer.model.state.exporting import ANIMATIONS, AnimationKind, ExportOptions
+
+MOST_FRAMES, MOST_RATE = 10_000, 240.0
+
+
+def kind_from_text(text: str) -> ExportKind:
+    """What to export, by name. Raises BadParameter."""
+    try:
+        return export_kind(text)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def device_from_text(text: str) -> str:
+    """A light-field display, by name. Raises BadParameter."""
+    if text not in DEVICES:
+        raise typer.BadParameter(f"{text!r} is no display that is known: give {', '.join(DEVICES)}")
+    return text
+
+
+def motion_from_text(text: str) -> AnimationKind:
+    """What moves in an animation, by name. Raises BadParameter."""
+    for motion in ANIMATIONS:
+        if text == motion:
+            return motion
+    raise typer.BadParameter(f"{text!r} is no motion: give {', '.join(ANIMATIONS)}")
+
+
+def rate_from_text(text: str) -> float:
+    """Frames a second. Raises BadParameter."""
+    rate = not_negative_from_text(text)
+    if not 0.1 <= rate <= MOST_RATE:
+        raise typer.BadParameter(f"{text!r} is no rate: give 0.1 to {MOST_RATE:g} frames a second")
+    return rate
+
+
+To = Annotated[
+    ExportKind, typer.Option("--to", parser=kind_from_text, metavar="KIND", help=f"One of {', '.join(EXPORTS)}.")
+]
+
+
+@dataclass(frozen=True)
+class KindOptions:
+    """As `ExportOptions` has them."""
+
+    size: Annotated[
+        ScreenSize | None,
+        typer.Option(parser=size_from_text, metavar="WxH", help="Of each picture.", show_default="the photo's"),
+    ] = None
+    device: Annotated[
+        str | None,
+        typer.Option(
+            parser=device_from_text, metavar="NAME", help=f"Display to make a quilt for: {', '.join(DEVICES)}."
+        ),
+    ] = None
+    eyes: Annotated[
+        float | None,
+        typer.Option(
+            parser=not_negative_from_text, metavar="X", help="View steps between two eyes.", show_default="the grid"
+        ),
+    ] = None
+    motion: Annotated[
+        AnimationKind | None,
+        typer.Option(parser=motion_from_text, metavar="|".join(ANIMATIONS), help="What moves.", show_default="circle"),
+    ] = None
+    frames: Annotated[
+        int | None, typer.Option(min=1, max=MOST_FRAMES, help="Of an animation, or pictures of a stack.")
+    ] = None
+    rate: Annotated[
+        float | None, typer.Option(parser=rate_from_text, metavar="X", help="Frames a second.", show_default="30")
+    ] = None
+
+    def options(self, keys: Path | None = None, row: int | None = None) -> ExportOptions:
+        """With what is said of a single photo."""
+        return ExportOptions(self.size, self.device, self.eyes, self.motion, keys, self.frames, self.rate, row)
+
+
+HEEDED_BY_SOME = {field.name for record in (LensOptions, KindOptions) for field in fields(record)} | {"keys", "row"}
+"""Options that some kinds heed and others do not."""
+
+
+def require_kind(context: typer.Context, kind: ExportKind) -> None:
+    """Raise InputError for options given that this kind would not heed, and where packages are missing for it."""
+    given = (given_options(context) & HEEDED_BY_SOME) - set(kind.heeds)
+    if given:
+        options = sorted(parameter.opts[0] for parameter in context.command.params if parameter.name in given)
+        name = next(name for name, known in EXPORTS.items() if known is kind)
+        raise InputError(f"{' and '.join(options)}: means nothing to --to {name}; leave it out")
+    if kind.needs:
+        require_extra("export", *kind.needs)
