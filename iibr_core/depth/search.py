@@ -19,8 +19,8 @@ from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.refine import refine
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
-from iibr_core.formats.images.oiio_reader import read_orientation
-from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo, upright
+from iibr_core.formats.images.oiio_reader import read_orientation, upright
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
@@ -180,13 +180,22 @@ class _DepthSearch:
     def embedded(self) -> _FoundDepth | None:
         embedded = read_embedded(self.path)
         if embedded is None:
-            return None
+            return self.of_pair()
         orientation = read_orientation(self.path)
         photo = self.photo
         if embedded.all_in_focus is not None:
             photo = _all_in_focus_photo(photo, embedded.all_in_focus, orientation, self.max_pixels)
         origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
         return _FoundDepth(photo, origin, _rotate(embedded.estimate, photo.size, orientation))
+
+    def of_pair(self) -> _FoundDepth | None:
+        from iibr_core.depth.stereo_pair import estimate_from_pair
+
+        found = estimate_from_pair(self.path, self.choice.memory_bytes, self.should_stop, self.report_progress)
+        if found is None:
+            return None
+        estimate, layout = found
+        return _FoundDepth(self.photo, DepthOrigin("embedded", f"the photo's two views ({layout})"), estimate)
 
     def model(self) -> _FoundDepth | None:
         from iibr_core.depth.models.catalog import model_to_use

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from iibr_core.formats.files import entries_of, is_folder
-from iibr_core.formats.images.oiio_reader import read_size
-from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.photo import read_picture
+from iibr_core.formats.images.picture_source import source_size
 from iibr_core.formats.light_fields.registry import LAYOUTS, find_light_field
 from iibr_core.formats.light_fields.scene import KnownDisparity, KnownView, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
@@ -58,11 +58,11 @@ def read_view(view: KnownView, max_pixels: int) -> tuple[FloatImage, NDArray[np.
 
     A turned camera's picture is turned back, so that it looks as the given one does.
     """
-    pixels = np.clip(read_photo(view.path, max_pixels).pixels, 0, 1)
+    pixels = np.clip(read_picture(view.picture, max_pixels).pixels, 0, 1)
     if view.turned is None:
         return pixels, np.ones(pixels.shape[:2], np.bool_)
     smaller = np.eye(3)
-    for axis, (stored, now) in enumerate(zip(read_size(view.path)[::-1], pixels.shape[1::-1])):
+    for axis, (stored, now) in enumerate(zip(source_size(view.picture)[::-1], pixels.shape[1::-1])):
         smaller[axis, axis] = now / stored
         smaller[axis, 2] = 0.5 * now / stored - 0.5
     return undo_rotation(pixels, smaller @ view.turned @ np.linalg.inv(smaller))

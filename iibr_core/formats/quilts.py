@@ -4,6 +4,7 @@ bottom left; the next ones follow to the right, then in the row above; the last,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,8 @@ from iibr_core.types import ImageSize, InputError
 USUAL_VIEWS = 8, 6
 USUAL_SIDE_PX = 4096
 MOST_VIEWS_A_SIDE = 32
+TAG = re.compile(r"_qs(\d{1,6})x(\d{1,6})a(\d{1,6}(?:\.\d{0,9})?)(?:[a-z][\d.]*)*$", re.IGNORECASE)
+"""At the end of a name, maybe with more about the display."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,25 @@ class Quilt:
         (height, width), row, column = self.tile, view // self.columns, view % self.columns
         bottom = self.size.height - row * height
         return slice(bottom - height, bottom), slice(column * width, (column + 1) * width)
+
+
+def quilt_named(path: Path, size: ImageSize) -> Quilt | None:
+    """The quilt that a file's name speaks of, None where it does not. size: of the picture.
+
+    Raises InputError for numbers of views that no quilt has, or that the picture is too small for.
+    """
+    match = TAG.search(path.stem)
+    if match is None:
+        return None
+    try:
+        quilt = Quilt(int(match[1]), int(match[2]), size, float(match[3]))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    if min(quilt.tile) < 1:
+        raise InputError(
+            f"{path}: {size} pixels are too few for {quilt.columns}x{quilt.rows} views; is its name right?"
+        )
+    return quilt
 
 
 DEVICES = {

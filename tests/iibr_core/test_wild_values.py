@@ -22,7 +22,7 @@ from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.multi_view import estimate, matching
-from iibr_core.formats.images import photo
+from iibr_core.formats.images import oiio_reader, photo
 from iibr_core.formats.images.picture_kinds import KINDS
 from iibr_core.formats.images.picture_writers import write_picture
 from iibr_core.formats.images.xmp_packet import parse_packet
@@ -365,7 +365,7 @@ ELEMENTWISE = {
     "color.srgb_from_linear": color.srgb_from_linear,
     "geometry.depth_of": plucker.depth_of,
     "geometry.line_of": lambda x: plucker.line_of(np.stack([x, x, x], -1), np.ones((len(x), 3))),
-    "formats.images.photo.upright": lambda x: photo.upright(x[None], 2)[0, ::-1],
+    "formats.images.oiio_reader.upright": lambda x: oiio_reader.upright(x[None], 2)[0, ::-1],
 }
 """One wild element changes no other."""
 
@@ -389,6 +389,10 @@ FINITE_BY_CONTRACT = {
     "generation.carried_disparity.carry_disparity": "of a Photo and a Disparity",
     "depth.models.transformers_models.estimate_with": "of a Photo; what a model gives is cleaned by `disparity_from`",
     "depth.models.transformers_models.input_size": "sizes only",
+    "formats.images.photo.read_picture": "`read_photo` reads so",
+    "formats.images.photo.encoded_colors": "`read_views` reads so",
+    "formats.images.picture_source.part_of": "keeps what it gets, tests/iibr_core/formats/test_view_files.py",
+    "depth.stereo_pair.estimate_from_pair": "of pictures that `read_photo` made finite",
     "formats.images.photo.focal_px_from_fov": "of angles that options check",
     "formats.images.photo.size_within": "sizes only",
     "formats.maps.pfm.write_pfm": "keeps every bit pattern, tests/core/test_pfm.py",
@@ -421,13 +425,14 @@ READS_OR_TELLS = {
     "depth.multi_view.matching": "choose_views",
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
+    "depth.embedded.leia": "leia_estimate",
     "depth.sidecar": "find_sidecar sidecars_of map_to_read flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout number_in xmp_of",
     "formats.animations": "even_size require_video_size write_animation",
     "formats.cameras": "FieldCameras write_llff write_nerfstudio write_colmap spread infinity_of",
     "formats.ply": "write_points write_splats write_ply",
     "formats.images.spatial_photo": "write_spatial_photo",
-    "formats.quilts": "Quilt quilt_for lay_out tagged",
+    "formats.quilts": "Quilt quilt_named quilt_for lay_out tagged",
     "formats.stereo": "anaglyph",
     "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
@@ -440,11 +445,21 @@ READS_OR_TELLS = {
     "formats.images.downsampling": "downsampled_linear finite_pixels linear_light OddValues Rows",
     "formats.images.color_profile": "ColorProfile UnusableProfileError color_profile color_profile_of color_space_of",
     "formats.images.avif": "is_avif read_avif avif_size",
-    "formats.images.heic": "is_heic read_heic heic_size read_heic_depth describe",
+    "formats.images.heic": "is_heic read_heic heic_size heic_pair read_heic_depth describe",
+    "formats.images.lif": "read_lif open_lif read_lif_picture lif_picture_size lif_bytes",
+    "formats.images.mpo": "is_jpeg is_stereo_mpo read_mpo_picture mpo_picture_size",
+    "formats.images.picture_source": "PicturePart source_size read_source",
+    "formats.images.pillow_reader": "open_with_pillow raster_of",
+    "formats.images.side_by_side": "side_by_side_pair own_picture require_developed",
+    "formats.light_fields.lenslet_image": "read_lenslet_image",
+    "formats.light_fields.quilt": "read_quilt",
+    "formats.light_fields.stanford_1996": "read_stanford_1996",
+    "formats.light_fields.stereo_file": "read_stereo_file",
     "formats.light_fields.llff": "read_llff",
     "formats.light_fields.middlebury": "read_middlebury",
     "formats.light_fields.parameters": "read_parameters write_parameters stated_grid stated_focal_px stated_range_px",
-    "formats.light_fields.registry": "LightFieldWriter WriterFactory find_light_field open_light_field writer_for",
+    "formats.light_fields.registry": "LightFieldWriter WriterFactory is_light_field find_light_field open_light_field "
+    "writer_for",
     "formats.light_fields.scene": "pictures_in common_size on_grid maps_in first_map numbers_in",
     "formats.light_fields.view_grid": "view_folder candidate_views set_view require_fitting missing_view grid_scene",
     "formats.light_fields.views": "grid_of read_stored_view disparity_range step_length",

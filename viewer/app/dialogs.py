@@ -13,14 +13,14 @@ UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first it finds."""
 
 FILE_KINDS: dict[ChoiceOf, str] = {
-    "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif avif",
+    "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif avif mpo lif",
     "mask": "png jpg jpeg tif tiff bmp exr",
     "map": "pfm exr npy png tif tiff",
 }
 """Endings of what is no folder."""
 
 DIALOG_TITLES: dict[ChoiceOf, str] = {
-    "photo": "Open a photo",
+    "photo": "Open a photo, a stereo photo or a quilt",
     "folder": "Open a folder of views",
     "mask": "Aperture image",
     "truth": "Ground truth: a folder of views",

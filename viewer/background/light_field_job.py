@@ -36,14 +36,14 @@ class Showing:
     views: Iterator[ViewUpdate]
 
 
-def showings_of_folder(
+def showings_of_light_field(
     source: Source, should_stop: ShouldStop, report_progress: Callable[[Progress], None], takes_drafts: bool
 ) -> Iterator[Showing]:
-    """The light field of a folder, whatever its layout.
+    """The light field of a folder or file, whatever its layout.
 
     takes_drafts: views without disparity are shown as read, then with a coarse one, then with the final one; else the
     field is shown once, when all is known. The views of a showing must be taken before the next is asked for. Raises
-    InputError for a folder or a map that cannot be read, Cancelled once should_stop is true.
+    InputError for a field or a map that cannot be read, Cancelled once should_stop is true.
     """
     from iibr_core.formats.light_fields.registry import open_light_field
     from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views

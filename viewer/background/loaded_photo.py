@@ -156,8 +156,13 @@ def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, ImageSize, 
     """
     from iibr_core.formats.images.header import read_photo_header
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, size_within
+    from iibr_core.formats.light_fields.registry import VIEW_FILES
 
     path, wanted = Path(source.path), source.max_pixels or DEFAULT_MAX_PIXELS
+    if VIEW_FILES.search(path.stem):
+        raise InputError(
+            f"{path}: holds the views of a light field, not a photo; `iibr view`, export and depth read it"
+        )
     budget = budget_of(source.depth.memory_bytes)
     header = read_photo_header(path)
     require_decoding(budget, path.name, header.decoding_bytes, keeps_views)

@@ -12,7 +12,23 @@ from viewer.model.reducers.folder import in_order
 from viewer.model.state.folder import FolderListed, FolderPhoto
 
 PHOTO_ENDINGS = frozenset(
-    (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".bmp", ".heic", ".heif", ".hif", ".avif")
+    (
+        ".jpg",
+        ".jpeg",
+        ".png",
+        ".tif",
+        ".tiff",
+        ".exr",
+        ".hdr",
+        ".webp",
+        ".bmp",
+        ".heic",
+        ".heif",
+        ".hif",
+        ".avif",
+        ".mpo",
+        ".lif",
+    )
 )
 CAMERA_NAME = re.compile(r"([A-Z0-9_]{4}\d{4}|(IMG|PXL|MVIMG)[_-]\d{8}[_-].*)\.(jpe?g|heic|heif|hif)$", re.IGNORECASE)
 """Names that cameras and phones give (DCF): such pictures are photos, however many there are."""

@@ -14,11 +14,12 @@ from pathlib import Path
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.formats.files import is_folder
+from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.types import Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
-from viewer.background.light_field_job import median_of_middle, showings_of_folder
+from viewer.background.light_field_job import median_of_middle, showings_of_light_field
 from viewer.background.loaded_photo import (
     LoadedPhoto,
     apply_depth_settings,
@@ -123,8 +124,8 @@ def results_of(
     be opened, Cancelled where should_stop says so while it is read.
     """
     try:
-        if is_folder(Path(request.source.path)):
-            yield from _results_of_folder(request, should_stop, report_progress)
+        if is_light_field(Path(request.source.path)):
+            yield from _results_of_light_field(request, should_stop, report_progress)
         else:
             yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
     finally:
@@ -199,11 +200,11 @@ def _results_of_photo(
         prepare_brush()
 
 
-def _results_of_folder(
+def _results_of_light_field(
     request: SceneRequest, should_stop: Callable[[], bool], report_progress: Callable[[Progress], None]
 ) -> Iterator[SceneReady | ViewReady]:
-    """The light field of a folder, once more each time that more is known of it."""
-    for showing in showings_of_folder(request.source, should_stop, report_progress, request.takes_drafts):
+    """The light field of a folder or file, once more each time that more is known of it."""
+    for showing in showings_of_light_field(request.source, should_stop, report_progress, request.takes_drafts):
         scene, centre = showing.scene, next(showing.views)
         yield SceneReady(request.generation, scene, None, centre)
         rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), showing.views))

@@ -192,7 +192,8 @@ def number_option(help_text: str) -> Any:
 PhotoPath = Annotated[
     Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP, HEIC, AVIF).", show_default=False)
 ]
-ScenePath = Annotated[Path, typer.Argument(help="A photo or a light-field folder.", show_default=False)]
+SCENE_HELP = "A photo, a stereo photo, or a light field: a folder of views, a quilt, a lenslet image."
+ScenePath = Annotated[Path, typer.Argument(help=SCENE_HELP, show_default=False)]
 DisparityFile = Annotated[
     Path | None,
     typer.Option("--disparity", metavar="FILE", help="Disparity map: PFM, EXR, NPY or 16-bit PNG.", show_default=False),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.files import is_folder
+from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import GridShape, InputError
 from viewer.cli.options import (
@@ -92,7 +92,9 @@ def require_heeded(context: typer.Context, path: Path) -> None:
     given = given_options(context)
     # A scale says nothing without the map that it is of.
     given &= NOT_FOR_LIGHT_FIELDS if "disparity" in given else NOT_FOR_LIGHT_FIELDS | {"disparity_scale"}
-    if not given or not is_folder(path):
+    if not given or not is_light_field(path):
         return
     options = [parameter.opts[0] for parameter in context.command.params if parameter.name in given]
-    raise InputError(f"{' and '.join(options)}: {path} is a folder, and its views are taken as they are; leave it out")
+    raise InputError(
+        f"{' and '.join(options)}: {path} is a light field, and its views are taken as they are; leave it out"
+    )

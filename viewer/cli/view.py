@@ -7,18 +7,26 @@ from typing import Annotated
 
 import typer
 
-from iibr_core.formats.files import is_folder
+from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.types import InputError
 from viewer.cli.demo import demo_photo
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import FocusDisparity, Grid, require_existing, require_memory, require_model, require_utf8
+from viewer.cli.options import (
+    SCENE_HELP,
+    FocusDisparity,
+    Grid,
+    require_existing,
+    require_memory,
+    require_model,
+    require_utf8,
+)
 from viewer.cli.scene_options import SceneOptions, require_heeded
 
 
 @with_option_records
 def view(
     context: typer.Context,
-    path: Annotated[Path | None, typer.Argument(help="A photo or a light-field folder.", show_default="a demo")] = None,
+    path: Annotated[Path | None, typer.Argument(help=SCENE_HELP, show_default="a demo")] = None,
     *,
     scene: SceneOptions,
     focus_disparity: FocusDisparity = None,
@@ -39,7 +47,7 @@ def view(
     require_memory(scene.memory, keeps_views=True)
     require_existing(source)
     require_model(source.depth)
-    if ground_truth is not None and not is_folder(ground_truth):
+    if ground_truth is not None and not is_light_field(ground_truth):
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import user_folder

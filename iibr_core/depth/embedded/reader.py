@@ -8,6 +8,7 @@ from pathlib import Path
 
 from iibr_core.depth.embedded.apple import appended_estimate, heic_estimate
 from iibr_core.depth.embedded.google import all_in_focus, dynamic_depth_estimate, gdepth_estimate
+from iibr_core.depth.embedded.leia import leia_estimate
 from iibr_core.depth.embedded.samsung import samsung_estimate
 from iibr_core.depth.embedded.xmp import Xmp, is_jpeg, jpeg_layout, xmp_of
 from iibr_core.depth.estimates import Estimate
@@ -73,6 +74,7 @@ def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
         (GDEPTH, lambda: gdepth_estimate(xmp)),
         ("Apple portrait", lambda: appended_estimate(data, layout.end)),
         ("Samsung Live focus", lambda: samsung_estimate(data)),
+        ("Leia", lambda: leia_estimate(data)),
     )
     for name, read in readers:
         try:

@@ -10,12 +10,16 @@ from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.avif import avif_size, is_avif
 from iibr_core.formats.images.heic import heic_size, is_heic
 from iibr_core.formats.images.oiio_reader import PictureRows
+from iibr_core.formats.images.picture_source import source_size
+from iibr_core.formats.images.side_by_side import own_picture
 from iibr_core.types import ImageSize
 
 BY_ROWS = frozenset({"jpeg", "png", "tiff", "openexr", "hdr", "pnm", "bmp", "targa"})
 """Formats, by OpenImageIO's names, that are decoded some rows at a time; of the others all is held at once."""
 HEIC_BYTES = 8
 """Of a pixel: libheif's planes, and what it makes of them; libavif's are no more."""
+PART_BYTES = 6
+"""Of a pixel of a picture of which a part is taken: 16 bits a channel at most."""
 COEFFICIENT_BYTES = 2
 JPEG_START, START_OF_SCAN = b"\xff\xd8", 0xDA
 PROGRESSIVE_FRAMES = (0xC2, 0xC6, 0xCA, 0xCE)
@@ -31,6 +35,16 @@ class PhotoHeader(NamedTuple):
 
 def read_photo_header(path: Path) -> PhotoHeader:
     """Of a photo that `read_photo` reads. Raises InputError as that does for its header."""
+    own = own_picture(path)
+    header = _whole_header(path)
+    if own.part is None:
+        return header
+    # Parts are cut out of the whole picture.
+    whole_bytes = header.size.height * header.size.width * PART_BYTES
+    return PhotoHeader(source_size(own), header.decoding_bytes + whole_bytes)
+
+
+def _whole_header(path: Path) -> PhotoHeader:
     if is_avif(path) or is_heic(path):
         size = avif_size(path) if is_avif(path) else heic_size(path)
         return PhotoHeader(size, size.height * size.width * HEIC_BYTES)

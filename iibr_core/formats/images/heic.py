@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,9 +43,12 @@ def is_heic(path: Path) -> bool:
     return start[4:8] == b"ftyp" and start[8:12] in BRANDS
 
 
-def read_heic(path: Path) -> Raster:
-    """Decode a HEIC's photo, turned upright as the file asks. Raises InputError as `read_raster` does."""
-    file = _open(path)
+def read_heic(path: Path, number: int = 0) -> Raster:
+    """Decode a HEIC's photo, turned upright as the file asks; number: or another picture, see `heic_pair`.
+
+    Raises InputError as `read_raster` does.
+    """
+    file = _open(path, number)
     spec = oiio.ImageSpec(file.size[0], file.size[1], 3, "uint8")
     describe(spec, file.info)
     pixels = _pixels(path, file)
@@ -56,10 +60,31 @@ def read_heic(path: Path) -> Raster:
     return Raster(pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1], alpha, spec)
 
 
-def heic_size(path: Path) -> ImageSize:
+def heic_size(path: Path, number: int = 0) -> ImageSize:
     """From a HEIC's header. Raises InputError as `read_heic` does."""
-    width, height = _open(path).size
+    width, height = _open(path, number).size
     return ImageSize(height, width)
+
+
+def heic_pair(path: Path) -> tuple[int, int] | None:
+    """The numbers of the left and the right eye's picture, None where the file has no such group (ISO/IEC 23008-12,
+    `ster`). Numbers are the pictures' places in the file, but for the photo itself, which is 0, and the first, which
+    has its place then. Raises InputError as `read_heic` does, and for a group of other pictures than two.
+    """
+    file = _open_file(path)
+    groups = [group for group in file.info.get("entity_groups") or () if group.get("type") == "ster"]
+    if not groups:
+        return None
+    places = [place for place in groups[0].get("images") or () if isinstance(place, int)]
+    if len(places) != 2 or places[0] == places[1] or not all(0 <= place < len(file) for place in places):
+        raise InputError(f"{path}: its group of two pictures holds others; get the whole file again")
+    left, right = (_swapped(place, file.primary_index) for place in places)
+    return left, right
+
+
+def _swapped(number: int, primary: int) -> int:
+    """Place from number, or number from place: the photo itself is 0."""
+    return {0: primary, primary: 0}.get(number, number)
 
 
 def read_heic_depth(path: Path) -> HeicDepth | None:
@@ -75,19 +100,27 @@ def read_heic_depth(path: Path) -> HeicDepth | None:
     return HeicDepth(np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {}))
 
 
-def _open(path: Path) -> Any:
+def _open_file(path: Path) -> Any:
     import pillow_heif
 
     require_file(path)
     try:
-        file = pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
-        width, height = file.size
+        return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
+    except DECODE_ERRORS as error:
+        raise InputError(f"{path}: cannot be read as a HEIC picture ({reason_of(error)})") from error
+
+
+def _open(path: Path, number: int = 0) -> Any:
+    file = _open_file(path)
+    try:
+        picture = file[_swapped(number, file.primary_index)] if number else file
+        width, height = picture.size
     except DECODE_ERRORS as error:
         raise InputError(f"{path}: cannot be read as a HEIC picture ({reason_of(error)})") from error
     if width < 1 or height < 1 or width * height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {width}x{height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
     refuse_bomb(path, width * height * 4)
-    return file
+    return picture
 
 
 def _pixels(path: Path, picture: Any) -> NDArray[Any]:
@@ -98,7 +131,7 @@ def _pixels(path: Path, picture: Any) -> NDArray[Any]:
     return pixels.reshape(*pixels.shape[:2], -1)
 
 
-def describe(spec: Any, info: dict[str, Any]) -> None:
+def describe(spec: Any, info: Mapping[Any, Any]) -> None:
     """Put what `read_photo` asks for into a header: focal length and colour profile, of what Pillow calls info."""
     from PIL import Image
 

@@ -68,6 +68,17 @@ def read_orientation(path: Path) -> int:
     return int(source.spec().get_int_attribute("Orientation", 1))
 
 
+def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
+    """Turn stored (H, W, ...) pixels as Exif's Orientation 1..8 says; other values leave them alone."""
+    if orientation >= 5 and orientation <= 8:
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    return np.ascontiguousarray(pixels)
+
+
 class PictureRows:
     """A picture file, open to be read from top to bottom, some rows at a time: no more of it is in memory than that,
     as far as its format allows.

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, convert, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file, shown_name
-from iibr_core.formats.images.avif import is_avif, read_avif
+from iibr_core.formats.images.avif import is_avif
 from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
-from iibr_core.formats.images.heic import is_heic, read_heic
-from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute
+from iibr_core.formats.images.heic import is_heic
+from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute, upright
 from iibr_core.formats.images.oiio_writer import PNG_SETTINGS, write_image_file
+from iibr_core.formats.images.picture_source import PictureSource, read_source
+from iibr_core.formats.images.side_by_side import own_picture
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
@@ -37,23 +39,32 @@ def read_photo(
     keeps_primaries: bool = False,
 ) -> Photo:
     """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads), HEIC or AVIF as a photo, upright,
-    max_pixels large at most.
+    max_pixels large at most; of two pictures side by side, as their file's name says, the left eye's.
 
     fov_deg: horizontal field of view where the file gives no focal length. keeps_primaries: the photo stays in the
     colour space of its file, else it is converted to sRGB, which cuts off what that lacks. Raises InputError, naming
     the file, if it is missing, no picture, cut off, or absurdly large.
     """
-    path = Path(path)
+    return read_picture(own_picture(Path(path)), max_pixels, fov_deg, keeps_primaries)
+
+
+def read_picture(
+    source: PictureSource,
+    max_pixels: int = DEFAULT_MAX_PIXELS,
+    fov_deg: float = DEFAULT_FOV_DEG,
+    keeps_primaries: bool = False,
+) -> Photo:
+    """Read any picture of a file, as `read_photo` does."""
     if max_pixels < 1:
         raise InputError(f"--max-pixels {max_pixels}: must be 1 or more")
-    require_file(path)
-    rows = _open_rows(path)
+    require_file(source.path)
+    rows = _open_rows(source)
     stored_size, spec = rows.size, rows.spec
     size = size_within(stored_size, max_pixels)
     if size == stored_size:
         encoded, is_opaque, odd = _encode(rows.read(0, size.height))
     else:
-        linear, is_opaque, odd = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(path), size)
+        linear, is_opaque, odd = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(source), size)
         encoded = _encode_in_place(linear)
     space = color_space_of(spec)
     if not keeps_primaries:
@@ -68,7 +79,14 @@ def read_photo(
         focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
     else:
         focal_px *= math.sqrt(size.height * size.width / (stored_size.height * stored_size.width))
-    return Photo(pixels, focal_px, shown_name(path.stem), bool(pixels.max() > 1), notes + _odd_notes(odd), space)
+    name = shown_name(source.path.stem)
+    return Photo(pixels, focal_px, name, bool(pixels.max() > 1), notes + _odd_notes(odd), space)
+
+
+def encoded_colors(raster: Raster) -> FloatImage:
+    """A decoded picture as a view's colours, upright: (H, W, 3), sRGB-encoded, of sRGB."""
+    encoded = convert(_encode(raster)[0], SRGB, color_space_of(raster.spec))
+    return upright(encoded, raster.spec.get_int_attribute("Orientation", 1))
 
 
 def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | int | float] | None = None) -> None:
@@ -101,21 +119,10 @@ def size_within(size: ImageSize, max_pixels: int) -> ImageSize:
     return ImageSize(new_height, min(max(1, math.floor(width * factor)), max_pixels // new_height))
 
 
-def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Turn stored (H, W, ...) pixels as Exif's Orientation 1..8 says; other values leave them alone."""
-    if orientation >= 5 and orientation <= 8:
-        pixels = pixels.swapaxes(0, 1)
-    if orientation in (3, 4, 7, 8):
-        pixels = pixels[::-1]
-    if orientation in (2, 3, 6, 7):
-        pixels = pixels[:, ::-1]
-    return np.ascontiguousarray(pixels)
-
-
-def _open_rows(path: Path) -> PictureRows | Raster:
-    if is_avif(path):
-        return read_avif(path)
-    return read_heic(path) if is_heic(path) else PictureRows(path)
+def _open_rows(source: PictureSource) -> PictureRows | Raster:
+    path = source.path
+    is_read_by_rows = source == PictureSource(path) and not is_avif(path) and not is_heic(path)
+    return PictureRows(path) if is_read_by_rows else read_source(source)
 
 
 def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import is_file, is_folder, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.scene import MOST_VIEWS, KnownView, MultiView, pictures_in
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.types import ImageSize, InputError, ViewOffset
@@ -43,7 +44,7 @@ def read_llff(folder: Path) -> MultiView | None:
     local = (positions - positions[central]) @ rotations[central].T
     step = _neighbour_distance(local[:, :2])
     views = tuple(
-        KnownView(picture.stem, ViewOffset(float(y / step), float(x / step)), picture)
+        KnownView(picture.stem, ViewOffset(float(y / step), float(x / step)), PictureSource(picture))
         for picture, (x, y, _) in zip(pictures, local)
     )
     size = read_size(pictures[central])

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from iibr_core.formats.files import is_file, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.scene import (
     KnownDisparity,
     KnownView,
@@ -44,7 +45,7 @@ def read_middlebury(folder: Path) -> MultiView | None:
     else:
         maps, layout = _coded_maps(folder, kind, next(iter(named.values()))), f"Middlebury, {len(named)} views"
     numbers = sorted(number for _, number in named)
-    views = tuple(KnownView(f"{kind}{n}", ViewOffset(0.0, float(n)), named[kind, n]) for n in numbers)
+    views = tuple(KnownView(f"{kind}{n}", ViewOffset(0.0, float(n)), PictureSource(named[kind, n])) for n in numbers)
     known = {numbers.index(n): disparity for n, disparity in maps.items() if n in numbers}
     return on_grid(MultiView(shown_name(folder.resolve().name), layout, views, known), [(0, n) for n in numbers])
 

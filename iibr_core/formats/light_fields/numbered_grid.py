@@ -1,5 +1,5 @@
-"""Grids of views in a folder: v00_u00.png, Heber's 11x11 Pov-ray scenes, and whatever else numbers its pictures by row
-and column, or row by row.
+"""Grids of views in a folder: v00_u00.png, Heber's 11x11 Pov-ray scenes, JPEG Pleno's 000_000.ppm (column, row), and
+whatever else numbers its pictures by row and column, or row by row.
 
 Rows are counted downwards, columns to the right. Views may lie in a subfolder `views`; maps lie beside it or in it.
 """
@@ -25,6 +25,8 @@ from iibr_core.types import GridShape, InputError
 
 MAP_WORDS = re.compile(r"disp|depth|mask|label|normal|edge|reliable", re.IGNORECASE)
 V_U = re.compile(r"v(\d{1,9})_u(\d{1,9})$")
+JPEG_PLENO = re.compile(r"(\d{3})_(\d{3})\.ppm$", re.IGNORECASE)
+"""Column and row, both three digits."""
 HEBER_GRID = GridShape(11, 11)
 
 
@@ -68,6 +70,10 @@ def _paths_by_place(folder: Path, pictures: list[Path]) -> dict[GridIndex, Path]
     for path in pictures:
         if match := V_U.match(path.stem):
             set_view(paths, (int(match[1]), int(match[2])), path)
+    if not paths and pictures and all(map(JPEG_PLENO.match, (path.name for path in pictures))):
+        paths = {(int(path.stem[4:]), int(path.stem[:3])): path for path in pictures}
+        first_row, first_column = (min(axis) for axis in zip(*paths))
+        return {(row - first_row, column - first_column): path for (row, column), path in paths.items()}
     return paths or _by_any_numbers(folder, [path for path in pictures if not MAP_WORDS.search(path.stem)])
 
 

@@ -6,13 +6,14 @@ loading what they need. A new layout is a file of its own and one line here.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from pkgutil import resolve_name
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from iibr_core.formats.files import is_folder
+from iibr_core.formats.files import is_folder, require_file
 from iibr_core.types import GridShape, InputError, ViewUpdate
 
 if TYPE_CHECKING:
@@ -23,9 +24,16 @@ READERS = (
     "stanford:read_stanford",
     "middlebury:read_middlebury",
     "hci:read_hci",
+    "stanford_1996:read_stanford_1996",
     "numbered_grid:read_numbered_grid",
 )
-"""In the order in which they are asked: `Reader`s."""
+"""Of folders, in the order in which they are asked: `Reader`s."""
+
+FILE_READERS = ("quilt:read_quilt", "lenslet_image:read_lenslet_image", "stereo_file:read_stereo_file")
+"""Of files, in the order in which they are asked: `Reader`s. Two views are a photo, whose depth they tell."""
+
+VIEW_FILES = re.compile(r"_qs\d+x\d+a[\d.]+[a-z\d.]*$|_eslf$", re.IGNORECASE)
+"""How names of files end that hold many views."""
 
 WRITERS = {
     "hci": "hci:HciWriter",
@@ -36,8 +44,9 @@ WRITERS = {
 }
 """By the name that people type: `WriterFactory`s."""
 
-LAYOUTS = "HCI, Stanford archive, Heber, LLFF, Middlebury, or views/v00_u00.png ..."
+LAYOUTS = "HCI, Stanford archive, Heber, JPEG Pleno, LLFF, Middlebury, or views/v00_u00.png ..."
 """What the readers know, for people."""
+FILES = "give a quilt (..._qs8x6a0.75.png), a lenslet image (..._eslf.png), a stereo photo, or a folder of views"
 
 
 class LightFieldWriter(Protocol):
@@ -56,7 +65,7 @@ class LightFieldWriter(Protocol):
 
 
 Reader = Callable[[Path], "MultiView | None"]
-"""Gives the scene of a folder, None where the folder is laid out otherwise; InputError where it is damaged."""
+"""Gives the scene of a folder or file, None where it is laid out otherwise; InputError where it is damaged."""
 
 
 class WriterFactory(Protocol):
@@ -74,23 +83,31 @@ class WriterFactory(Protocol):
         """
 
 
-def find_light_field(folder: Path) -> MultiView | None:
-    """The scene of a folder, None where it is laid out as no reader knows. Raises InputError where it is damaged."""
-    for entry in READERS:
+def is_light_field(path: Path) -> bool:
+    """Whether a path is to be opened as many views rather than as a photo: a folder, or a file that is named so."""
+    return is_folder(path) or VIEW_FILES.search(path.stem) is not None
+
+
+def find_light_field(path: Path) -> MultiView | None:
+    """The scene of a folder or file, None where it is laid out as no reader knows. Raises InputError where it is
+    damaged.
+    """
+    for entry in READERS if is_folder(path) else FILE_READERS:
         read: Reader = _resolve(entry)
-        scene = read(folder)
+        scene = read(path)
         if scene is not None:
             return scene
     return None
 
 
-def open_light_field(folder: Path) -> MultiView:
-    """The scene of a folder. Raises InputError where there is none, or it is damaged."""
-    if not is_folder(folder):
-        raise InputError(f"{folder}: is not a folder")
-    scene = find_light_field(folder)
+def open_light_field(path: Path) -> MultiView:
+    """The scene of a folder or file. Raises InputError where there is none, or it is damaged."""
+    if not is_folder(path):
+        require_file(path)
+    scene = find_light_field(path)
     if scene is None:
-        raise InputError(f"{folder}: holds no light field; laid out as {LAYOUTS}")
+        said = f"laid out as {LAYOUTS}" if is_folder(path) else FILES
+        raise InputError(f"{path}: holds no light field; {said}")
     return scene
 
 

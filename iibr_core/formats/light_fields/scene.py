@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import entries_of, is_file
-from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.picture_source import PictureSource, source_size
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 PICTURE_EXTENSIONS = (".png", ".jpg", ".jpeg", ".ppm", ".exr", ".tif", ".tiff", ".bmp", ".webp")
@@ -29,7 +29,7 @@ GridIndex = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class KnownView:
-    """One picture. offset: its viewpoint (t, s) in view steps, from any origin.
+    """One picture. offset: its viewpoint (t, s) in view steps, from any origin. picture: where its pixels are.
 
     turned: (3, 3), takes a pixel (x, y, 1) of the given view's frame to this picture's where cameras are turned
     against each other; None where all look the same way. name: for people ("v00 u08"). place: on the scene's grid,
@@ -38,9 +38,14 @@ class KnownView:
 
     name: str
     offset: ViewOffset
-    path: Path
+    picture: PictureSource
     turned: NDArray[np.float64] | None = None
     place: GridIndex | None = None
+
+    @property
+    def path(self) -> Path:
+        """The file that it is in."""
+        return self.picture.path
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,12 @@ class MultiView:
         return nearest_view(self.views, middle(self.views))
 
     @property
+    def place(self) -> Path:
+        """The file that all views are in, or the folder that the first one's file is in."""
+        files = {view.path for view in self.views}
+        return files.pop() if len(files) == 1 and len(self.views) > 1 else self.views[0].path.parent
+
+    @property
     def is_hdr(self) -> bool:
         """Whether any view holds linear light, which may exceed white."""
         return any(view.path.suffix.lower() == ".exr" for view in self.views)
@@ -116,12 +127,12 @@ def pictures_in(folder: Path) -> list[Path]:
 
 def common_size(views: Sequence[KnownView]) -> ImageSize:
     """Of all views, from their headers. Raises InputError for one of another size than the first."""
-    first = views[0].path
-    size = read_size(first)
-    for view in views[1:]:
-        if (found := read_size(view.path)) != size:
-            raise InputError(f"{view.path}: is {found}, but {first.name} is {size}")
-    return size
+    sizes = {view.picture: source_size(view.picture) for view in views}
+    first = views[0].picture
+    for picture, size in sizes.items():
+        if size != sizes[first]:
+            raise InputError(f"{picture.path}: is {size}, but {first.path.name} is {sizes[first]}")
+    return sizes[first]
 
 
 def on_grid(scene: MultiView, numbers: Sequence[GridIndex]) -> MultiView:

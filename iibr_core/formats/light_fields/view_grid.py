@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from iibr_core.formats.files import entries_of, is_folder, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_focal_px, stated_range_px
 from iibr_core.formats.light_fields.scene import (
     MAP_EXTENSIONS,
@@ -75,7 +76,8 @@ def grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridIn
     """
     places = sorted(paths)
     views = tuple(
-        KnownView(f"v{v:02d} u{u:02d}", ViewOffset(float(v), float(u)), paths[v, u], place=(v, u)) for v, u in places
+        KnownView(f"v{v:02d} u{u:02d}", ViewOffset(float(v), float(u)), PictureSource(paths[v, u]), place=(v, u))
+        for v, u in places
     )
     maps = {places.index(at): known for at, known in _maps(folder, grid).items()}
     parameters = read_parameters(folder)

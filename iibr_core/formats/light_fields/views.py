@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator
 
 from iibr_core.color import stored_from_encoded
-from iibr_core.formats.files import MAX_FILE_PIXELS
-from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.oiio_reader import Raster
+from iibr_core.formats.images.photo import encoded_colors
+from iibr_core.formats.images.picture_source import PictureSource, part_of, read_source
 from iibr_core.formats.light_fields.scene import GridIndex, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
@@ -17,7 +18,7 @@ def grid_of(scene: MultiView) -> GridShape:
     """The grid that the views fill. Raises InputError where they fill none, telling what reads such a scene."""
     if scene.grid is None:
         raise InputError(
-            f"{scene.views[0].path.parent}: the views ({scene.layout}) fill no regular grid,"
+            f"{scene.place}: the views ({scene.layout}) fill no regular grid,"
             " so they cannot be shown as a light field; `iibr evaluate` reads them"
         )
     return scene.grid
@@ -37,9 +38,9 @@ def read_stored_view(scene: MultiView, row: int, column: int) -> StoredColors:
     """Colours (H, W, 3) of one view, read alone. Raises InputError as `read_views` does, or for a bad row or column."""
     grid = grid_of(scene)
     if not (0 <= row < grid.rows and 0 <= column < grid.columns):
-        folder = scene.views[0].path.parent
-        raise InputError(f"{folder}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")
-    return _read_colors(scene, _indices(scene)[row, column])
+        raise InputError(f"{scene.place}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")
+    index = _indices(scene)[row, column]
+    return next(_read_colors(scene, [index]))
 
 
 def disparity_range(scene: MultiView) -> tuple[float, float] | None:
@@ -79,19 +80,26 @@ def _indices(scene: MultiView) -> dict[GridIndex, int]:
 
 
 def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize) -> Iterator[ViewUpdate]:
-    indices = _indices(scene)
-    for row, column in _nearest_to_centre(grid):
-        index = indices[row, column]
-        colors = _read_colors(scene, index)
+    indices, order = _indices(scene), _nearest_to_centre(grid)
+    for at, colors in zip(order, _read_colors(scene, [indices[at] for at in order])):
+        index = indices[at]
         if image_size(colors) != size:
             path = scene.views[index].path
             raise InputError(f"{path}: is rotated by its Exif orientation; views must be stored upright")
         disparity = _read_map(scene, index, size) if index in scene.disparity else None
-        yield ViewUpdate(row, column, colors, disparity)
+        yield ViewUpdate(*at, colors, disparity)
 
 
-def _read_colors(scene: MultiView, index: int) -> StoredColors:
-    return stored_from_encoded(read_photo(scene.views[index].path, MAX_FILE_PIXELS).pixels, scene.is_hdr)
+def _read_colors(scene: MultiView, indices: list[int]) -> Iterator[StoredColors]:
+    """Colours (H, W, 3) of views. A picture that several of them are parts of is decoded once and kept meanwhile."""
+    decoded: tuple[PictureSource, Raster] | None = None
+    for index in indices:
+        source = scene.views[index].picture
+        if decoded is None or decoded[0] != source.whole:
+            decoded = None  # two may be large
+            decoded = source.whole, read_source(source.whole)
+        raster = decoded[1] if source == source.whole else part_of(decoded[1], source)
+        yield stored_from_encoded(encoded_colors(raster), scene.is_hdr)
 
 
 def _read_map(scene: MultiView, index: int, size: ImageSize) -> FloatImage:

@@ -19,6 +19,9 @@ from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.formats.outputs import require_file_place
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
 
+LENSLET_KEY = "iibr:Lenslet"
+"""In a lenslet image's header: columns and rows of each lens's pixels, which only ours tell."""
+
 
 class _FileWriter(ABC):
     """Writes all views to one file when the `with` block ends well; raises InputError where some are missing."""
@@ -119,7 +122,8 @@ class EslfWriter(_FileWriter):
         for row, column in self.places():
             whole[:, row, :, column] = self.view(row, column)[0]
         pixels = whole.reshape(height * rows, width * columns, 3)
-        write_image(self.path, pixels if pixels.dtype == np.uint8 else encoded_from_stored(pixels))
+        stored = pixels if pixels.dtype == np.uint8 else encoded_from_stored(pixels)
+        write_image(self.path, stored, {LENSLET_KEY: f"{columns}x{rows}"})
 
 
 class ExrWriter(_FileWriter):

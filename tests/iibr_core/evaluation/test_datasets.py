@@ -10,6 +10,7 @@ import pytest
 
 from iibr_core.evaluation.datasets import find_scenes, read_known_disparity, read_scene, read_view, undo_rotation
 from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.scene import KnownView, MultiView, nearest_view
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import ImageSize, InputError, ViewOffset
@@ -78,12 +79,12 @@ def test_hebers_grid_under_any_numbering(tmp_path: Path, name: str) -> None:
 
 
 def stanford_names(jitter: float = 0.0) -> dict[str, ViewOffset]:
-    """5 rows counted upwards, 4 columns; positions in millimetres, x growing to the left, up to `jitter` steps off."""
+    """5 rows counted upwards, 4 columns to the left; positions in millimetres, up to `jitter` steps off."""
     rng, found = np.random.default_rng(3), {}
     for row in range(5):
         for column in range(4):
-            t, s = -row + rng.uniform(-jitter, jitter), column + rng.uniform(-jitter, jitter)
-            found[f"out_{row:02d}_{column:02d}_{100 + 30 * t:.6f}_{-30 * s:.6f}_.png"] = ViewOffset(t, s)
+            t, s = -row + rng.uniform(-jitter, jitter), -column + rng.uniform(-jitter, jitter)
+            found[f"out_{row:02d}_{column:02d}_{100 + 30 * t:.6f}_{30 * s:.6f}_.png"] = ViewOffset(t, s)
     return found
 
 
@@ -99,7 +100,7 @@ def test_stanford_viewpoints_are_the_cameras_positions(tmp_path: Path, inside: s
     np.testing.assert_allclose(found - found[0], wanted - wanted[0], atol=0.1 * jitter * 20 + 1e-6)
     by_index = {view.name: view.offset for view in scene.views}
     assert by_index["row 4 column 0"].t < by_index["row 0 column 0"].t  # rows are counted upwards
-    assert by_index["row 0 column 3"].s > by_index["row 0 column 0"].s
+    assert by_index["row 0 column 3"].s < by_index["row 0 column 0"].s
 
 
 def test_stanford_positions_that_make_no_grid_are_told(tmp_path: Path) -> None:
@@ -246,7 +247,9 @@ def test_folders_of_scenes_are_looked_through(tmp_path: Path) -> None:
 
 
 def test_the_centre_of_an_even_grid_is_farther_down_and_right() -> None:
-    views = tuple(KnownView("", ViewOffset(t, s), Path()) for t in (0.0, 1.0) for s in (0.0, 1.0, 2.0, 3.0))
+    views = tuple(
+        KnownView("", ViewOffset(t, s), PictureSource(Path())) for t in (0.0, 1.0) for s in (0.0, 1.0, 2.0, 3.0)
+    )
     assert views[nearest_view(views, ViewOffset(0.5, 1.5))].offset == (1.0, 2.0)
 
 

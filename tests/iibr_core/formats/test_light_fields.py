@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.evaluation.datasets import read_known_disparity, read_scene
 from iibr_core.formats.images.photo import write_image
@@ -24,8 +25,11 @@ from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.known_scenes import (
+    HEIGHT,
+    WIDTH,
     disparity_of_square,
     offsets_of,
+    view_of_wall,
     write_grid,
     write_hci,
     write_llff_row,
@@ -88,7 +92,7 @@ def test_a_folder_that_no_reader_knows(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds no light field; laid out as HCI, Stanford"):
         open_light_field(tmp_path)
     (tmp_path / "photo.png").touch()
-    with pytest.raises(InputError, match="not a folder"):
+    with pytest.raises(InputError, match="is empty"):
         open_light_field(tmp_path / "photo.png")
 
 
@@ -202,3 +206,104 @@ def test_a_layout_that_none_writes_is_refused_by_those_there_are() -> None:
         writer_for("mp4")
     expected: WriterFactory = HciWriter
     assert writer_for("hci") is expected
+
+
+def test_columns_of_stanford_go_where_the_camera_went(tmp_path: Path) -> None:
+    """In some scenes leftwards: positions say so, as they say how far off the grid a camera stands."""
+    names = {
+        f"out_{row:02d}_{column:02d}_{-400 - 30.0 * row + 3 * column}_{1100 - 30.0 * column}_.png": ViewOffset(
+            -float(row), -float(column)
+        )
+        for row, column in np.ndindex(3, 3)
+    }
+    scene = open_light_field(write_numbered(tmp_path / "knights", names))
+    places = {view.path.stem[:9]: (view.place, view.offset) for view in scene.views}
+    assert places["out_00_00"][0] == (2, 2)
+    assert places["out_02_02"][0] == (0, 0)
+    first, last = (places[f"out_{k:02d}_{k:02d}"][1] for k in (0, 2))
+    assert (last.s - first.s, last.t - first.t) == pytest.approx((-2, -1.8))
+
+
+def write_rendered(folder: Path, config: str = "", focal_mm: float = 50.0) -> Path:
+    """As light-field-renderer's exporter for Blender has it: rows upwards, columns to the left, v written as -v."""
+    step = 20.0
+    names = {
+        f"Camera_{j:02d}_{i:02d}_{-(j - 1) * step:f}_{(1 - i) * step:f}_{focal_mm:g}_36.png": ViewOffset(
+            -float(j - 1), float(1 - i)
+        )
+        for j, i in np.ndindex(3, 3)
+    }
+    write_numbered(folder, names, (HEIGHT, WIDTH))
+    if config:
+        (folder / "config.cfg").write_text(config)
+    return folder
+
+
+def test_light_field_renderers_names_and_config(tmp_path: Path) -> None:
+    config = "focal-length 50 10 100\nfocus-distance 2 1.0 8.0\n"
+    scene = open_light_field(write_rendered(tmp_path / "shop", config))
+    assert (scene.layout, scene.grid) == ("light-field-renderer, 3x3", GridShape(3, 3))
+    focal_px = 50 / 36 * WIDTH
+    assert scene.focal_px == pytest.approx(focal_px)
+    assert scene.range_px == pytest.approx((focal_px * 0.02 / 8, focal_px * 0.02))
+    for view in written(scene):
+        t, s = GridShape(3, 3).offset(view.row, view.column)
+        expected = np.rint(view_of_wall(ViewOffset(t, s)) * 255)
+        np.testing.assert_array_equal(view.colors, expected)
+
+
+@pytest.mark.parametrize("line", ["focus-distance", "focus-distance 1 5 2", "focus-distance a b c"])
+def test_a_config_that_makes_no_sense(tmp_path: Path, line: str) -> None:
+    with pytest.raises(InputError, match=r"config\.cfg: focus-distance.*least and a greatest"):
+        open_light_field(write_rendered(tmp_path, f"{line}\n"))
+
+
+def test_names_with_no_focal_length(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="focal length of 0 mm; correct the names"):
+        open_light_field(write_rendered(tmp_path, focal_mm=0.0))
+
+
+def test_jpeg_pleno_counts_columns_first(tmp_path: Path) -> None:
+    for row, column in np.ndindex(3, 4):
+        pixels = np.rint(view_of_wall(ViewOffset(row, column), size=(8, 8)) * 255).astype(np.uint8)
+        Image.fromarray(pixels).save(tmp_path / f"{column + 1:03d}_{row + 1:03d}.ppm")
+    scene = open_light_field(tmp_path)
+    assert scene.grid == GridShape(3, 4)
+    assert {view.path.stem for view in scene.views if view.place == (2, 0)} == {"001_003"}
+    (tmp_path / "002_001.ppm").unlink()
+    with pytest.raises(InputError, match="row 0, column 1 is missing"):
+        open_light_field(tmp_path)
+
+
+def test_stanford_of_1996(tmp_path: Path) -> None:
+    for u, v in np.ndindex(3, 2):
+        pixels = np.full((4, 5, 3), 10 * u + 100 * v, np.uint8)
+        Image.fromarray(pixels).save(tmp_path / f"dragon.{u}.{v}.rgb", "SGI")
+    (tmp_path / "dragon.lid").write_text("# LIF1.0\n")
+    found = {(view.row, view.column): int(view.colors.mean()) for view in written(open_light_field(tmp_path))}
+    assert found == {(0, 0): 100, (0, 1): 110, (0, 2): 120, (1, 0): 0, (1, 1): 10, (1, 2): 20}
+    Image.fromarray(pixels).save(tmp_path / "buddha.0.0.rgb", "SGI")
+    with pytest.raises(InputError, match=r"2 slabs \(buddha, dragon\)"):
+        open_light_field(tmp_path)
+
+
+def test_a_grid_of_15x15_numbered_from_one(tmp_path: Path) -> None:
+    names = {f"{k + 1:03d}.png": at for k, at in enumerate(offsets_of(15, 15).values())}
+    scene = open_light_field(write_numbered(tmp_path, names, (4, 4)))
+    assert (scene.grid, scene.views[16].place) == (GridShape(15, 15), (1, 1))
+
+
+def test_views_of_two_depths_of_colour_and_two_grids_in_a_folder(tmp_path: Path) -> None:
+    folder = write_grid(tmp_path / "depths")
+    deep = np.full((HEIGHT, WIDTH, 3), 40_000, np.uint16)
+    import cv2
+
+    cv2.imwrite(str(folder / "views" / "v00_u00.png"), deep)
+    assert {view.colors.dtype for view in written(open_light_field(folder))} == {np.dtype(np.uint8)}
+    two = write_hci(tmp_path / "two")
+    write_numbered(two, {f"v{v:02d}_u{u:02d}.png": at for (v, u), at in offsets_of(2, 2).items()})
+    assert open_light_field(two).grid == GridShape(3, 3)
+    mixed = write_numbered(tmp_path / "mixed", {f"a_{k}.png": ViewOffset(0, 0) for k in range(4)})
+    write_numbered(mixed, {f"b_{k}_{k}.png": ViewOffset(0, 0) for k in range(3)})
+    with pytest.raises(InputError, match="holds no light field"):
+        open_light_field(mixed)

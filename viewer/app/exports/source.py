@@ -97,11 +97,11 @@ class ExportSource:
         """As read; with disparity that was found where the scene has such."""
         from iibr_core.formats.light_fields.registry import open_light_field
         from iibr_core.formats.light_fields.views import read_views
-        from viewer.background.light_field_job import showings_of_folder
+        from viewer.background.light_field_job import showings_of_light_field
 
         if self.scene.depth_source in ("none", "light field"):
             return read_views(open_light_field(Path(self.scene.source.path)))[1]
-        showings = showings_of_folder(self.scene.source, self.should_stop, self._tell, takes_drafts=False)
+        showings = showings_of_light_field(self.scene.source, self.should_stop, self._tell, takes_drafts=False)
         return next(showings).views
 
     def _tell(self, progress: Progress) -> None:

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG
 from iibr_core.formats.quilts import tagged
 from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.source import ExportSource
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import ExportOptions
-
-FULL_TAG, HALF_TAG, OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB"
-"""At the end of a file's name, for players: left first, side by side; top and bottom."""
 
 Eyes = tuple[NDArray[Any], NDArray[Any]]
 

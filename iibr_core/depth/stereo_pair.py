@@ -1,0 +1,51 @@
+"""The depth of a stereo photo, from its two views: matched at a moderate size, as depth maps of phones have it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.color import stored_from_encoded
+from iibr_core.depth.estimates import DisparityMap
+from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.formats.images.photo import read_picture
+from iibr_core.formats.images.side_by_side import own_picture
+from iibr_core.formats.light_fields.stereo_file import read_stereo_file
+from iibr_core.runtime.machine import usual_budget_bytes
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import InputError, ReportProgress, ignore_progress, image_size
+
+MATCHED_PIXELS = 400_000
+"""Of each view; edges are drawn to the photo's afterwards."""
+
+
+def estimate_from_pair(
+    path: Path,
+    memory_bytes: int | None = None,
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+) -> tuple[DisparityMap, str] | None:
+    """Of the picture that a stereo photo's file shows, px from eye to eye, and what kind of file it is; None where a
+    file is no stereo photo.
+
+    Raises InputError where it is damaged, its views differ in size, are too small, or memory does not do; Cancelled
+    once should_stop is true.
+    """
+    scene = read_stereo_file(path)
+    if scene is None:
+        return None
+    report_progress(0, 0, "finding disparity")
+    pictures = [read_picture(view.picture, MATCHED_PIXELS).pixels for view in scene.views]
+    if pictures[0].shape != pictures[1].shape:
+        sizes = " and ".join(str(image_size(pixels)) for pixels in pictures)
+        raise InputError(f"{path}: its two views differ in shape ({sizes} after reading)")
+    views = [stored_from_encoded(pixels, is_hdr=False) for pixels in pictures]
+    offsets = [view.offset for view in scene.views]
+    reference = next(k for k, view in enumerate(scene.views) if view.picture == own_picture(path))
+    coarse = estimate_coarse(views, offsets, reference, should_stop)
+    allowed = memory_bytes or usual_budget_bytes()
+    if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > allowed:
+        raise InputError(f"{path}: matching its two views takes more memory than there is: raise --memory")
+    values = estimate_disparity(views, offsets, reference, coarse.range_px, should_stop)
+    return DisparityMap(values.astype(np.float32)), scene.layout

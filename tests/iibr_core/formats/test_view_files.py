@@ -1,0 +1,280 @@
+"""Light fields and stereo photos in one file: tiles, lenses, pictures for two eyes."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from PIL import Image
+
+from iibr_core.formats.images.lif import open_lif
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, read_source, source_size
+from iibr_core.formats.images.spatial_photo import write_spatial_photo
+from iibr_core.formats.light_fields import views as views_module
+from iibr_core.formats.light_fields.registry import find_light_field, is_light_field, open_light_field, writer_for
+from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.quilts import Quilt, lay_out, quilt_named
+from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate
+
+HEIGHT, WIDTH = 6, 9
+RNG = np.random.default_rng(0)
+
+
+def pictures(count: int, height: int = HEIGHT, width: int = WIDTH) -> list[np.ndarray]:
+    return [RNG.integers(0, 256, (height, width, 3), np.uint8) for _ in range(count)]
+
+
+def read_back(path: Path) -> dict[tuple[int, int], np.ndarray]:
+    size, views = read_views(open_light_field(path))
+    found = {(view.row, view.column): view.colors for view in views}
+    assert all(colors.shape == (*size, 3) for colors in found.values())
+    return found
+
+
+def write_quilt(folder: Path, quilt: Quilt, tiles: list[np.ndarray], more: str = "") -> Path:
+    path = folder / f"scene{quilt.tag}{more}.png"
+    Image.fromarray(lay_out(quilt, tiles)).save(path)
+    return path
+
+
+@pytest.mark.parametrize("more", ["", "z1.2f0.0"])
+def test_quilts_are_read_as_they_are_written(tmp_path: Path, more: str) -> None:
+    quilt, tiles = Quilt(3, 2, ImageSize(2 * HEIGHT + 1, 3 * WIDTH + 2), WIDTH / HEIGHT), pictures(6)
+    path = write_quilt(tmp_path, quilt, tiles, more)
+    assert is_light_field(path)
+    scene = open_light_field(path)
+    assert (scene.name, scene.grid) == ("scene", GridShape(1, 6))
+    found = read_back(path)
+    for k, tile in enumerate(tiles):
+        np.testing.assert_array_equal(found[0, k], tile)
+
+
+def test_a_quilt_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_quilt(tmp_path, Quilt(3, 2, ImageSize(2 * HEIGHT, 3 * WIDTH), WIDTH / HEIGHT), pictures(6))
+    decoded = []
+    monkeypatch.setattr(views_module, "read_source", lambda source: decoded.append(source) or read_source(source))
+    read_back(path)
+    assert decoded == [PictureSource(path)]
+
+
+@pytest.mark.parametrize(("aspect", "size"), [(3.0, ImageSize(HEIGHT, 18)), (0.75, ImageSize(12, WIDTH))])
+def test_tiles_are_stretched_to_the_shape_they_are_displayed_in(tmp_path: Path, aspect: float, size: ImageSize) -> None:
+    level = [np.full((HEIGHT, WIDTH, 3), 40 * k, np.uint8) for k in range(4)]
+    path = write_quilt(tmp_path, Quilt(2, 2, ImageSize(2 * HEIGHT, 2 * WIDTH), aspect), level)
+    found = read_back(path)
+    assert found[0, 0].shape == (*size, 3)
+    assert [int(found[0, k].mean()) for k in range(4)] == [0, 40, 80, 120]
+
+
+@pytest.mark.parametrize(
+    ("tag", "problem"),
+    [("_qs0x6a1", "0x6"), ("_qs99999x1a1", "99999x1"), ("_qs2x2a0", "aspect"), ("_qs32x32a1", "too few")],
+)
+def test_names_that_no_quilt_can_have(tmp_path: Path, tag: str, problem: str) -> None:
+    path = tmp_path / f"scene{tag}.png"
+    Image.fromarray(pictures(1)[0]).save(path)
+    with pytest.raises(InputError, match=rf"scene{tag}\.png: .*{problem}"):
+        open_light_field(path)
+    assert quilt_named(tmp_path / "scene.png", ImageSize(8, 8)) is None
+
+
+def test_lenslet_images_of_ours_are_read_whole(tmp_path: Path) -> None:
+    grid, path = GridShape(3, 4), tmp_path / "field_eslf.png"
+    tiles = dict(zip(np.ndindex(*grid), pictures(12)))
+    with writer_for("eslf")(path, grid, 40.0, "field", False) as writer:
+        for (row, column), tile in tiles.items():
+            writer.add(ViewUpdate(row, column, tile, None))
+    assert open_light_field(path).grid == grid
+    for at, colors in read_back(path).items():
+        np.testing.assert_array_equal(colors, tiles[at[0], at[1]])
+
+
+def test_of_a_lytros_lenslet_image_the_middle_views_are_taken(tmp_path: Path) -> None:
+    whole = RNG.integers(0, 256, (14 * 3, 14 * 5, 3), np.uint8)
+    Image.fromarray(whole).save(tmp_path / "img_1_eslf.png")
+    found = read_back(tmp_path / "img_1_eslf.png")
+    assert max(found) == (7, 7)
+    np.testing.assert_array_equal(found[0, 0], whole[3::14, 3::14])
+    np.testing.assert_array_equal(found[4, 6], whole[7::14, 9::14])
+
+
+def test_a_lenslet_image_of_no_whole_lenses(tmp_path: Path) -> None:
+    Image.fromarray(pictures(1, 29, 28)[0]).save(tmp_path / "a_eslf.png")
+    with pytest.raises(InputError, match=r"a_eslf\.png: 28x29 pixels are no whole number of lenses of 14x14"):
+        open_light_field(tmp_path / "a_eslf.png")
+
+
+def smooth(height: int = 48, width: int = 64, shift: int = 0) -> np.ndarray:
+    """What lossy formats keep."""
+    y, x = np.mgrid[0:height, 0:width]
+    return np.stack([127 + 100 * np.sin((x + shift) / 9), 2.0 * y, x + 0.0 * y], -1).astype(np.uint8)
+
+
+def write_spatial(path: Path, left: np.ndarray, right: np.ndarray) -> None:
+    write_spatial_photo(path, left, right, 80.0)
+
+
+def write_mpo(path: Path, left: np.ndarray, right: np.ndarray) -> None:
+    Image.fromarray(left).save(path, "MPO", save_all=True, append_images=[Image.fromarray(right)], quality=95)
+
+
+def write_stereo_jpeg(path: Path, left: np.ndarray, right: np.ndarray) -> None:
+    """As cameras do: both pictures are said to be for the eyes."""
+    write_mpo(path, left, right)
+    stored = path.read_bytes()
+    entries = stored.index(struct.pack("<I", 0x030000), stored.index(b"MPF") + 20)
+    changed = bytearray(stored)
+    changed[entries : entries + 4] = struct.pack("<I", 0x020002)
+    changed[entries + 16 : entries + 20] = struct.pack("<I", 0x020002)
+    path.write_bytes(changed)
+
+
+def jpeg(pixels: np.ndarray) -> bytes:
+    stored = BytesIO()
+    Image.fromarray(pixels).save(stored, "JPEG", quality=95)
+    return stored.getvalue()
+
+
+def leia_image(left: np.ndarray, right: np.ndarray, *more: tuple[int, bytes], **own: object) -> bytes:
+    views = [
+        {"image": {"blob_id": 10}, "position": {"x": 0.03, "y": 0, "z": 0}},
+        {"image": {"blob_id": -1}, "position": {"x": -0.03, "y": 0, "z": 0}, **own},
+    ]
+    fields = [(8, json.dumps({"views": views}).encode()), (10, jpeg(right)), *more]
+    body = b"".join(struct.pack(">II", number, len(data)) + data for number, data in fields)
+    region = struct.pack(">I", len(fields)) + body
+    return jpeg(left) + region + struct.pack(">I", len(region) + 6) + b"\x1e\x1a"
+
+
+def write_leia(path: Path, left: np.ndarray, right: np.ndarray) -> None:
+    path.write_bytes(leia_image(left, right))
+
+
+def write_full(path: Path, left: np.ndarray, right: np.ndarray) -> None:
+    Image.fromarray(np.hstack([left, right])).save(path)
+
+
+def write_half(path: Path, left: np.ndarray, right: np.ndarray) -> None:
+    Image.fromarray(np.hstack([left[:, ::2], right[:, ::2]])).save(path)
+
+
+def write_over(path: Path, left: np.ndarray, right: np.ndarray) -> None:
+    Image.fromarray(np.vstack([left, right])).save(path)
+
+
+STEREO: dict[str, tuple[str, Callable[[Path, np.ndarray, np.ndarray], None], str]] = {
+    "spatial": ("a.heic", write_spatial, "spatial HEIC"),
+    "mpo": ("a.mpo", write_mpo, "MPO stereo"),
+    "stereo jpeg": ("a.jpg", write_stereo_jpeg, "MPO stereo"),
+    "leia": ("a.jpg", write_leia, "Leia stereo"),
+    "lif": ("a.lif", write_leia, "Leia stereo"),
+    "full": ("a_LRF_Full_SBS.png", write_full, "side-by-side stereo"),
+    "sbs": ("a_sbs.png", write_full, "side-by-side stereo"),
+    "half": ("a_LRF_Half_SBS.png", write_half, "side-by-side stereo"),
+    "leia half": ("a_half_2x1.png", write_half, "side-by-side stereo"),
+    "over": ("a_TB.png", write_over, "side-by-side stereo"),
+}
+
+
+@pytest.mark.parametrize("kind", STEREO)
+def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path: Path, kind: str) -> None:
+    name, write, layout = STEREO[kind]
+    left, right = smooth(), smooth(shift=4)
+    path = tmp_path / name
+    write(path, left, right)
+    scene = open_light_field(path)
+    assert (scene.layout, scene.grid, scene.place) == (layout, GridShape(1, 2), path)
+    assert not is_light_field(path)  # it opens as a photo with depth
+    found = read_back(path)
+    for at, expected in (((0, 0), left), ((0, 1), right)):
+        assert found[at].shape == expected.shape
+        assert np.abs(found[at].astype(int) - expected).mean() < 3
+    photo = read_photo(path)
+    np.testing.assert_allclose(photo.pixels * 255, found[0, 0], atol=0.51)
+
+
+@pytest.mark.parametrize("kind", ["spatial", "mpo", "stereo jpeg", "lif", "full"])
+@pytest.mark.parametrize("share", [0.97, 0.6, 0.1])
+def test_cut_stereo_photos_are_refused_in_a_line_or_read_as_photos(tmp_path: Path, kind: str, share: float) -> None:
+    name, write, _ = STEREO[kind]
+    path = tmp_path / name
+    write(path, smooth(), smooth(shift=4))
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    if kind == "stereo jpeg" and find_light_field(path) is None:
+        return  # nothing says any more that it held two
+    with pytest.raises(InputError, match=rf"^{path}: [^\n]*$"):
+        read_back(path)
+
+
+def test_pictures_of_two_sizes_are_no_pair(tmp_path: Path) -> None:
+    write_mpo(tmp_path / "a.mpo", smooth(), smooth(40, 60))
+    with pytest.raises(InputError, match=r"is 60x40, but a\.mpo is 64x48"):
+        read_views(open_light_field(tmp_path / "a.mpo"))
+
+
+def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
+    """Gain maps and previews are stored the same way."""
+    write_mpo(tmp_path / "phone.jpg", smooth(), smooth(24, 32))
+    assert find_light_field(tmp_path / "phone.jpg") is None
+    Image.fromarray(smooth()).save(tmp_path / "single.mpo", "JPEG")
+    with pytest.raises(InputError, match="holds one picture only"):
+        find_light_field(tmp_path / "single.mpo")
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (lambda data: data.replace(b'"blob_id": 10', b'"blob_id": 11'), "lack a picture"),
+        (lambda data: data.replace(b'{"views"', b'["views"'), "cannot be read"),
+        (lambda data: data.replace(b'"views"', b'"sights"'), "cannot be read|beyond"),
+        (lambda data: data.replace(struct.pack(">I", 8) + b"\0", struct.pack(">I", 9) + b"\0"), "nothing of views"),
+        (lambda data: data[:-6] + struct.pack(">I", 20) + data[-2:], "fields|beyond"),
+    ],
+)
+def test_damaged_leia_images_are_refused_in_a_line(
+    tmp_path: Path, change: Callable[[bytes], bytes], problem: str
+) -> None:
+    whole = leia_image(smooth(), smooth(shift=4))
+    assert change(whole) != whole
+    (tmp_path / "a.lif").write_bytes(change(whole))
+    with pytest.raises(InputError, match=rf"a\.lif: .*({problem})"):
+        open_lif(tmp_path / "a.lif")
+
+
+@pytest.mark.parametrize("ending", ["lfp", "lfr", "lfx", "raw", "LFP"])
+def test_raw_light_fields_are_refused_by_saying_what_decodes_them(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"IMG_0001.{ending}"
+    path.write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(100))
+    for read in (open_light_field, read_photo):
+        with pytest.raises(InputError, match=r"raw light field .* decoded first: PlenoptiCam"):
+            read(path)
+
+
+def test_parts_are_of_the_upright_picture(tmp_path: Path) -> None:
+    stored, exif = pictures(1, 4, 6)[0], Image.Exif()
+    exif[0x0112] = 6  # a quarter turn clockwise
+    Image.fromarray(stored).save(tmp_path / "a.tif", exif=exif)
+    upright = np.rot90(stored, -1)
+    source = PictureSource(tmp_path / "a.tif", part=PicturePart((1, 0), ImageSize(3, 2), (2, 2)))
+    np.testing.assert_array_equal(read_source(source).pixels, upright[1:6:2, 0:4:2])
+    assert source_size(source) == (3, 2)
+    beyond = PictureSource(tmp_path / "a.tif", part=PicturePart((0, 3), ImageSize(6, 3)))
+    with pytest.raises(InputError, match="smaller than it should be"):
+        read_source(beyond)
+    oiio.geterror()
+
+
+def test_files_that_hold_no_light_field(tmp_path: Path) -> None:
+    Image.fromarray(smooth()).save(tmp_path / "photo.png")
+    assert find_light_field(tmp_path / "photo.png") is None
+    with pytest.raises(InputError, match=r"photo\.png: holds no light field; give a quilt"):
+        open_light_field(tmp_path / "photo.png")
+    with pytest.raises(InputError, match="no such file"):
+        open_light_field(tmp_path / "missing_qs2x2a1.png")
