@@ -289,5 +289,5 @@ def test_parameters_that_are_none(tmp_path):
 def test_folder_without_light_field(tmp_path):
     with pytest.raises(InputError, match="holds no light field"):
         read_light_field(tmp_path)
-    with pytest.raises(InputError, match="not a folder"):
+    with pytest.raises(InputError, match="no such file"):
         read_light_field(tmp_path / "none")
