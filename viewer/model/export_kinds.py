@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from iibr_core.formats.animations import VIDEOS
 from iibr_core.types import InputError
 
 LIGHT_FIELD = ("light_field:write_light_field",)
@@ -27,7 +28,8 @@ class ExportKind:
     """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
     names of the options about exports and the lens that mean something to it. path: makes the file's name what players
     expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
-    expression. needs: packages, of the extra `export`.
+    expression. needs: packages, of the extra `export`. frames: pictures of a
+    stack. rate: frames a second. most_width_px: of pictures whose size nobody chose, 0: any.
     """
 
     words: str
@@ -38,11 +40,19 @@ class ExportKind:
     layout: str = ""
     own_files: str = ""
     needs: tuple[str, ...] = ()
+    frames: int = 0
+    rate: float = 0.0
+    most_width_px: int = 0
 
     @property
     def is_drawn(self) -> bool:
         """Whether the graphics card draws it; else it is made of the views themselves."""
         return "aperture" in self.heeds
+
+    @property
+    def is_video(self) -> bool:
+        """Whether its width and height must be even."""
+        return bool(set(self.endings) & set(VIDEOS))
 
 
 EXPORTS = {
@@ -61,17 +71,21 @@ EXPORTS = {
     "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES),
     "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES),
     "spatial-photo": ExportKind("Spatial photo, HEIC", (".heic",), "spatial_photo:write_spatial", EYES),
-    "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",)),
-    "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",)),
-    "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING),
-    "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING),
-    "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING),
-    "focal-stack": ExportKind("Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES),
-    "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK),
-    "aperture-sweep": ExportKind(
-        "Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES
+    "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",), rate=30),
+    "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",), rate=30),
+    "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
+    "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING, rate=25, most_width_px=960),
+    "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
+    "focal-stack": ExportKind(
+        "Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES, frames=16
     ),
-    "aperture-sweep-exr": ExportKind("Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK),
+    "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK, frames=16),
+    "aperture-sweep": ExportKind(
+        "Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES, frames=9
+    ),
+    "aperture-sweep-exr": ExportKind(
+        "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK, frames=9
+    ),
     "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",)),
     "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity"),
     "depth": ExportKind("Depth map", MAP, "maps:write_depth", path="maps:depth_path"),

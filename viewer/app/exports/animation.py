@@ -12,51 +12,43 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.animations import VIDEOS, even_size, require_video_size, write_animation
+from iibr_core.formats.animations import require_video_size, write_animation
 from iibr_core.formats.files import open_binary
 from iibr_core.types import ImageSize, InputError, ViewOffset
+from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.source import ExportSource
-from viewer.model.layout import ScreenSize
+from viewer.model.export_settings import ExportSettings
 from viewer.model.lens.limits import aperture_limit, clamp_optics
 from viewer.model.reducers.camera_motion import point_on_loop
 from viewer.model.state.app_state import Scene
-from viewer.model.state.exporting import AnimationKind, ExportOptions
+from viewer.model.state.exporting import AnimationKind
 from viewer.model.state.optics import Optics
 
-USUAL_SECONDS = 4.0
-USUAL_RATE = {".gif": 15.0, ".png": 15.0, ".webp": 25.0}
-"""Where it is another than USUAL_VIDEO_RATE: what compresses little has fewer frames, and smaller ones."""
-USUAL_VIDEO_RATE = 30.0
-USUAL_WIDTH_PX = {".gif": 480, ".png": 480, ".webp": 960}
 OPENED = 0.8
 """Of the widest aperture, for motions that need an open one."""
 MOST_PATH_BYTES = 1_000_000
 MOST_KEYS = 1000
 
 
-def write_motion(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_motion(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Raises InputError where it cannot be written, Cancelled once the export should stop."""
-    kind = path.suffix.lower()
-    rate = options.rate or USUAL_RATE.get(kind, USUAL_VIDEO_RATE)
-    count = options.frames or max(round(USUAL_SECONDS * rate), 2)
-    size = options.size or _usual_size(source.scene, kind)
-    require_video_size(path, ImageSize(size.height, size.width))
-    optics = optics_on_path(source.scene, source.optics, options, count)
-    drawn = (source.draw(each, size) for each in optics)
-    frames = source.watched(drawn, count, "drawing frames")
-    write_animation(path, frames, ImageSize(size.height, size.width), rate)
+    size = ImageSize(settings.size.height, settings.size.width)
+    require_video_size(path, size)
+    optics = optics_on_path(source.scene, source.optics, settings)
+    drawn = (draw_framed(source, each, settings.size) for each in optics)
+    frames = source.watched(drawn, settings.frames, "drawing frames")
+    write_animation(path, frames, size, settings.rate)
 
 
-def optics_on_path(scene: Scene, optics: Optics, options: ExportOptions, count: int) -> list[Optics]:
-    """So many, evenly spread over one turn of a closed path. Raises InputError for a path that cannot be read."""
-    turns = [k / count for k in range(count)]
-    if options.keys is not None:
-        keys = read_keys(options.keys)
+def optics_on_path(scene: Scene, optics: Optics, settings: ExportSettings) -> list[Optics]:
+    """One a frame, evenly spread over one turn of a closed path. Raises InputError for a path that cannot be read."""
+    turns = [k / settings.frames for k in range(settings.frames)]
+    if settings.keys is not None:
+        keys = read_keys(settings.keys)
         if any(not _is_within(scene, _between(keys, k / len(keys), optics)) for k in range(len(keys))):
-            raise InputError(f"{options.keys}: a key lies beyond what {scene.name} has; take smaller numbers")
+            raise InputError(f"{settings.keys}: a key lies beyond what {scene.name} has; take smaller numbers")
         return [clamp_optics(_between(keys, turn, optics), scene) for turn in turns]
-    motion = options.motion or "circle"
-    return [_on_motion(scene, optics, motion, turn) for turn in turns]
+    return [_on_motion(scene, optics, settings.motion, turn) for turn in turns]
 
 
 def read_keys(path: Path) -> list[tuple[float, ...]]:
@@ -114,10 +106,3 @@ def _on_motion(scene: Scene, optics: Optics, motion: AnimationKind, turn: float)
         case "aperture":
             return replace(optics, aperture_diameter=wave * opened)
     return replace(optics, eye=point_on_loop(motion, turn, scene.grid))
-
-
-def _usual_size(scene: Scene, kind: str) -> ScreenSize:
-    width = min(scene.width, USUAL_WIDTH_PX.get(kind, scene.width))
-    size = ImageSize(max(round(scene.height * width / scene.width), 1), width)
-    height, width = even_size(size) if kind in VIDEOS else size
-    return ScreenSize(width, height)

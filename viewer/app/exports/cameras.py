@@ -21,7 +21,7 @@ from iibr_core.formats.cameras import (
 from iibr_core.formats.outputs import UnfinishedFolder
 from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 from viewer.app.exports.source import ExportSource
-from viewer.model.state.exporting import ExportOptions
+from viewer.model.export_settings import ExportSettings
 
 MOST_POINTS = 20_000
 """For COLMAP: as many as a reconstruction finds."""
@@ -61,19 +61,19 @@ def _straight_cameras(source: ExportSource) -> tuple[FieldCameras, float | None]
     return replace(cameras, range_px=(low, high), at_infinity=0.0), _given_infinity(source)
 
 
-def write_llff_folder(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_llff_folder(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Images and poses_bounds.npy; the others likewise: raises InputError where it cannot be written, Cancelled once
     the export should stop.
     """
     _write(path, source, lambda folder, cameras, views, centre: write_llff(folder, cameras, views))
 
 
-def write_nerfstudio_folder(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_nerfstudio_folder(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Images and transforms.json."""
     _write(path, source, lambda folder, cameras, views, centre: write_nerfstudio(folder, cameras, views))
 
 
-def write_colmap_folder(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_colmap_folder(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Images and sparse/0, with points of the centre view."""
 
     def write(folder: Path, cameras: FieldCameras, views: Views, centre: ViewUpdate) -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from iibr_core.formats.light_fields.registry import writer_for
 from viewer.app.exports.source import ExportSource
-from viewer.model.state.exporting import ExportOptions
+from viewer.model.export_settings import ExportSettings
 
 
-def write_light_field(layout: str, path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_light_field(layout: str, path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """With every view's disparity, where there is one and the layout has a place for it.
 
     Raises InputError where it cannot be written, Cancelled once the export should stop.

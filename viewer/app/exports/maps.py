@@ -11,6 +11,7 @@ from iibr_core.formats.quilts import tagged
 from iibr_core.types import InputError
 from viewer.app.exports.cameras import cameras_of, colors_of
 from viewer.app.exports.source import ExportSource
+from viewer.model.export_settings import ExportSettings
 from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import ExportOptions
 
@@ -20,25 +21,24 @@ def depth_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     return tagged(path, "_depth")
 
 
-def write_disparity(path: Path, source: ExportSource, options: ExportOptions) -> str:
+def write_disparity(path: Path, source: ExportSource, settings: ExportSettings) -> str:
     """Px per view step; returns what is to be known of the file."""
     return write_map(path, _disparity_of(source))
 
 
-def write_depth(path: Path, source: ExportSource, options: ExportOptions) -> str:
+def write_depth(path: Path, source: ExportSource, settings: ExportSettings) -> str:
     """In distances of the nearest; returns what is to be known of the file."""
     return write_depth_map(path, cameras_of(source).depth(_disparity_of(source)))
 
 
-def write_epi(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_epi(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """A row of the picture in each view of the centre row of views, the leftmost on top."""
     from iibr_core.formats.images.photo import write_image
 
     scene = source.scene
-    row = scene.height // 2 if options.row is None else options.row
-    if not 0 <= row < scene.height:
-        raise InputError(f"row {row}: {scene.name} has rows 0 to {scene.height - 1}")
-    lines = {view.column: colors_of(view)[row] for view in source.views() if view.row == scene.grid.centre[0]}
+    if not 0 <= settings.row < scene.height:
+        raise InputError(f"row {settings.row}: {scene.name} has rows 0 to {scene.height - 1}")
+    lines = {view.column: colors_of(view)[settings.row] for view in source.views() if view.row == scene.grid.centre[0]}
     write_image(path, np.stack([lines[column] for column in sorted(lines)]))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from iibr_core.types import InputError, ViewOffset
 from viewer.gpu.refocus.lens import TargetWindow
-from viewer.model.layout import ScreenSize
+from viewer.model.export_settings import shear_margin
 from viewer.model.state.app_state import Scene
 from viewer.model.state.optics import Optics
 
@@ -22,28 +22,25 @@ LEAST_WIDTH = 0.4
 
 @dataclass(frozen=True)
 class SidePicture:
-    """A picture from one viewpoint. aspect: width / height of what it shows."""
+    """A picture from one viewpoint: a part of what that shows."""
 
     optics: Optics
     part: TargetWindow
-    aspect: float
 
 
-def side_pictures(scene: Scene, optics: Optics, count: int, span_views: float | None = None) -> list[SidePicture]:
+def side_pictures(scene: Scene, optics: Optics, count: int, span_views: float) -> list[SidePicture]:
     """So many pictures, from the leftmost viewpoint to the rightmost. span_views: view steps from the first to the
-    last, the whole grid by default.
+    last, about the middle of the grid.
 
     Raises InputError where the focus lies so far from the plane that stays still that little would be left to see.
     """
-    columns, (_, centre) = scene.grid.columns, scene.grid.centre
-    span = float(columns - 1) if span_views is None else span_views
-    middle = (columns - 1) / 2 - centre
-    places = np.linspace(middle - span / 2, middle + span / 2, count) if count > 1 else np.array([middle])
+    middle = (scene.grid.columns - 1) / 2 - scene.grid.centre[1]
+    places = middle + (np.linspace(-span_views / 2, span_views / 2, count) if count > 1 else np.zeros(1))
     shears = -optics.focus_disparity * places / scene.width
-    margin = float(np.abs(shears).max())
+    margin = shear_margin(scene, optics, span_views)
     width = 1 - 2 * margin
     if width < LEAST_WIDTH:
-        moved = optics.focus_disparity * span
+        moved = optics.focus_disparity * span_views
         raise InputError(
             f"{scene.name}: what is in focus moves by {moved:.0f} px from the first view to the last, too much to be"
             " held still; focus nearer to 0, or take fewer view steps"
@@ -52,15 +49,6 @@ def side_pictures(scene: Scene, optics: Optics, count: int, span_views: float | 
         SidePicture(
             replace(optics, eye=ViewOffset(optics.eye.t, float(s))),
             TargetWindow(margin + float(shear), 0.0, width, 1.0),
-            width * scene.width / scene.height,
         )
         for s, shear in zip(places, shears)
     ]
-
-
-def fitted(aspect: float, frame: ScreenSize, frame_aspect: float) -> ScreenSize:
-    """The size of a picture of this aspect, whole in a frame (width, height) that is displayed with frame_aspect."""
-    width, height = frame
-    if aspect > frame_aspect:
-        return ScreenSize(width, max(round(height * frame_aspect / aspect), 1))
-    return ScreenSize(max(round(width * aspect / frame_aspect), 1), height)

@@ -12,7 +12,7 @@ from iibr_core.formats.ply import write_points, write_splats
 from iibr_core.types import FloatImage, InputError, ViewUpdate
 from viewer.app.exports.cameras import cameras_of, colors_of
 from viewer.app.exports.source import ExportSource
-from viewer.model.state.exporting import ExportOptions
+from viewer.model.export_settings import ExportSettings
 
 SAME_DISPARITY_PX = 0.1
 """Made-up pixels of several views are one where they agree so well, per view step, and look at one pixel."""
@@ -21,13 +21,13 @@ Points = tuple[FloatImage, NDArray[np.uint8], FloatImage]
 """Places (N, 3), x right, y down, z forward; colours (N, 3); how wide a pixel is there (N,)."""
 
 
-def write_point_cloud(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_point_cloud(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """As a PLY, y up and z backwards, as most viewers of points look."""
     places, colors, _ = scene_points(source)
     write_points(path, places * np.array([1, -1, -1], np.float32), colors)
 
 
-def write_gaussians(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_gaussians(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """As a PLY of 3DGS, y down and z forward, as its training leaves them."""
     write_splats(path, *scene_points(source))
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.formats.quilts import Quilt, lay_out, quilt_for, tagged
 from iibr_core.types import ImageSize
-from viewer.app.exports.parallax import fitted, side_pictures
+from viewer.app.exports.framing import draw_framed
+from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.source import ExportSource
+from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import ExportOptions
@@ -19,30 +17,21 @@ from viewer.model.state.exporting import ExportOptions
 
 def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     """With the numbers that players read from the name. Raises InputError for a display that nobody knows."""
-    return tagged(path, _quilt_of(scene, options).tag)
+    return tagged(path, _quilt_of(scene, options.device).tag)
 
 
-def write_quilt(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Raises InputError where it cannot be written, Cancelled once the export should stop."""
     from iibr_core.formats.images.picture_writers import write_picture
 
-    quilt = _quilt_of(source.scene, options)
-    pictures = side_pictures(source.scene, source.optics, quilt.views)
+    quilt = _quilt_of(source.scene, settings.device)
     frame = ScreenSize(quilt.tile.width, quilt.tile.height)
-    size = fitted(pictures[0].aspect, frame, quilt.aspect)
-    drawn = (source.draw(picture.optics, size, picture.part) for picture in pictures)
-    tiles = (_framed(pixels, quilt) for pixels in source.watched(drawn, quilt.views, "drawing views"))
-    write_picture(path, lay_out(quilt, tiles))
+    drawn = (
+        draw_framed(source, picture.optics, frame, picture.part, frame_aspect=quilt.aspect)
+        for picture in side_pictures(source.scene, source.optics, quilt.views, settings.eyes)
+    )
+    write_picture(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")))
 
 
-def _quilt_of(scene: Scene, options: ExportOptions) -> Quilt:
-    return quilt_for(options.device, ImageSize(scene.height, scene.width))
-
-
-def _framed(pixels: NDArray[Any], quilt: Quilt) -> NDArray[np.uint8]:
-    """In the middle of a black tile."""
-    tile = np.zeros((*quilt.tile, 3), np.uint8)
-    height, width = pixels.shape[:2]
-    top, left = (quilt.tile.height - height) // 2, (quilt.tile.width - width) // 2
-    tile[top : top + height, left : left + width] = pixels
-    return tile
+def _quilt_of(scene: Scene, device: str | None) -> Quilt:
+    return quilt_for(device, ImageSize(scene.height, scene.width))

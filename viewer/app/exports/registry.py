@@ -15,6 +15,7 @@ from iibr_core.formats.light_fields.registry import writer_for
 from iibr_core.formats.outputs import remove_leftovers, require_file_place, require_folder_place
 from iibr_core.types import InputError
 from viewer.model.export_kinds import ExportKind, require_ending
+from viewer.model.export_settings import settle
 
 if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
@@ -58,8 +59,13 @@ def writer_of(kind: ExportKind) -> Callable[[Path, ExportSource, ExportOptions],
 
     It raises InputError where that cannot be, Cancelled once it should stop.
     """
-    writer: Callable[..., str | None] = _resolve(kind.write)
-    return partial(writer, kind.layout) if kind.layout else writer
+    resolved: Callable[..., str | None] = _resolve(kind.write)
+    writer = partial(resolved, kind.layout) if kind.layout else resolved
+
+    def write(path: Path, source: ExportSource, options: ExportOptions) -> str | None:
+        return writer(path, source, settle(kind, options, source.scene, source.optics))
+
+    return write
 
 
 def _resolve(entry: str) -> Any:

@@ -10,20 +10,20 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.types import InputError
 from viewer.app.exports.cameras import colors_of
 from viewer.app.exports.source import ExportSource
-from viewer.model.state.exporting import ExportOptions
+from viewer.model.export_settings import ExportSettings
 
 
-def write_beside(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_beside(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Depth at the right; the others likewise: raises InputError where nothing tells depth or it cannot be written."""
     _write(path, source, axis=1, is_first=False)
 
 
-def write_before(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_before(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Depth at the left."""
     _write(path, source, axis=1, is_first=True)
 
 
-def write_below(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_below(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Depth below."""
     _write(path, source, axis=0, is_first=False)
 

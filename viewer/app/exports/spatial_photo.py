@@ -7,12 +7,12 @@ from pathlib import Path
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from viewer.app.exports.source import ExportSource
 from viewer.app.exports.stereo import draw_eyes
-from viewer.model.state.exporting import ExportOptions
+from viewer.model.export_settings import ExportSettings
 
 
-def write_spatial(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_spatial(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """Raises InputError where it cannot be written, Cancelled once the export should stop."""
-    left, right = draw_eyes(source, options)
+    left, right = draw_eyes(source, settings)
     focal_px = source.loaded.photo.focal_px if source.loaded is not None else source.scene.focal_px
     scale = left.shape[0] / source.scene.height
     write_spatial_photo(path, left, right, scale * (focal_px or source.scene.width))

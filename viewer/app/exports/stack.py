@@ -13,14 +13,14 @@ import numpy as np
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import UnfinishedFolder
 from iibr_core.types import FloatImage, ImageSize
+from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.source import ExportSource
+from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
 from viewer.model.state.app_state import Scene
-from viewer.model.state.exporting import ExportOptions
 from viewer.model.state.optics import Optics
 
-USUAL_FOCUSES, USUAL_APERTURES = 16, 9
 OPENED = 0.8
 """Of the widest aperture, where it is closed."""
 
@@ -29,39 +29,38 @@ Stack = Sequence[tuple[str, Optics]]
 ALL_IN_FOCUS = "all_in_focus"
 
 
-def focal_stack(scene: Scene, optics: Optics, count: int | None) -> Stack:
+def focal_stack(scene: Scene, optics: Optics, count: int) -> Stack:
     """Focus by focus, from far to near."""
     far, near = scene.disparity_range_px
     opened = optics.aperture_diameter or OPENED * aperture_limit(scene.grid)
-    focuses = np.linspace(far, near, count or USUAL_FOCUSES)
+    focuses = np.linspace(far, near, count)
     return [
         (f"focus_{k:03d}", replace(optics, focus_disparity=float(focus), aperture_diameter=opened))
         for k, focus in enumerate(focuses)
     ]
 
 
-def aperture_sweep(scene: Scene, optics: Optics, count: int | None) -> Stack:
+def aperture_sweep(scene: Scene, optics: Optics, count: int) -> Stack:
     """Aperture by aperture, from a pinhole."""
-    diameters = np.linspace(0.0, aperture_limit(scene.grid), count or USUAL_APERTURES)
+    diameters = np.linspace(0.0, aperture_limit(scene.grid), count)
     return [
         (f"aperture_{k:03d}", replace(optics, aperture_diameter=float(diameter)))
         for k, diameter in enumerate(diameters)
     ]
 
 
-def write_focal_stack(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_focal_stack(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """A folder of PNGs, or an OpenEXR file; so do the others."""
-    _write(path, source, options, focal_stack(source.scene, source.optics, options.frames))
+    _write(path, source, settings.size, focal_stack(source.scene, source.optics, settings.frames))
 
 
-def write_aperture_sweep(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_aperture_sweep(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """See `aperture_sweep`. Raises InputError where it cannot be written, Cancelled once the export should stop."""
-    _write(path, source, options, aperture_sweep(source.scene, source.optics, options.frames))
+    _write(path, source, settings.size, aperture_sweep(source.scene, source.optics, settings.frames))
 
 
-def _write(path: Path, source: ExportSource, options: ExportOptions, stack: Stack) -> None:
+def _write(path: Path, source: ExportSource, size: ScreenSize, stack: Stack) -> None:
     stack = [*stack, (ALL_IN_FOCUS, replace(source.optics, aperture_diameter=0.0))]
-    size = options.size or source.scene.size
     disparity = source.disparity_seen()
     if path.suffix.lower() == ".exr":
         _write_parts(path, source, size, stack, disparity)
@@ -77,7 +76,7 @@ def _write_folder(
     unfinished = UnfinishedFolder(path)
     try:
         for name, optics in source.watched(stack, len(stack), "drawing"):
-            write_image(unfinished.path / f"{name}.png", source.draw(optics, size))
+            write_image(unfinished.path / f"{name}.png", draw_framed(source, optics, size))
         if disparity is not None:
             write_pfm(unfinished.path / "disparity.pfm", disparity)
         unfinished.put_in_place()
@@ -97,7 +96,7 @@ def _write_parts(
         return known is not None and name == ALL_IN_FOCUS
 
     def draw(name: str, optics: Optics) -> FloatImage:
-        light = source.draw(optics, size, is_linear=True)
+        light = draw_framed(source, optics, size, is_linear=True)
         return light if known is None or not has_disparity(name) else np.dstack([light, known])
 
     parts = [ExrPart(name, COLORS | (DISPARITY if has_disparity(name) else {})) for name, _ in stack]

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG
 from iibr_core.formats.quilts import tagged
+from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.source import ExportSource
+from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import ExportOptions
@@ -34,45 +36,46 @@ def over_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     return tagged(path, OVER_TAG)
 
 
-def draw_eyes(source: ExportSource, options: ExportOptions, squeeze: int = 1) -> Eyes:
+def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1) -> Eyes:
     """The left eye's picture and the right one's, (H, W, 3) uint8. squeeze: the width is divided by it.
 
     Raises InputError where what is in focus cannot be held still, Cancelled once the export should stop.
     """
-    scene = source.scene
-    eyes = side_pictures(scene, source.optics, 2, options.eyes)
-    width, height = options.size or ScreenSize(max(round(eyes[0].aspect * scene.height), 1), scene.height)
-    size = ScreenSize(max(width // squeeze, 1), height)
-    drawn = (source.draw(eye.optics, size, eye.part) for eye in eyes)
+    width, height = settings.size
+    frame = ScreenSize(max(width // squeeze, 1), height)
+    drawn = (
+        draw_framed(source, eye.optics, frame, eye.part, frame_aspect=width / height)
+        for eye in side_pictures(source.scene, source.optics, 2, settings.eyes)
+    )
     left, right = source.watched(drawn, 2, "drawing")
     return left, right
 
 
-def write_side_by_side(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_side_by_side(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The left eye's at the left."""
-    _write(path, np.hstack(draw_eyes(source, options)))
+    _write(path, np.hstack(draw_eyes(source, settings)))
 
 
-def write_half_side_by_side(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_half_side_by_side(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The same, together as wide as one."""
-    _write(path, np.hstack(draw_eyes(source, options, squeeze=2)))
+    _write(path, np.hstack(draw_eyes(source, settings, squeeze=2)))
 
 
-def write_over_under(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_over_under(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The left eye's on top."""
-    _write(path, np.vstack(draw_eyes(source, options)))
+    _write(path, np.vstack(draw_eyes(source, settings)))
 
 
-def write_cross_eyed(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_cross_eyed(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The left eye's at the right, to be seen with crossed eyes."""
-    _write(path, np.hstack(draw_eyes(source, options)[::-1]))
+    _write(path, np.hstack(draw_eyes(source, settings)[::-1]))
 
 
-def write_anaglyph(path: Path, source: ExportSource, options: ExportOptions) -> None:
+def write_anaglyph(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """For red-cyan glasses, the left eye's red."""
     from iibr_core.formats.stereo import anaglyph
 
-    _write(path, anaglyph(*draw_eyes(source, options)))
+    _write(path, anaglyph(*draw_eyes(source, settings)))
 
 
 def _write(path: Path, pixels: NDArray[Any]) -> None:

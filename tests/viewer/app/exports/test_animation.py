@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,19 +16,24 @@ from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.animation import optics_on_path
 from viewer.app.exports.source import ExportSource
+from viewer.model.export_kinds import EXPORTS
+from viewer.model.export_settings import settle
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
 from viewer.model.state.exporting import ANIMATIONS, ExportOptions
+from viewer.model.state.optics import Optics
 
 SIZE = ScreenSize(96, 64)
 COUNT = 6
 
 
+def path_of(source: ExportSource, **options: Any) -> list[Optics]:
+    settings = settle(EXPORTS["gif"], ExportOptions(**options), source.scene, source.optics)
+    return optics_on_path(source.scene, source.optics, settings)
+
+
 def expected_frames(source: ExportSource) -> list[np.ndarray]:
-    return [
-        source.draw(optics, SIZE).astype(int)
-        for optics in optics_on_path(source.scene, source.optics, ExportOptions(), COUNT)
-    ]
+    return [source.draw(optics, SIZE).astype(int) for optics in path_of(source, frames=COUNT)]
 
 
 def video_frames(path: Path) -> tuple[list[np.ndarray], float, str]:
@@ -77,8 +83,7 @@ def _frames(image: Image.Image) -> Iterator[Image.Image]:
 
 @pytest.mark.parametrize("motion", ANIMATIONS)
 def test_paths_are_closed_and_move(source: ExportSource, motion: str) -> None:
-    asked = ExportOptions(motion=motion)  # type: ignore[arg-type]
-    path = optics_on_path(source.scene, source.optics, asked, 24)
+    path = path_of(source, motion=motion, frames=24)
     around = np.array([(*optics.eye, optics.focus_disparity, optics.aperture_diameter) for optics in path])
     steps = np.linalg.norm(np.diff(around, axis=0, append=around[:1]), axis=1)
     assert steps.max() > 0.01
@@ -89,7 +94,7 @@ def test_paths_are_closed_and_move(source: ExportSource, motion: str) -> None:
 def test_a_path_of_ones_own_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> None:
     keys = tmp_path / "keys.txt"
     keys.write_text("# s t focus aperture\n-1 0 0.5 1\n1, 0.5, -0.1, 2\n\n0 -1\n")
-    path = optics_on_path(source.scene, replace(source.optics, aperture_diameter=1.5), ExportOptions(keys=keys), 6)
+    path = path_of(replace(source, optics=replace(source.optics, aperture_diameter=1.5)), keys=keys, frames=6)
     assert path[0].eye == ViewOffset(0, -1)
     assert (path[2].eye, path[2].focus_disparity, path[2].aperture_diameter) == (ViewOffset(0.5, 1), -0.1, 2)
     assert (path[4].eye, path[4].focus_disparity, path[4].aperture_diameter) == (ViewOffset(-1, 0), 0.0, 1.5)
@@ -100,7 +105,7 @@ def test_keys_that_mean_nothing_are_refused(source: ExportSource, tmp_path: Path
     keys = tmp_path / "keys.txt"
     keys.write_text(text or "\n")
     with pytest.raises(InputError, match="keys"):
-        optics_on_path(source.scene, source.optics, ExportOptions(keys=keys), 4)
+        path_of(source, keys=keys, frames=4)
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.webm"])

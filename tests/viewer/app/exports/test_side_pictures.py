@@ -12,7 +12,8 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.viewer.app.exports.conftest import exported
-from viewer.app.exports.parallax import fitted, side_pictures
+from viewer.app.exports.framing import fitted
+from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.source import ExportSource
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
@@ -47,7 +48,7 @@ def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
     near = source.scene.disparity_range_px[1]
     places = {}
     for focus in (0.0, near):
-        eyes = side_pictures(source.scene, Optics(focus_disparity=focus), 2)
+        eyes = side_pictures(source.scene, Optics(focus_disparity=focus), 2, 2.0)
         drawn = [source.draw(eye.optics, ScreenSize(288, 192), eye.part).astype(int) for eye in eyes]
         left, right = map(left_edge_of_square, drawn)
         places[focus] = left - right
@@ -57,7 +58,7 @@ def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
 
 def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:
     with pytest.raises(InputError, match="too much to be held still"):
-        side_pictures(source.scene, Optics(focus_disparity=30.0), 2)
+        side_pictures(source.scene, Optics(focus_disparity=30.0), 2, 2.0)
 
 
 @pytest.mark.parametrize("name", DEVICES)
@@ -76,6 +77,16 @@ def test_tiles_of_a_display_are_stretched_to_its_shape(source: ExportSource, tmp
     assert DEVICES["16-landscape"].tile == ImageSize(857, 857)
     assert fitted(1.5, ScreenSize(857, 857), 1.777) == (round(857 * 1.5 / 1.777), 857)
     assert fitted(2.5, ScreenSize(857, 857), 1.777) == (857, round(857 * 1.777 / 2.5))
+    assert fitted(741 / 500, ScreenSize(740, 500), 740 / 500) == (740, 500), "no bar of a single row"
+
+
+def test_a_size_of_another_shape_shows_the_whole_picture_undistorted(source: ExportSource, tmp_path: Path) -> None:
+    out = pixels(exported(source, "cross-eyed", tmp_path / "a.png", size=ScreenSize(96, 100)))
+    expected = source.draw(Optics(eye=ViewOffset(0.0, 1.0)), ScreenSize(96, 64)).astype(int)
+    assert out.shape == (100, 192, 3)
+    assert np.array_equal(out[18:82, :96], expected)
+    assert not out[:18].any()
+    assert not out[82:].any()
 
 
 def test_stereo_pictures(source: ExportSource, tmp_path: Path) -> None:
