@@ -14,10 +14,9 @@ from iibr_core.types import InputError
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.options import given_options, not_negative_from_text, size_from_text
 from viewer.model.export_kinds import EXPORTS, ExportKind, export_kind
+from viewer.model.export_settings import MOST_FRAMES, RATE_LIMITS
 from viewer.model.layout import ScreenSize
 from viewer.model.state.exporting import ANIMATIONS, AnimationKind, ExportOptions
-
-MOST_FRAMES, MOST_RATE = 10_000, 240.0
 
 
 def kind_from_text(text: str) -> ExportKind:
@@ -46,8 +45,9 @@ def motion_from_text(text: str) -> AnimationKind:
 def rate_from_text(text: str) -> float:
     """Frames a second. Raises BadParameter."""
     rate = not_negative_from_text(text)
-    if not 0.1 <= rate <= MOST_RATE:
-        raise typer.BadParameter(f"{text!r} is no rate: give 0.1 to {MOST_RATE:g} frames a second")
+    least, most = RATE_LIMITS
+    if not least <= rate <= most:
+        raise typer.BadParameter(f"{text!r} is no rate: give {least:g} to {most:g} frames a second")
     return rate
 
 

@@ -15,15 +15,19 @@ from viewer.model.state.optics import Optics
 
 USUAL_SECONDS = 4.0
 """Of an animation."""
+MOST_FRAMES = 10_000
+RATE_LIMITS = 0.1, 240.0
+"""Frames a second."""
 
 
 @dataclass(frozen=True)
 class ExportSettings:
-    """As `ExportOptions`, with all choices made but for the display, which may be any. size: of each picture, for both
-    eyes of one. eyes: view steps between them, or from the first picture of a quilt to its last.
+    """As `ExportOptions`, with all choices made; device: None for any display. aspect: width / height of what there is
+    to be seen in each picture. eyes: view steps from the first viewpoint to the last, of a quilt too.
     """
 
     size: ScreenSize
+    aspect: float
     device: str | None
     eyes: float
     motion: AnimationKind
@@ -37,8 +41,13 @@ def settle(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optic
     """What the user said, and what is usual of this kind where nothing was said."""
     rate = options.rate or kind.rate
     eyes = float(scene.grid.columns - 1) if options.eyes is None else options.eyes
+    width = scene.width
+    if "eyes" in kind.heeds:
+        width = max(round(width * (1 - 2 * shear_margin(scene, optics, eyes))), 1)
+    aspect = width / scene.height
     return ExportSettings(
-        options.size or _usual_size(kind, scene, 1 - 2 * shear_margin(scene, optics, eyes)),
+        options.size or size_of_width(kind, aspect, min(width, kind.most_width_px or width)),
+        aspect,
         options.device,
         eyes,
         options.motion or ANIMATIONS[0],
@@ -57,10 +66,8 @@ def shear_margin(scene: Scene, optics: Optics, span_views: float) -> float:
     return abs(optics.focus_disparity) * (abs(middle) + span_views / 2) / scene.width
 
 
-def _usual_size(kind: ExportKind, scene: Scene, width_left: float) -> ScreenSize:
-    """As large as the views. width_left: what shear leaves of their width, for eyes."""
-    share = max(width_left, 1 / scene.width) if "eyes" in kind.heeds else 1.0
-    width = min(max(round(share * scene.width), 1), kind.most_width_px or scene.width)
-    size = ImageSize(max(round(scene.height * width / (share * scene.width)), 1), width)
+def size_of_width(kind: ExportKind, aspect: float, width: int) -> ScreenSize:
+    """A size of about this aspect that the kind can have."""
+    size = ImageSize(max(round(width / aspect), 1), width)
     height, width = even_size(size) if kind.is_video else size
     return ScreenSize(width, height)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.image_export import render_pixels
 from viewer.app.main_loop import App
-from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength
+from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, ShowPrompt
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import Source
 from viewer.model.state.exporting import CancelExportTask, ExportOptions, ExportPrompt, ExportTask
@@ -114,3 +114,28 @@ def test_it_is_asked_for_by_key_and_says_what_is_wrong(viewer: Driver, tmp_path:
     assert app.state.prompt is None
     with Image.open(there) as image:
         assert image.size == (192, 64)
+
+
+def test_the_window_asks_for_what_a_kind_can_be_told(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / "a.gif"
+    app = viewer.app
+    app.do(ShowPrompt(ExportPrompt("gif", str(out))))
+    window = "prompt ExportPrompt"
+    expected = ExportOptions()
+    for field, text, said in (
+        ("##width", "48", {"size": ScreenSize(48, 32)}),
+        ("##frames", "3", {"frames": 3}),
+        ("##rate", "12.5", {"rate": 12.5}),
+    ):
+        viewer.press(field, window)
+        viewer.type(text)
+        viewer.send("key", "Tab")
+        expected = replace(expected, **said)  # type: ignore[arg-type]
+        asked = ExportPrompt("gif", str(out), expected)
+        viewer.until(lambda app, asked=asked: app.state.prompt == asked)  # type: ignore[misc]
+    viewer.press("Export", window)
+    viewer.until(lambda app: bool(texts(app)))
+    assert texts(app) == [f"Exported {out}"]
+    with Image.open(out) as image:
+        assert (image.size, image.n_frames) == ((48, 32), 3)  # type: ignore[attr-defined]
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(image)) == 240

@@ -22,6 +22,8 @@ STEEPEST_TILT = 4.0
 """In spans of the focus from the picture's middle to its border: for tilt handles that are close together."""
 
 FONT_SCALE_LIMITS = (0.6, 2.5)
+LARGEST_SIDE_PX = 65536
+"""Of a picture that is asked for in the window."""
 
 
 def clamp(value: float, low: float, high: float) -> float:

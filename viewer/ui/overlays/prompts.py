@@ -10,13 +10,10 @@ from typing import TypeVar
 from imgui_bundle import imgui
 
 from iibr_core.formats.images.picture_kinds import BEST_QUALITY, KINDS, PROFILES
-from iibr_core.formats.quilts import DEVICES
 from iibr_core.types import SRGB
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
 from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching, recent_commands
-from viewer.model.export_kinds import EXPORTS
 from viewer.model.layout import Layout, ScreenSize
-from viewer.model.reducers.exporting import export_path_beside
 from viewer.model.state.app_state import (
     AppState,
     ChoosePlaceTask,
@@ -26,17 +23,22 @@ from viewer.model.state.app_state import (
     SavePrompt,
     SaveTask,
 )
-from viewer.model.state.exporting import ANIMATIONS, ExportPrompt, ExportTask
+from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import GetModelTask, ModelsPrompt
-from viewer.ui.style import palette_of
+from viewer.ui.overlays.export_prompt import export_prompt
+from viewer.ui.overlays.prompt_rows import (
+    focus_on_appearing,
+    prompt_actions,
+    prompt_buttons,
+    say_problem,
+    size_rows,
+    text_field,
+)
 from viewer.ui.widgets import button, gap, label, quiet
 
-Choice = TypeVar("Choice", bound=str)
 Option = TypeVar("Option")
-ANY_DISPLAY = "any"
 PROMPT_WIDTH, MODELS_WIDTH, HELP_WIDTH = 460.0, 490.0, 860.0
 ROWS_SHOWN = 12
-LARGEST_SIDE = 65536
 MOUSE = (
     ("Drag", "Move the viewpoint"),
     ("Click", "Focus there"),
@@ -99,7 +101,7 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case SavePrompt():
             return _save(prompt, state, layout)
         case ExportPrompt():
-            return _export(prompt, state, layout)
+            return export_prompt(prompt, state, layout)
         case PathPrompt():
             return _path(prompt, state, layout)
         case ModelsPrompt():
@@ -119,82 +121,32 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     is_map = prompt.what == "map"
     imgui.text("Save the depth map" if is_map else "Save the picture")
     gap(layout, 2)
-    _focus_on_appearing()
+    focus_on_appearing()
     label("File", layout)
-    path, entered = _text_field("path", prompt.path)
+    path, entered = text_field("path", prompt.path)
     edited = prompt if path == prompt.path else replace(prompt, path=path, already_there=False, problem="")
-    edited = edited if is_map else _form_rows(_size_rows(edited, state, layout), state, layout)
+    edited = edited if is_map else _form_rows(_sized(edited, state, layout), state, layout)
     gap(layout, 2)
     quiet(MAP_ENDINGS if is_map else PICTURE_ENDINGS)
     problem = prompt.problem or ("There is a file of this name already." if prompt.already_there else "")
-    _say_problem(problem, state)
-    pressed, closed = _buttons("Replace" if prompt.already_there else "Save", layout)
+    say_problem(problem, state)
+    pressed, closed = prompt_buttons("Replace" if prompt.already_there else "Save", layout)
     if state.has_dialogs:
         imgui.same_line()
         if button("Choose a folder and name…", layout):
             return [DoTask(ChoosePlaceTask(edited))]
     if pressed or entered:
         return [DoTask(SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what, edited.form))]
-    return _prompt_actions(closed, edited, prompt)
+    return prompt_actions(closed, edited, prompt)
 
 
-def _size_rows(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
-    """Rows for width and height."""
-    label("Width", layout, "Pixels; the height follows.")
-    changed, width = imgui.input_int("##width", prompt.size_px[0], 0, 0)
-    if changed and state.scene is not None:
-        width = min(max(width, 1), LARGEST_SIDE)
-        height = max(round(width * state.scene.height / state.scene.width), 1)
-        prompt = replace(prompt, size_px=ScreenSize(width, height))
-    label("Height", layout)
-    imgui.align_text_to_frame_padding()
-    imgui.text(str(prompt.size_px[1]))
-    return prompt
-
-
-def _export(prompt: ExportPrompt, state: AppState, layout: Layout) -> list[Action]:
-    """What, where to, and what a display or a motion asks for."""
-    imgui.text("Export")
-    gap(layout, 2)
-    label("As", layout)
-    kind = _choice("kind", prompt.kind, {name: kind.words for name, kind in EXPORTS.items()})
-    if kind != prompt.kind:
-        return [ShowPrompt(ExportPrompt(kind, export_path_beside(state, kind)))]
-    heeds, options = EXPORTS[kind].heeds, prompt.options
-    if "device" in heeds:
-        label("Display", layout, "Without one, the photo's own shape.")
-        device = _choice("device", options.device or ANY_DISPLAY, {name: name for name in (ANY_DISPLAY, *DEVICES)})
-        options = replace(options, device=None if device == ANY_DISPLAY else device)
-    if "motion" in heeds:
-        label("Motion", layout, "What moves; the end leads to the beginning.")
-        motion = _choice("motion", options.motion or ANIMATIONS[0], {name: name for name in ANIMATIONS})
-        options = replace(options, motion=motion)
-    label("File" if EXPORTS[kind].endings else "Folder", layout)
-    path, entered = _text_field("path", prompt.path)
-    edited = replace(prompt, options=options)
-    edited = edited if path == prompt.path else replace(edited, path=path, already_there=False, problem="")
-    _say_problem(prompt.problem or ("There is one of this name already." if prompt.already_there else ""), state)
-    pressed, closed = _buttons("Replace" if prompt.already_there else "Export", layout)
-    if pressed or entered:
-        return [DoTask(ExportTask(kind, edited.path, options, prompt.already_there))]
-    return _prompt_actions(closed, edited, prompt)
-
-
-def _choice(name: str, chosen: Choice, words: Mapping[Choice, str]) -> Choice:
-    """One of these, by its words."""
-    if imgui.begin_combo(f"##{name}", words[chosen]):
-        for choice, text in words.items():
-            if imgui.selectable(text, choice == chosen)[0]:
-                chosen = choice
-        imgui.end_combo()
-    return chosen
-
-
-def _say_problem(problem: str, state: AppState) -> None:
-    if problem:
-        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
-        imgui.text_wrapped(problem)
-        imgui.pop_style_color()
+def _sized(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
+    """With the size that its rows say."""
+    width = size_rows(prompt.size_px, layout)
+    if width is None or state.scene is None:
+        return prompt
+    height = max(round(width * state.scene.height / state.scene.width), 1)
+    return replace(prompt, size_px=ScreenSize(width, height))
 
 
 def _form_rows(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePrompt:
@@ -235,14 +187,14 @@ def _radio(choices: Mapping[str, Option], chosen: Option) -> Option:
 def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
     imgui.text(PATH_WORDS[prompt.what])
     gap(layout, 2)
-    _focus_on_appearing()
+    focus_on_appearing()
     label("Path", layout)
-    path, entered = _text_field("path", prompt.path)
+    path, entered = text_field("path", prompt.path)
     quiet("This system has no file dialog (zenity or kdialog): type a path, or drop a file on the window.")
-    pressed, closed = _buttons("Open", layout)
+    pressed, closed = prompt_buttons("Open", layout)
     if (pressed or entered) and path.strip():
         return [ShowPrompt(None), action_for_path(prompt.what, path.strip(), state)]
-    return _prompt_actions(closed, replace(prompt, path=path), prompt)
+    return prompt_actions(closed, replace(prompt, path=path), prompt)
 
 
 def _models(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list[Action]:
@@ -265,19 +217,19 @@ def _models(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list[Actio
     quiet(f"From huggingface.co/{model.repository}, licence {model.licence}. {model.lacks}")
     word = "Use it" if model.is_here else f"Download {model.megabytes:,} MB"
     is_enabled = state.downloading is None if not model.is_here else state.source is not None and not model.lacks
-    pressed, closed = _buttons(word, layout, is_enabled)
+    pressed, closed = prompt_buttons(word, layout, is_enabled)
     if pressed and model.is_here:
         return [ShowPrompt(None), action_for_path("model", model.name, state)]
     if pressed:
         return [ShowPrompt(None), DoTask(GetModelTask(model.name))]
-    return _prompt_actions(closed, replace(prompt, selected=selected), prompt)
+    return prompt_actions(closed, replace(prompt, selected=selected), prompt)
 
 
 def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
     """Commands that match what was typed; the arrow keys select one of them, Enter runs it."""
-    _focus_on_appearing()
+    focus_on_appearing()
     imgui.set_next_item_width(-1)
-    text, entered = _text_field("command", prompt.text, "Type a command")
+    text, entered = text_field("command", prompt.text, "Type a command")
     matching = commands_matching(text, recent_commands(state))
     steps = imgui.is_key_pressed(imgui.Key.down_arrow) - imgui.is_key_pressed(imgui.Key.up_arrow)
     selected = min(max((prompt.selected if text == prompt.text else 0) + steps, 0), max(len(matching) - 1, 0))
@@ -288,7 +240,7 @@ def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Act
     chosen = pressed or chosen
     if chosen is not None:
         return [ShowPrompt(None), chosen.action(replace(state, prompt=None))]
-    return _prompt_actions(False, PalettePrompt(text, selected), prompt)
+    return prompt_actions(False, PalettePrompt(text, selected), prompt)
 
 
 def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -> Command | None:
@@ -339,29 +291,3 @@ def _quit(layout: Layout) -> list[Action]:
         return [Quit(is_sure=True)]
     imgui.same_line()
     return [ShowPrompt(None)] if button("Cancel", layout) else []
-
-
-def _prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:
-    if closed:
-        return [ShowPrompt(None)]
-    return [ShowPrompt(edited)] if edited != prompt else []
-
-
-def _buttons(word: str, layout: Layout, is_enabled: bool = True) -> tuple[bool, bool]:
-    """(pressed, cancelled)."""
-    gap(layout, 2)
-    pressed = button(word, layout, is_enabled=is_enabled)
-    imgui.same_line()
-    return pressed, button("Cancel", layout)
-
-
-def _text_field(name: str, text: str, hint: str = "") -> tuple[str, bool]:
-    """The text, and whether Enter was pressed in it."""
-    _, new = imgui.input_text_with_hint(f"##{name}", hint, text)
-    is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
-    return new, bool(imgui.is_item_deactivated() and is_enter)
-
-
-def _focus_on_appearing() -> None:
-    if imgui.is_window_appearing():
-        imgui.set_keyboard_focus_here(0)

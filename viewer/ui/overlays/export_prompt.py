@@ -1,0 +1,129 @@
+"""The window that asks what to export: the kinds of the registry, and for each the rows that it heeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from iibr_core.formats.quilts import DEVICES
+from viewer.model.actions import Action, DoTask, ShowPrompt
+from viewer.model.export_kinds import EXPORTS, ExportKind
+from viewer.model.export_settings import MOST_FRAMES, RATE_LIMITS, ExportSettings, settle, size_of_width
+from viewer.model.layout import Layout
+from viewer.model.lens.limits import clamp
+from viewer.model.reducers.exporting import export_path_beside
+from viewer.model.state.app_state import AppState, Scene
+from viewer.model.state.exporting import ANIMATIONS, ExportOptions, ExportPrompt, ExportTask
+from viewer.ui.overlays.prompt_rows import (
+    choice_row,
+    prompt_actions,
+    prompt_buttons,
+    say_problem,
+    size_rows,
+    text_field,
+)
+from viewer.ui.widgets import gap, label, slider, whole_slider
+
+ANY_DISPLAY = "any"
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the rows are about. settings: with what is usual where the user said nothing."""
+
+    kind: ExportKind
+    scene: Scene
+    settings: ExportSettings
+    layout: Layout
+
+
+def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list[Action]:
+    """What, where to, and what this kind can be told."""
+    assert state.scene is not None
+    imgui.text("Export")
+    gap(layout, 2)
+    label("As", layout)
+    chosen = choice_row("kind", prompt.kind, {name: kind.words for name, kind in EXPORTS.items()})
+    if chosen != prompt.kind:
+        return [ShowPrompt(ExportPrompt(chosen, export_path_beside(state, chosen)))]
+    kind, options = EXPORTS[chosen], prompt.options
+    asked = _Asked(kind, state.scene, settle(kind, options, state.scene, state.optics), layout)
+    for name, row in ROWS.items():
+        if name in kind.heeds:
+            options = row(options, asked)
+    label("File" if kind.endings else "Folder", layout)
+    path, entered = text_field("path", prompt.path)
+    edited = replace(prompt, path=path, options=options)
+    if edited != prompt:
+        edited = replace(edited, already_there=False, problem="")
+    say_problem(prompt.problem or ("There is one of this name already." if prompt.already_there else ""), state)
+    pressed, closed = prompt_buttons("Replace" if prompt.already_there else "Export", layout)
+    if pressed or entered:
+        return [DoTask(ExportTask(chosen, path, options, prompt.already_there))]
+    return prompt_actions(closed, edited, prompt)
+
+
+def _device(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("Display", asked.layout, "Without one, the photo's own shape.")
+    shown = asked.settings.device or ANY_DISPLAY
+    device = choice_row("device", shown, {name: name for name in (ANY_DISPLAY, *DEVICES)})
+    return replace(options, device=None if device == ANY_DISPLAY else device)
+
+
+def _motion(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("Motion", asked.layout, "What moves; the end leads to the beginning.")
+    motion = choice_row("motion", asked.settings.motion, {name: name for name in ANIMATIONS})
+    return options if motion == asked.settings.motion else replace(options, motion=motion)
+
+
+def _keys(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("Own path", asked.layout, "A text file with a line a key: s t, s t focus, or s t focus aperture.")
+    text, _ = text_field("keys", str(asked.settings.keys or ""), "a file of keys, instead of the motion")
+    return replace(options, keys=Path(text) if text.strip() else None)
+
+
+def _eyes(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    limits = 0.0, float(max(asked.scene.grid.columns - 1, 1))
+    tip = "View steps from eye to eye. What is in focus lies in the screen."
+    eyes = slider("Eyes", asked.settings.eyes, limits, "%.1f apart", asked.layout, tip)
+    return options if eyes is None else replace(options, eyes=eyes)
+
+
+def _row(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    limits = 0, asked.scene.height - 1
+    row = whole_slider("Row", asked.settings.row, limits, asked.layout, "Of the picture, from its top.")
+    return options if row is None else replace(options, row=row)
+
+
+def _size(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    width = size_rows(asked.settings.size, asked.layout)
+    return options if width is None else replace(options, size=size_of_width(asked.kind, asked.settings.aspect, width))
+
+
+def _frames(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("Pictures", asked.layout, "How many.")
+    changed, frames = imgui.input_int("##frames", asked.settings.frames, 0, 0)
+    return replace(options, frames=min(max(frames, 1), MOST_FRAMES)) if changed else options
+
+
+def _rate(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    settings = asked.settings
+    label("Rate", asked.layout, f"Pictures a second: it lasts {settings.frames / settings.rate:.3g} seconds.")
+    changed, rate = imgui.input_float("##rate", settings.rate, 0, 0, "%.4g a second")
+    return replace(options, rate=clamp(rate, *RATE_LIMITS)) if changed else options
+
+
+ROWS: dict[str, Callable[[ExportOptions, _Asked], ExportOptions]] = {
+    "device": _device,
+    "motion": _motion,
+    "keys": _keys,
+    "eyes": _eyes,
+    "row": _row,
+    "size": _size,
+    "frames": _frames,
+    "rate": _rate,
+}
+"""In their order from above, by the names that `ExportKind.heeds` has."""

@@ -1,0 +1,73 @@
+"""What the small windows in the middle share: a text to type, one of some, what is wrong, the buttons below."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from imgui_bundle import imgui
+
+from viewer.model.actions import Action, ShowPrompt
+from viewer.model.layout import Layout
+from viewer.model.lens.limits import LARGEST_SIDE_PX
+from viewer.model.state.app_state import AppState, Prompt
+from viewer.ui.style import palette_of
+from viewer.ui.widgets import button, gap, label
+
+Choice = TypeVar("Choice", bound=str)
+
+
+def prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:
+    """What becomes of the prompt: it goes, or what was edited in it is kept."""
+    if closed:
+        return [ShowPrompt(None)]
+    return [ShowPrompt(edited)] if edited != prompt else []
+
+
+def prompt_buttons(word: str, layout: Layout, is_enabled: bool = True) -> tuple[bool, bool]:
+    """(pressed, cancelled)."""
+    gap(layout, 2)
+    pressed = button(word, layout, is_enabled=is_enabled)
+    imgui.same_line()
+    return pressed, button("Cancel", layout)
+
+
+def text_field(name: str, text: str, hint: str = "") -> tuple[str, bool]:
+    """The text, and whether Enter was pressed in it."""
+    _, new = imgui.input_text_with_hint(f"##{name}", hint, text)
+    is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
+    return new, bool(imgui.is_item_deactivated() and is_enter)
+
+
+def focus_on_appearing() -> None:
+    """What comes next has the keys once the prompt is there."""
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here(0)
+
+
+def choice_row(name: str, chosen: Choice, words: Mapping[Choice, str]) -> Choice:
+    """One of these, by its words."""
+    if imgui.begin_combo(f"##{name}", words[chosen]):
+        for choice, text in words.items():
+            if imgui.selectable(text, choice == chosen)[0]:
+                chosen = choice
+        imgui.end_combo()
+    return chosen
+
+
+def size_rows(size_px: tuple[int, int], layout: Layout) -> int | None:
+    """Width and height; the new width where the user changed it: the height is to follow."""
+    label("Width", layout, "Pixels; the height follows.")
+    changed, width = imgui.input_int("##width", size_px[0], 0, 0)
+    label("Height", layout)
+    imgui.align_text_to_frame_padding()
+    imgui.text(str(size_px[1]))
+    return min(max(width, 1), LARGEST_SIDE_PX) if changed else None
+
+
+def say_problem(problem: str, state: AppState) -> None:
+    """Why it cannot be so, if there is a reason."""
+    if problem:
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
+        imgui.text_wrapped(problem)
+        imgui.pop_style_color()
