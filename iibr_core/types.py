@@ -14,7 +14,7 @@ Colour          encoded by sRGB's curve, 1 = white, as photos are; HDR values ex
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -40,6 +40,11 @@ total 0: how much there is to do is not known. Called in whatever thread works.
 
 TOTAL_PARALLAX = 0.04
 """For viewing: how far the nearest moves against the farthest across the grid, as a share of the photo's width."""
+
+LARGEST_LENGTH = 1e12
+"""Of a camera's place, in any unit: products of larger ones lose all digits."""
+MOST_FOCAL_WIDTHS = 100.0
+"""A telescope's; and as short is no lens's."""
 
 
 class ViewOffset(NamedTuple):
@@ -164,6 +169,49 @@ class Disparity:
             raise InputError(
                 f"{self.source}: holds disparities that are NaN, infinite or too large; fill or scale them"
             )
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera anywhere: x to the right, y down, z forward, as the pictures it takes.
+
+    world_from_camera: (3, 3) rotation; position: (3,) in the world's units. size: of its pictures. focal_px, centre_px:
+    focal lengths and principal point (x, y), the latter counted as pixel centres are. source: where it was read, for
+    people ("transforms.json, pose 3"). depth_range: of the nearest and the farthest that it sees, None where not known.
+    Raises InputError where these make no camera.
+    """
+
+    world_from_camera: NDArray[np.float64]
+    position: NDArray[np.float64]
+    size: ImageSize
+    focal_px: tuple[float, float]
+    centre_px: tuple[float, float]
+    source: str
+    depth_range: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        turned = self.world_from_camera
+        near, far = self.depth_range or (1.0, 2.0)
+        numbers = (*turned.ravel(), *self.position, *self.focal_px, *self.centre_px, near, far)
+        if not np.abs(numbers).max() < LARGEST_LENGTH:
+            raise InputError(f"{self.source}: holds numbers that are NaN, infinite or too large; give finite ones")
+        if not np.allclose(turned @ turned.T, np.eye(3), atol=1e-3) or np.linalg.det(turned) < 0:
+            raise InputError(f"{self.source}: its axes are no rotation; get the whole file again")
+        widths = tuple(focal / max(self.size) for focal in self.focal_px)
+        if min(self.size) < 1 or not all(1 / MOST_FOCAL_WIDTHS <= width <= MOST_FOCAL_WIDTHS for width in widths):
+            raise InputError(
+                f"{self.source}: pictures of {self.size} with focal lengths of {self.focal_px[0]:g} and"
+                f" {self.focal_px[1]:g} px; give the longer side times 1/{MOST_FOCAL_WIDTHS:g} to {MOST_FOCAL_WIDTHS:g}"
+            )
+        if not 0 < near < far:
+            raise InputError(f"{self.source}: depths from {near:g} to {far:g} are not positive and ascending")
+
+    def resized(self, size: ImageSize) -> Camera:
+        """The same with larger or smaller pictures."""
+        (height, width), (focal_x, focal_y), (x, y) = self.size, self.focal_px, self.centre_px
+        wider, higher = size.width / width, size.height / height
+        centre_px = (x + 0.5) * wider - 0.5, (y + 0.5) * higher - 0.5
+        return replace(self, size=size, focal_px=(focal_x * wider, focal_y * higher), centre_px=centre_px)
 
 
 @dataclass(frozen=True, eq=False)

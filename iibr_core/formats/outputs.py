@@ -89,6 +89,19 @@ def require_folder_place(
         raise AlreadyThereError(f"{folder}: is there already; give --force to replace it, or choose another folder")
 
 
+def require_own_folder(folder: Path, own_files: str) -> None:
+    """Raise InputError where a folder holds anything but what was written there before, which matches a regular
+    expression by its path in it: it would be replaced as a whole.
+    """
+    if not is_folder(folder):
+        return
+    remove_leftovers(folder)
+    for place, _, names in os.walk(folder):
+        for name in names:
+            if not re.fullmatch(own_files, (Path(place) / name).relative_to(folder).as_posix()):
+                raise InputError(f"{folder}: holds other files ({name}); choose an empty or new folder")
+
+
 def require_files_in(
     folder: Path, names: Iterable[str], inputs: Iterable[Path] = (), may_replace: bool = False
 ) -> None:

@@ -185,6 +185,15 @@ def require_own_size(budget: Budget, size: ImageSize, view: ImageSize, field_byt
     budget.require(needed, f"a picture at the photo's own size, {size},", "raise --memory, or save a smaller picture")
 
 
+def require_free_views(budget: Budget, canvas: ImageSize, largest: ImageSize) -> None:
+    """Raise InputError where views of cameras cannot be made. canvas: (height, width) of the photo as far as they look
+    beyond its frame; largest: of their pictures.
+    """
+    needed = WRITER_BYTES + math.prod(canvas) * (KEPT_BYTES + USUAL_RAY_IMAGES * RAY_BYTES)
+    needed += math.prod(largest) * FLOAT_PICTURE_BYTES
+    budget.require(needed, f"views of {largest} from a canvas of {canvas}", "raise --memory or lower --max-pixels")
+
+
 def mebibytes(count: float) -> str:
     """For people."""
     return f"{math.ceil(count / MIB):,} MiB"

@@ -52,6 +52,36 @@ def fill_background(
     them goes on. The disparity is that of one surface, the one with the most weight: a mean of several would lie on
     none. A view that is all hole stays as it is. Raises Cancelled once should_stop is true.
     """
+    _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), should_stop, threads)
+
+
+def continue_farthest(
+    colors: FloatImage,
+    disparity: FloatImage,
+    hole: NDArray[np.bool_],
+    farthest_views: float,
+    should_stop: ShouldStop = never,
+    threads: int = 1,
+) -> None:
+    """The same in a picture of which nobody knows what the photo hides there: the farthest surface around goes on.
+
+    farthest_views: surfaces are one that part by less than SURFACE_PX so many view steps away.
+    """
+    nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
+    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, threads)
+
+
+def _fill_view(
+    colors: FloatImage,
+    disparity: FloatImage,
+    hole: NDArray[np.bool_],
+    photo_disparity: FloatImage,
+    offset: ViewOffset,
+    parallax: float,
+    should_stop: ShouldStop,
+    threads: int,
+) -> None:
+    """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
     pixels = _hole_pixels(hole, should_stop, threads)
     known = _nearest_known(hole, pixels, should_stop, threads)
     reach = np.empty(len(pixels), np.float32)
@@ -67,7 +97,7 @@ def fill_background(
 
     steps: list[Callable[[slice], None]] = [
         lambda part: _fill(
-            colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, reach[part]
+            colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, parallax, reach[part]
         ),
         lambda part: _agree(disparity, hole, pixels[part], changed[part]),
         lambda part: _write_disparity(changed[part], pixels[part], disparity),
@@ -141,12 +171,11 @@ def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):
 
 
 @kernel
-def _fill(colors, disparity, pixels, known, photo_disparity, s, t, reach):
+def _fill(colors, disparity, pixels, known, photo_disparity, s, t, parallax, reach):
     """What `fill_background` says; and how far away the nearest known pixel is, reach (N,)."""
     height, width = disparity.shape
     directions = known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
-    parallax = max(abs(s), abs(t))
     one_surface = SURFACE_PX / parallax
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width

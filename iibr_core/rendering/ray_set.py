@@ -133,6 +133,11 @@ class RaySet:
         return self._count
 
     @property
+    def farthest_views(self) -> float:
+        """The largest view offset that will be rendered."""
+        return self._farthest_views
+
+    @property
     def size(self) -> ImageSize:
         """Of every image."""
         return image_size(self._disparity[0])

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
+import numpy as np
+
 from tests.hostile.case import Case
 from tests.hostile.inputs import COMMANDS
+from tests.hostile.sandbox import HEIGHT, WIDTH
 
 HUGE = str(10**30)
 
@@ -32,6 +36,20 @@ def _hide_map(folder: Path) -> None:
     (folder / "model").mkdir()
     (folder / "model" / "config.json").write_text("{}")
     shutil.copy(folder / "photo.png", folder / "bare.png")
+
+
+def _write_poses(folder: Path) -> None:
+    """Cameras that look where the photo does; one that looks away; of pictures of another shape; none."""
+    turned = np.diag([-1.0, 1.0, -1.0, 1.0])
+    for name, sides, matrices in (
+        ("poses", (WIDTH, HEIGHT), [np.eye(4)]),
+        ("away", (WIDTH, HEIGHT), [np.eye(4), turned]),
+        ("square", (7, 7), [np.eye(4)]),
+    ):
+        frames = [{"transform_matrix": matrix.tolist()} for matrix in matrices]
+        whole = {"w": sides[0], "h": sides[1], "fl_x": 50.0, "frames": frames}
+        (folder / f"{name}.json").write_text(json.dumps(whole))
+    (folder / "empty.json").touch()
 
 
 _values = [
@@ -103,6 +121,34 @@ _export = [
         (("--to", "anaglyph", "-o", "new.png", "--view", "1,1"), "--view"),
     )
 ]
+
+_POSES = ("generate", "photo.png", "--disparity", "map.pfm", "--out", "new")
+_generate = [
+    Case(f"generate {' '.join(words)}", (*_POSES, *words), says=says, prepare=_write_poses)
+    for words, says in (
+        ((), "--grid"),
+        (("--poses", "poses.json", "--grid", "3"), "--grid"),
+        (("--grid", "3", "--photo-pose", "1"), "--photo-pose"),
+        (("--poses", "poses.json", "--photo-pose", "0"), "--photo-pose"),
+        (("--poses", "poses.json", "--photo-pose", "9"), "--photo-pose 9"),
+        (("--poses", "poses.json", "--quality", "exact", "--format", "hci"), "--format and --quality"),
+        (("--poses", "missing"), "missing"),
+        (("--poses", "folder"), "poses_bounds.npy"),
+        (("--poses", "text.txt"), "text.txt"),
+        (("--poses", "map.pfm"), "map.pfm"),
+        (("--poses", "away.json"), "pose 2"),
+        (("--poses", "square.json"), "pictures of 7x7"),
+        (("--poses", "empty.json"), "empty"),
+        (("--poses", "poses.json", "--literal"), "not positive"),
+        (("--poses", "poses.json", "--memory", "1M"), "memory"),
+    )
+]
+_generate += [
+    Case("generate poses", (*_POSES, "--poses", "poses.json"), 0, makes=("new", "new/view_0001.png"),
+         prepare=_write_poses),
+    Case("generate poses into a folder", (*_POSES[:-1], "field", "--poses", "poses.json", "--force"), says="field",
+         prepare=_write_poses),
+]  # fmt: skip
 
 _batch = [
     Case(f"batch {' '.join(words)}", ("batch", *words), says=says)
@@ -242,6 +288,7 @@ OPTION_CASES = (
     *_values,
     *_screenshot,
     *_export,
+    *_generate,
     *_batch,
     *_clamped,
     *_inpainters,

@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.types import GridShape
+from iibr_core.types import GridShape, InputError
+from viewer.cli.free_views import require_heeded_with_poses, write_free_views
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
     Force,
@@ -24,13 +25,32 @@ from viewer.cli.options import (
 from viewer.cli.scene_options import SceneOptions
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
+if TYPE_CHECKING:
+    from viewer.model.state.app_state import Source
+
 
 @with_option_records
 def generate(
+    context: typer.Context,
     photo: PhotoPath,
-    grid: Annotated[GridShape, typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder to write.", show_default=False)],
     scene: SceneOptions,
+    grid: Annotated[
+        GridShape | None,
+        typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.", show_default=False),
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Instead of a grid, views of these cameras: poses_bounds.npy, transforms.json or COLMAP's folder.",
+            show_default=False,
+        ),
+    ] = None,
+    photo_pose: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Which of the poses is the photo's.", show_default="the middle one"),
+    ] = None,
     format: LightFieldFormat = "hci",
     literal: Annotated[
         bool | None,
@@ -47,13 +67,34 @@ def generate(
     or estimated depth gets the parallax that the window shows.
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
+
+    With --poses: the pictures of any cameras; the photo's depth is fitted to the depths of its pose, else the nearest
+    is 1 away (--literal: disparity counts as it is, in px per unit of length).
+
+    Example: iibr generate photo.png --poses transforms.json --out pictures
     """
+    if photo_pose is not None and poses is None:
+        raise InputError("--photo-pose says which of --poses is the photo's: give those, too")
     require_memory(scene.memory, keeps_views=False)
+    if poses is not None:
+        if grid is not None:
+            raise InputError("--grid makes a light field, --poses pictures of any cameras: give one of them")
+        require_heeded_with_poses(context)
+        write_free_views(scene.source(photo, None), poses, photo_pose, bool(literal), out, force)
+        return
+    if grid is None:
+        raise InputError("give --grid, for a light field, or --poses, for pictures of any cameras")
+    source = scene.source(photo, grid, is_literal=scene.disparity is not None if literal is None else literal)
+    _write_light_field(source, grid, out, format, scene.depth_strength, with_disparity, force)
+
+
+def _write_light_field(
+    source: Source, grid: GridShape, out: Path, layout: str, depth_strength: float, with_disparity: bool, force: bool
+) -> None:
     from iibr_core.formats.light_fields.registry import writer_for
 
-    source = scene.source(photo, grid, is_literal=scene.disparity is not None if literal is None else literal)
     require_existing(source)
-    new_writer = writer_for(format)
+    new_writer = writer_for(layout)
     new_writer.require_place(out, inputs_with_sidecar(source), force)
     require_model(source.depth)
 
@@ -64,7 +105,7 @@ def generate(
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
     photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
-    plan = make_plan(source, loaded, scene.depth_strength, keeps_views=False)
+    plan = make_plan(source, loaded, depth_strength, keeps_views=False)
     total = grid.rows * grid.columns
     disparity_read = plan.field_disparity(loaded.disparity)
     with (

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
-from iibr_core.formats.files import is_folder
 from iibr_core.formats.light_fields.registry import writer_for
-from iibr_core.formats.outputs import remove_leftovers, require_file_place, require_folder_place
-from iibr_core.types import InputError
+from iibr_core.formats.outputs import require_file_place, require_folder_place, require_own_folder
 from viewer.model.export_kinds import ExportKind, require_ending
 from viewer.model.export_settings import settle
 
@@ -39,19 +35,8 @@ def require_export_place(kind: ExportKind, path: Path, inputs: Sequence[Path], m
     elif kind.endings:
         require_file_place(path, inputs, may_replace)
     else:
-        _require_own_folder(kind, path)
+        require_own_folder(path, kind.own_files)
         require_folder_place(path, inputs, may_replace, is_whole=True)
-
-
-def _require_own_folder(kind: ExportKind, folder: Path) -> None:
-    """Raise InputError where a folder holds anything but what was exported before: it would be replaced as a whole."""
-    if not is_folder(folder):
-        return
-    remove_leftovers(folder)
-    for place, _, names in os.walk(folder):
-        for name in names:
-            if not re.fullmatch(kind.own_files, (Path(place) / name).relative_to(folder).as_posix()):
-                raise InputError(f"{folder}: holds other files ({name}); choose an empty or new folder")
 
 
 def writer_of(kind: ExportKind) -> Callable[[Path, ExportSource, ExportOptions], str | None]:

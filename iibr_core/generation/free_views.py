@@ -1,0 +1,175 @@
+"""Views of any cameras from one photo: from other places, turned, nearer, with lenses of their own.
+
+The field around the photo's camera is as dense as can be: none of its views is kept, each ray of it is made when a
+camera looks along it. Which part of its plane the cameras look through says how far the ray set has to be completed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.formats.cameras import infinity_of
+from iibr_core.generation.outer_views import AROUND_PX, farthest_views, outer_views
+from iibr_core.generation.relief import measure_relief
+from iibr_core.generation.update_loop import complete_ray_set
+from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.beyond_frame import extend_beyond_frame
+from iibr_core.inpainting.protocol import Inpainter
+from iibr_core.rendering.free_view import render_free_view, target_from_photo
+from iibr_core.rendering.view_synthesis import RenderedView, rays_of_photo
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import Camera, FloatImage, ImageSize, InputError, Margins, ViewOffset, image_size
+
+FARTHEST_STEPS = 4.0
+"""To the border of what cameras look through on the photo's plane: the length of a view step follows from it."""
+MOST_BEYOND = 0.5
+"""Of the photo's width and height: so far on each side it is continued for cameras that look there."""
+LEAST_BEYOND_PX = 1e-3
+MOST_PARALLAX = 0.5
+"""Of the photo's longer side: cameras that see the nearest move farther against the farthest see what is made up."""
+LOOKED_AT = 33
+"""So many places each way of a camera's picture tell what it sees."""
+
+LEAST_STEP = 1e-6
+"""Of the nearest's distance: of cameras that only turn, none looks beside the photo's place."""
+
+Points = NDArray[np.float64]
+
+
+def inverse_depth_of(disparity: FloatImage, depth_range: tuple[float, float] | None) -> FloatImage:
+    """1 / depth (H, W) in the unit of lengths that depth_range is in, of disparity (H, W) in any unit.
+
+    The range of what counts as relief becomes the range of depths. Where that is not known (None), lengths are in
+    distances of the nearest, and what is infinitely far as `infinity_of` has it.
+    """
+    relief = measure_relief(disparity)
+    if depth_range is None:
+        at_infinity = infinity_of(relief.low, relief.high)
+        farthest, nearest = (relief.low - at_infinity) / (relief.high - at_infinity), 1.0
+    else:
+        nearest, farthest = (1.0 / depth for depth in depth_range)
+    # What is flat is at the middle of both.
+    share = (np.clip(disparity, relief.low, relief.high) - relief.low) / relief.range if relief.range > 0 else 0.5
+    return np.full(disparity.shape, farthest + (nearest - farthest) * share, np.float32)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What cameras ask of a photo. margins: so far beyond its frame they look. step: length of a view step, in the
+    world's units. outer: views that show what they disocclude.
+    """
+
+    margins: Margins
+    step: float
+    outer: tuple[ViewOffset, ...]
+
+
+def reach_of(photo: Camera, cameras: Sequence[Camera], depths: tuple[float, float]) -> Reach:
+    """Of cameras that look at what lies between two depths before the photo's.
+
+    Raises InputError for a camera that sees nothing of the photo.
+    """
+    near, far = depths
+    looked_at = [_looked_at(photo, camera, depths) for camera in cameras]
+    places, crossings = (np.concatenate(parts) for parts in zip(*looked_at))
+    farthest = float(np.abs(crossings).max())
+    # What the nearest moves against the farthest, for each unit of length.
+    parallax_px = photo.focal_px[0] * (1 / near - 1 / far)
+    if parallax_px > 0:
+        farthest = min(farthest, MOST_PARALLAX * max(photo.size) / parallax_px)
+    step = max(farthest / FARTHEST_STEPS, LEAST_STEP * near)
+    steps = np.clip(crossings, -farthest, farthest) / step
+    corners = [ViewOffset(float(y), float(x)) for x, y in (steps.min(axis=0), steps.max(axis=0))]
+    return Reach(_margins(photo.size, places), step, tuple(outer_views(corners)) if parallax_px > 0 else ())
+
+
+class FreeViews:
+    """Makes views of one photo for cameras that are known from the start; each when it is asked for."""
+
+    def __init__(
+        self,
+        photo: FloatImage,
+        inverse_depth: FloatImage,
+        camera: Camera,
+        cameras: Sequence[Camera],
+        should_stop: ShouldStop = never,
+        inpainter: Inpainter = fill_background,
+    ) -> None:
+        """photo: (H, W, 3) sRGB-encoded, taken by `camera`, which is of its size. inverse_depth: (H, W), positive, 1 /
+        distance from the camera's plane. cameras: all that will be asked for. inpainter: fills what they disocclude.
+
+        Raises InputError for a camera that sees nothing of the photo, Cancelled once should_stop is true.
+        """
+        reach = reach_of(camera, cameras, depths_of(inverse_depth))
+        self._should_stop, self._margins = should_stop, reach.margins
+        self._scale_px = camera.focal_px[0] * reach.step
+        disparity = inverse_depth * np.float32(self._scale_px)
+        colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, should_stop)
+        x, y = camera.centre_px
+        centre_px = x + reach.margins.left, y + reach.margins.top
+        self._camera = replace(camera, size=image_size(disparity), centre_px=centre_px)
+        self._rays = rays_of_photo(colors, disparity, farthest_views(reach.outer), len(reach.outer), should_stop)
+        complete_ray_set(self._rays, reach.outer, should_stop, inpainter)
+
+    def view(self, camera: Camera) -> RenderedView:
+        """What a camera sees; its disparity is proportional to 1 / its distance from that camera's plane."""
+        matrix = target_from_photo(self._camera, camera, self._scale_px)
+        return render_free_view(self._rays, matrix, camera.size, self._margins, self._should_stop)
+
+
+def depths_of(inverse_depth: FloatImage) -> tuple[float, float]:
+    """Of the nearest and the farthest."""
+    return 1 / float(inverse_depth.max()), 1 / float(inverse_depth.min())
+
+
+def _looked_at(photo: Camera, target: Camera, depths: tuple[float, float]) -> tuple[Points, Points]:
+    """Where the photo shows (N, 2) what a camera sees, and where that looks through the photo's plane (N, 2), in the
+    world's units: (x, y) each, for places all over its picture and both depths.
+
+    Raises InputError where it sees nothing of the photo.
+    """
+    x, y = (np.linspace(-0.5, side - 0.5, LOOKED_AT) for side in target.size[::-1])
+    pixels = np.stack([part.ravel() for part in (*np.meshgrid(x, y), np.ones((LOOKED_AT, LOOKED_AT)))])
+    photo_from_world = photo.world_from_camera.T
+    rays = photo_from_world @ target.world_from_camera @ (np.linalg.inv(_intrinsics(target)) @ pixels)
+    place = photo_from_world @ (target.position - photo.position)
+    height, width = photo.size
+    shown, crossed = [], []
+    for depth in depths:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = (depth - place[2]) / rays[2]
+            points = place[:, None] + along * rays
+            at = (_intrinsics(photo) @ (points / depth))[:2].T
+            crossing = (place[:2, None] - place[2] / rays[2] * rays[:2]).T
+        beyond = np.array([width, height]) * MOST_BEYOND
+        before = along > 0
+        inside = before & (at > -beyond).all(axis=1) & (at < beyond + np.array([width, height])).all(axis=1)
+        shown.append(np.clip(at[before], -beyond, beyond + np.array([width, height])))
+        crossed.append(crossing[inside])
+    places = np.concatenate(shown)
+    if not ((places > -0.5) & (places < np.array([width, height]) - 0.5)).all(axis=1).any():
+        raise InputError(f"{target.source}: sees nothing of the photo, which looks elsewhere; leave this pose out")
+    return places, np.concatenate(crossed)
+
+
+def _intrinsics(camera: Camera) -> Points:
+    """(3, 3): pixels from directions."""
+    (focal_x, focal_y), (x, y) = camera.focal_px, camera.centre_px
+    return np.array([[focal_x, 0.0, x], [0.0, focal_y, y], [0.0, 0.0, 1.0]])
+
+
+def _margins(size: ImageSize, places: Points) -> Margins:
+    """So far beyond the frame of a photo of this size these places (x, y) lie."""
+    (left, top), (right, bottom) = -0.5 - places.min(axis=0), 0.5 + places.max(axis=0) - (size.width, size.height)
+
+    def margin(reach: float, length: int) -> int:
+        return min(ceil(reach) + AROUND_PX, ceil(MOST_BEYOND * length)) if reach > LEAST_BEYOND_PX else 0
+
+    return Margins(
+        margin(top, size.height), margin(bottom, size.height), margin(left, size.width), margin(right, size.width)
+    )

@@ -1,0 +1,79 @@
+"""What cameras ask of a photo: its depth in their units, how far it goes on beyond its frame, what they cannot see."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iibr_core.generation.free_views import FARTHEST_STEPS, MOST_BEYOND, FreeViews, inverse_depth_of, reach_of
+from iibr_core.types import InputError
+from tests.iibr_core.rendering.test_free_view import about, camera, square_scene
+
+
+def test_depths_that_are_known_are_those_of_the_relief():
+    given = np.tile(np.linspace(5.0, 9.0, 50, dtype=np.float32), (40, 1))
+    inverse_depth = inverse_depth_of(given, (2.0, 10.0))
+    assert (inverse_depth.min(), inverse_depth.max()) == (pytest.approx(0.1), pytest.approx(0.5))
+    steps = np.diff(inverse_depth[0, 5:-5])  # lone pixels at both ends do not count
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-4)
+
+
+def test_else_the_nearest_is_one_away():
+    given = np.repeat(np.float32([1.0, 2.0]), 30).reshape(6, 10)
+    np.testing.assert_allclose(inverse_depth_of(given, None), given / 2)
+    below_zero = inverse_depth_of(2 * given - 3, None)
+    assert below_zero.max() == 1.0
+    assert below_zero.min() == pytest.approx(1 / 20, rel=1e-4)
+
+
+@pytest.mark.parametrize("depths", [None, (2.0, 10.0)])
+@pytest.mark.parametrize("value", [0.0, -3.0, 1e30])
+def test_what_is_flat_is_at_a_sensible_depth(value, depths):
+    inverse_depth = inverse_depth_of(np.full((3, 4), value, np.float32), depths)
+    assert (inverse_depth > 0).all()
+    assert np.isfinite(inverse_depth).all()
+
+
+def test_the_plane_is_looked_through_as_far_as_cameras_stand_beside():
+    photo, beside = camera(40, 48), camera(40, 48, place=(0.2, -0.1, 0.0))
+    reach = reach_of(photo, [photo, beside], (1.0, 3.0))
+    assert reach.step == pytest.approx(0.2 / FARTHEST_STEPS)
+    assert {(round(at.t, 6), round(at.s, 6)) for at in reach.outer} >= {(-2.0, 4.0), (-2.0, 0.0), (0.0, 4.0)}
+
+
+def test_from_behind_it_is_looked_through_all_over():
+    photo, behind = camera(40, 48), camera(40, 48, place=(0.0, 0.0, -0.5))
+    reach = reach_of(photo, [behind], (1.0, 3.0))
+    assert min(at.s for at in reach.outer) == pytest.approx(-max(at.s for at in reach.outer))
+    assert all(margin > 2 for margin in reach.margins)
+
+
+def test_a_turned_camera_asks_for_what_lies_beyond_the_frame():
+    photo = camera(40, 48)
+    margins = reach_of(photo, [camera(40, 48, turned=about(1, 10.0))], (1.0, 3.0)).margins
+    assert margins.right >= 60 * np.tan(np.radians(10.0)) > 0 == margins.left
+    wide = reach_of(photo, [camera(40, 48, 2.0)], (1.0, 3.0)).margins
+    assert tuple(wide) == (MOST_BEYOND * 40,) * 2 + (MOST_BEYOND * 48,) * 2
+
+
+def test_cameras_that_look_along_add_nothing():
+    photo = camera(40, 48)
+    reach = reach_of(photo, [photo], (1.0, 3.0))
+    assert reach.margins == (0, 0, 0, 0)
+    assert reach.outer == ()
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        camera(40, 48, turned=about(1, 180.0)),
+        camera(40, 48, turned=about(0, 90.0)),
+        camera(40, 48, place=(0.0, 0.0, 5.0)),
+        camera(40, 48, place=(100.0, 0.0, 0.0)),
+        camera(40, 48, place=(0.0, 0.0, 3.0)),
+    ],
+)
+def test_a_camera_that_sees_nothing_of_the_photo_is_refused(target):
+    pixels, inverse_depth = square_scene()
+    with pytest.raises(InputError, match="test: sees nothing of the photo"):
+        FreeViews(pixels, inverse_depth, camera(40, 48), [camera(40, 48), target])

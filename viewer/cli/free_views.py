@@ -1,0 +1,139 @@
+"""`iibr generate --poses`: what any cameras see of a photo, on disk."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import typer
+
+from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place, require_own_folder
+from iibr_core.types import Camera, FloatImage, ImageSize, InputError
+from viewer.cli.options import given_options, inputs_with_sidecar, require_existing, require_model
+from viewer.cli.terminal import print_depth, print_notes, show_progress
+
+if TYPE_CHECKING:
+    from viewer.background.loaded_photo import LoadedPhoto
+    from viewer.model.state.app_state import Source
+
+OWN_FILES = r"view_\d{4,5}\.(png|exr)"
+NOT_WITH_POSES = {"format": "--format", "depth_strength": "--depth-strength", "with_disparity": "--with-disparity",
+                  "quality": "--quality"}  # fmt: skip
+"""Parameters of light fields alone. Weights are the closed form's."""
+MOST_UNLIKE = 0.02
+"""So far the sides of a pose's picture and the photo's may differ in their ratio: smaller copies are rounded."""
+MOSTLY, MOST_NAMED = 0.5, 5
+"""Poses that show more than this share of what was made up are named, so many at most."""
+
+
+def require_heeded_with_poses(context: typer.Context) -> None:
+    """Raise InputError for options that only light fields heed."""
+    given = [option for name, option in NOT_WITH_POSES.items() if name in given_options(context)]
+    if given:
+        raise InputError(f"{' and '.join(given)}: for light fields only; leave it out with --poses")
+
+
+def write_free_views(
+    source: Source, poses: Path, photo_pose: int | None, is_literal: bool, out: Path, force: bool
+) -> None:
+    """A picture for each pose, view_0001.png and so on, in a folder. photo_pose: the number of the photo's, from 1.
+    is_literal: disparity counts in px per unit of length.
+
+    Raises InputError.
+    """
+    from iibr_core.formats.poses import central_camera, read_poses
+
+    require_existing(source)
+    require_own_folder(out, OWN_FILES)
+    require_folder_place(out, (*inputs_with_sidecar(source), poses), force, is_whole=True)
+    require_model(source.depth)
+    cameras = read_poses(poses)
+    if photo_pose is not None and photo_pose > len(cameras):
+        raise InputError(f"--photo-pose {photo_pose}: {poses} holds {len(cameras)}")
+    given = central_camera(cameras) if photo_pose is None else photo_pose - 1
+
+    with show_progress("reading") as show:
+        from viewer.background.loaded_photo import load_photo
+
+        loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
+    pictures = _as_large_as(cameras, given, loaded.photo.size)
+    start, unseen = time.perf_counter(), []
+    with show_progress("making views") as show:
+        for done, share in enumerate(_written(out, source, loaded, is_literal, pictures, given), 1):
+            unseen.append(share)
+            show(done, len(pictures))
+    seconds = time.perf_counter() - start
+    print(f"{len(pictures)} views in {seconds:.2f} s ({1000 * seconds / len(pictures):.1f} ms per view): {out}")
+    notes = (*loaded.photo.notes, *loaded.disparity.notes, f"The photo was taken at {pictures[given].source}.")
+    print_notes((*notes, *_unseen_notes(unseen)))
+    print_depth(loaded.origin)
+
+
+def _written(
+    out: Path, source: Source, loaded: LoadedPhoto, is_literal: bool, cameras: Sequence[Camera], given: int
+) -> Iterator[float]:
+    """Write the views, one after the other; of each the share that the photo does not show. The folder is there when
+    all have been taken.
+    """
+    from iibr_core.color import photo_in_srgb
+    from iibr_core.formats.images.photo import write_image
+    from iibr_core.generation.free_views import FreeViews, depths_of, reach_of
+    from iibr_core.generation.memory_model import budget_of, require_free_views
+    from iibr_core.generation.stored_views import encode_for_storage
+    from iibr_core.inpainting.registry import load_inpainter
+    from iibr_core.runtime.tiling import never
+    from viewer.background.loaded_photo import inpainting_aids
+
+    photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])
+    canvas = reach_of(cameras[given], cameras, depths_of(inverse_depth)).margins.around(photo.size)
+    largest = max((camera.size for camera in cameras), key=math.prod)
+    require_free_views(budget_of(source.depth.memory_bytes), canvas, largest)
+    inpainter = load_inpainter(source.inpaint, inpainting_aids(source, loaded))
+    views = FreeViews(photo.pixels, inverse_depth, cameras[given], cameras, inpainter=inpainter)
+    unfinished = UnfinishedFolder(out)
+    try:
+        for number, camera in enumerate(cameras, 1):
+            view = views.view(camera)
+            name = f"view_{number:04d}{'.exr' if photo.is_hdr else '.png'}"
+            write_image(unfinished.path / name, encode_for_storage(view.colors, photo.is_hdr, never))
+            yield float(view.inpainted.mean())
+        unfinished.put_in_place()
+    finally:
+        unfinished.discard()
+
+
+def _as_large_as(cameras: Sequence[Camera], given: int, size: ImageSize) -> list[Camera]:
+    """The cameras with pictures so much smaller or larger that those of the given one are of the photo's size.
+
+    Raises InputError where they have another shape.
+    """
+    scale = size.width / cameras[given].size.width
+    if abs(size.height / (cameras[given].size.height * scale) - 1) > MOST_UNLIKE:
+        raise InputError(f"{cameras[given].source}: is of pictures of {cameras[given].size}, the photo is {size}")
+    smaller = [ImageSize(*(max(round(side * scale), 1) for side in camera.size)) for camera in cameras]
+    return [camera.resized(each) for camera, each in zip(cameras, [*smaller[:given], size, *smaller[given + 1 :]])]
+
+
+def _inverse_depth(loaded: LoadedPhoto, is_literal: bool, camera: Camera) -> FloatImage:
+    """1 / depth (H, W) of the photo in the unit of the poses. Raises InputError where disparity does not say it."""
+    from iibr_core.generation.free_views import inverse_depth_of
+
+    values = loaded.disparity.values
+    if not is_literal:
+        return inverse_depth_of(values, camera.depth_range)
+    if not values.min() > 0:
+        raise InputError(f"{loaded.disparity.source}: holds disparities that are not positive, which --literal needs")
+    return values / np.float32(camera.focal_px[0])
+
+
+def _unseen_notes(unseen: Sequence[float]) -> tuple[str, ...]:
+    """A sentence about the poses that show mostly what is made up."""
+    many = [f"{number} ({share:.0%})" for number, share in enumerate(unseen, 1) if share > MOSTLY]
+    if not many:
+        return ()
+    named = ", ".join(many[:MOST_NAMED]) + (" and others" if len(many) > MOST_NAMED else "")
+    return (f"Most of what these poses show was made up, as the photo never saw it: {named}.",)
