@@ -44,6 +44,8 @@ OWN_SIZE_BYTES, TILE_BYTES = 45, 350 * MIB
 """Of one pixel of a photo that is drawn at its own size; and of a tile of it, whatever its size."""
 USUAL_RAY_IMAGES, USUAL_HOLE_BYTES, USUAL_AMBIGUOUS_SHARE = 10, 20, 0.2
 """What scenes take while their views are made, before anything is known of them."""
+MOST_COMPLETING = 9
+"""Views that complete the rays of several photos: three rows of three at most."""
 USUAL_GRID = GridShape(5, 5)
 """A photo is made no smaller than that so many of its views fit; more are not worth its details."""
 LEAST_PIXELS = 10_000
@@ -166,6 +168,14 @@ def require_field(budget: Budget, name: str, size: ImageSize, grid: GridShape) -
     budget.require(
         needed, f"{name}: {grid.columns} x {grid.rows} views of {size}", "raise --memory, or take fewer views"
     )
+
+
+def require_dense_field(budget: Budget, name: str, size: ImageSize, sparse: GridShape) -> None:
+    """Raise InputError where views cannot be made between those of a sparse grid, each of this (height, width)."""
+    rays = 2 * RAY_BYTES * (math.prod(sparse) + MOST_COMPLETING)
+    each = STORED_HDR_BYTES * math.prod(sparse) + rays + CORES * (KEPT_BYTES + WORKING_BYTES)
+    what = f"making views between {sparse.columns} x {sparse.rows} of {name} ({size})"
+    budget.require(WRITER_BYTES + math.prod(size) * each, what, "raise --memory, or take fewer or smaller views")
 
 
 def require_picture(budget: Budget, size: ImageSize, is_float: bool) -> None:

@@ -192,6 +192,17 @@ class ViewSynthesis:
         view = self._fill(rays, offset, view, covered, 1)
         return view, [part for part in undecided if part is not None and len(part.pixel)]
 
+    def render_seen(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, FloatImage]:
+        """What the set itself shows, in closed form and alone, its holes left open (`occluded`); and how much of each
+        ray is covered (H, W).
+        """
+        view, covered = self._begin_view(rays, offset)
+        in_bands(
+            lambda first, last: self._render_rows(rays, offset, (first, last), view, covered),
+            rays.view_size, self._should_stop, 1, self._most_band_pixels,
+        )  # fmt: skip
+        return view, covered
+
     def decide(self, rays: RaySet, undecided: UndecidedRays) -> DecidedRays:
         """What undecided rays show is the transformer's choice. Raises Cancelled once should_stop is true."""
         assert self._transformer is not None

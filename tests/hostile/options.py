@@ -239,6 +239,18 @@ _ignored = [
     for more in each
 ]
 
+_dense_fields = [
+    Case(f"generate a light field {' '.join(words)}", ("generate", "field", *words), says=says)
+    for words, says in (
+        (("--grid", "4", "--out", "new"), "5x5"),
+        (("--grid", "3", "--out", "new"), "5x5"),
+        (("--grid", "5", "--out", "field", "--force"), "field"),
+        (("--grid", "5", "--out", "new", "--refine", "off"), "--refine"),
+        (("--grid", "5", "--out", "new", "--disparity", "map.pfm"), "--disparity"),
+        (("--grid", "5", "--out", "new", "--literal"), "--literal"),
+    )
+] + [Case("generate between views", ("generate", "field", "--grid", "5", "--out", "new"), 0, "", ("new",))]
+
 _others = [
     Case(f"{' '.join(words)[:60]}", words, says=says)
     for words, says in (
@@ -295,5 +307,6 @@ OPTION_CASES = (
     *_models,
     *_contradictions,
     *_ignored,
+    *_dense_fields,
     *_others,
 )

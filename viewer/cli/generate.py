@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.types import GridShape, InputError
+from viewer.cli.dense_field import NOT_FOR_DENSE_FIELDS, write_dense_field
 from viewer.cli.free_views import require_heeded_with_poses, write_free_views
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
     Force,
     LightFieldFormat,
-    PhotoPath,
+    ScenePath,
     grid_from_text,
     inputs_with_sidecar,
     require_existing,
     require_memory,
     require_model,
 )
-from viewer.cli.scene_options import SceneOptions
+from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
     from viewer.model.state.app_state import Source
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 @with_option_records
 def generate(
     context: typer.Context,
-    photo: PhotoPath,
+    path: ScenePath,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder to write.", show_default=False)],
     scene: SceneOptions,
     grid: Annotated[
@@ -64,7 +66,7 @@ def generate(
     force: Force = False,
 ) -> None:
     """Write the light field of a photo: a disparity map that is named counts as it is, in px from view to view; found
-    or estimated depth gets the parallax that the window shows.
+    or estimated depth gets the parallax that the window shows. Of a light field: its views and those between.
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
 
@@ -80,11 +82,15 @@ def generate(
         if grid is not None:
             raise InputError("--grid makes a light field, --poses pictures of any cameras: give one of them")
         require_heeded_with_poses(context)
-        write_free_views(scene.source(photo, None), poses, photo_pose, bool(literal), out, force)
+        write_free_views(scene.source(path, None), poses, photo_pose, bool(literal), out, force)
         return
     if grid is None:
         raise InputError("give --grid, for a light field, or --poses, for pictures of any cameras")
-    source = scene.source(photo, grid, is_literal=scene.disparity is not None if literal is None else literal)
+    if is_light_field(path):
+        require_heeded(context, path, NOT_FOR_DENSE_FIELDS)
+        write_dense_field(scene.source(path, grid), grid, out, format, with_disparity, force)
+        return
+    source = scene.source(path, grid, is_literal=scene.disparity is not None if literal is None else literal)
     _write_light_field(source, grid, out, format, scene.depth_strength, with_disparity, force)
 
 
@@ -106,7 +112,6 @@ def _write_light_field(
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
     photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
     plan = make_plan(source, loaded, depth_strength, keeps_views=False)
-    total = grid.rows * grid.columns
     disparity_read = plan.field_disparity(loaded.disparity)
     with (
         new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
@@ -117,14 +122,7 @@ def _write_light_field(
             )
         ) as views,
     ):
-        seconds = 0.0
-        for done in range(1, total + 1):
-            start = time.perf_counter()
-            update = next(views)
-            seconds += time.perf_counter() - start
-            writer.add(update)
-            show(done, total)
-    height, width = loaded.photo.size
-    print(f"{total} views of {width}x{height} in {seconds:.2f} s ({1000 * seconds / total:.1f} ms per view): {out}")
+        said = write_views(views, writer, grid, loaded.photo.size, show)
+    print(f"{said}: {out}")
     print_notes(loaded.photo.notes + loaded.disparity.notes + plan.notes)
     print_depth(loaded.origin)

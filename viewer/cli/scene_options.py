@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -87,11 +88,11 @@ NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} - {"memory
 """Options about how views are made: a light field brings its own. Its centre view's disparity may be given."""
 
 
-def require_heeded(context: typer.Context, path: Path) -> None:
+def require_heeded(context: typer.Context, path: Path, unheeded: AbstractSet[str] = NOT_FOR_LIGHT_FIELDS) -> None:
     """Raise InputError for options given that a light field at `path` would not heed."""
     given = given_options(context)
     # A scale says nothing without the map that it is of.
-    given &= NOT_FOR_LIGHT_FIELDS if "disparity" in given else NOT_FOR_LIGHT_FIELDS | {"disparity_scale"}
+    given &= unheeded if "disparity" in given else unheeded | {"disparity_scale"}
     if not given or not is_light_field(path):
         return
     options = [parameter.opts[0] for parameter in context.command.params if parameter.name in given]

@@ -1,0 +1,93 @@
+"""The disparity of every view of a light field: each estimated from all views, then held against the other maps.
+
+A map is least sure where few other views see a place: there it mostly continues what stands in front. What no other map
+confirms, or more of them look through than confirm, is filled by what looks like it around.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import encoded_from_stored
+from iibr_core.depth.multi_view.estimate import estimate_disparity
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress
+
+AGREE_PX = 1.0
+"""Two maps that place a point within so many pixels, seen from each other's view, agree."""
+
+
+def estimate_all(
+    views: Sequence[StoredColors],
+    offsets: Sequence[ViewOffset],
+    range_px: tuple[float, float],
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+) -> list[FloatImage]:
+    """The disparity (H, W) of each view, px per view step, within a range (`estimate_coarse` finds it), in agreement
+    with the others.
+
+    views: (H, W, 3) each, of equal size. offsets: their viewpoints. Raises InputError where these are all one,
+    Cancelled once should_stop is true.
+    """
+    maps = []
+    for index in range(len(views)):
+        report_progress(index, len(views), "finding disparity")
+        maps.append(estimate_disparity(views, offsets, index, range_px, should_stop))
+    return reconcile(views, maps, offsets, should_stop)
+
+
+def reconcile(
+    views: Sequence[StoredColors],
+    maps: Sequence[FloatImage],
+    offsets: Sequence[ViewOffset],
+    should_stop: ShouldStop = never,
+) -> list[FloatImage]:
+    """The maps, (H, W) each, with what the others do not bear out filled by what looks like it around; a map that
+    nothing bears out stays as it is. views: (H, W, 3) each. Raises Cancelled once should_stop is true.
+    """
+    reconciled = []
+    for index, (colors, values) in enumerate(zip(views, maps)):
+        is_confirmed = find_confirmed(maps, offsets, index, should_stop)
+        if is_confirmed.any() and not is_confirmed.all():
+            known = np.where(is_confirmed, values, np.float32(np.nan))
+            photo = np.nan_to_num(encoded_from_stored(colors), posinf=1.0)
+            values = fill_disparity_by_color(photo, known, should_stop)
+        reconciled.append(values)
+    return reconciled
+
+
+def find_confirmed(
+    maps: Sequence[FloatImage], offsets: Sequence[ViewOffset], index: int, should_stop: ShouldStop = never
+) -> NDArray[np.bool_]:
+    """Where one of the maps (H, W) is borne out: another one has the same point, and no more look through it, to what
+    lies behind, than have it. What stands before it there says nothing. Raises Cancelled once should_stop is true.
+    """
+    values = maps[index]
+    rows, columns = np.indices(values.shape, np.float32)
+    having, through = np.zeros(values.shape, np.int32), np.zeros(values.shape, np.int32)
+    for other, (there, at) in enumerate(zip(maps, offsets)):
+        t, s = at.t - offsets[index].t, at.s - offsets[index].s
+        if other == index or t == s == 0:
+            continue
+        raise_if_stopped(should_stop)
+        nearer = _sample(there, rows - values * np.float32(t), columns - values * np.float32(s)) - values
+        most = np.float32(AGREE_PX / max(abs(t), abs(s)))
+        having += np.abs(nearer) <= most
+        through += nearer < -most
+    confirmed: NDArray[np.bool_] = (having > 0) & (having >= through)
+    return confirmed
+
+
+def _sample(image: FloatImage, row: FloatImage, column: FloatImage) -> FloatImage:
+    """The nearest pixels of an image (H, W) at these positions, NaN beyond it."""
+    height, width = image.shape
+    y, x = np.rint(row), np.rint(column)
+    is_inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
+    y, x = (np.where(is_inside, at, 0).astype(np.int64) for at in (y, x))
+    sampled: FloatImage = np.where(is_inside, image[y, x], np.float32(np.nan))
+    return sampled

@@ -1,0 +1,75 @@
+"""Maps of several views, held against each other."""
+
+import numpy as np
+
+from iibr_core.depth.multi_view.agreement import AGREE_PX, estimate_all, find_confirmed, reconcile
+from iibr_core.depth.multi_view.estimate import estimate_coarse
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import render
+from iibr_core.types import GridShape, ImageSize, ViewOffset
+
+OFFSETS = [ViewOffset(0.0, -2.0), ViewOffset(0.0, 0.0), ViewOffset(1.0, 2.0)]
+
+
+def slow_confirmed(maps, index):
+    result = np.zeros(maps[0].shape, bool)
+    for y, x in np.ndindex(*maps[0].shape):
+        having = through = 0
+        for other, at in enumerate(OFFSETS):
+            if other == index:
+                continue
+            t, s = at.t - OFFSETS[index].t, at.s - OFFSETS[index].s
+            d = maps[index][y, x]
+            row, column = (
+                round(float(np.float32(y) - d * np.float32(t))),
+                round(float(np.float32(x) - d * np.float32(s))),
+            )
+            if not (0 <= row < len(result) and 0 <= column < len(result[0])):
+                continue
+            nearer = maps[other][row, column] - d
+            having += abs(nearer) <= np.float32(AGREE_PX / max(abs(t), abs(s)))
+            through += nearer < -np.float32(AGREE_PX / max(abs(t), abs(s)))
+        result[y, x] = having > 0 and having >= through
+    return result
+
+
+def test_it_confirms_what_the_plain_definition_does():
+    maps = list(np.random.default_rng(1).uniform(-2, 2, (3, 20, 26)).astype(np.float32))
+    for index in range(3):
+        confirmed = find_confirmed(maps, OFFSETS, index)
+        assert 0 < confirmed.mean() < 1
+        assert (confirmed == slow_confirmed(maps, index)).all()
+
+
+def test_a_wrong_patch_takes_the_disparity_of_what_looks_like_it():
+    maps = [np.full((30, 40), 1.0, np.float32) for _ in OFFSETS]
+    maps[1][10:14, 10:14] = 5.0
+    views = [np.full((30, 40, 3), 90, np.uint8)] * 3
+    assert all((values == 1.0).all() for values in reconcile(views, maps, OFFSETS))
+
+
+def test_maps_that_share_nothing_stay_as_they_are():
+    maps = [np.full((8, 8), value, np.float32) for value in (-900.0, 0.0, 900.0)]
+    kept = reconcile([np.zeros((8, 8, 3), np.uint8)] * 3, maps, OFFSETS)
+    assert all((a == b).all() for a, b in zip(kept, maps))
+
+
+def test_views_without_any_texture_get_finite_maps():
+    views = [np.full((24, 32, 3), 90, np.uint8)] * 3
+    range_px = estimate_coarse(views, OFFSETS, 1).range_px
+    assert all(np.isfinite(values).all() for values in estimate_all(views, OFFSETS, range_px))
+
+
+def test_agreement_brings_estimated_maps_nearer_to_the_truth():
+    grid, size = GridShape(3, 3), ImageSize(96, 120)
+    offsets = [ViewOffset(2 * t, 2 * s) for t, s in (grid.offset(*at) for at in np.ndindex(*grid))]
+    scene = random_scene(np.random.default_rng(5), size, 2.0)
+    drawn = [render(scene, size, offset, samples=2) for offset in offsets]
+    views = [(255 * colors + 0.5).astype(np.uint8) for colors, _ in drawn]
+    told = []
+    maps = estimate_all(
+        views, offsets, estimate_coarse(views, offsets, 4).range_px, report_progress=lambda *now: told.append(now)
+    )
+    assert len(told) == 9
+    wrong = np.mean([np.abs(values - truth) > 0.25 for values, (_, truth) in zip(maps, drawn)])
+    assert wrong < 0.12

@@ -1,0 +1,155 @@
+"""Views between given views: better than any one of them alone, and finite whatever these say."""
+
+import numpy as np
+import pytest
+
+from iibr_core.color import bytes_from_encoded, encoded_from_stored
+from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.generation.dense_field import BESIDE_WEIGHT, GivenView, densify, require_steps
+from iibr_core.generation.light_field import generate
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import render
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture
+
+SPARSE, DENSE = GridShape(3, 3), GridShape(5, 5)
+SIZE = ImageSize(72, 90)
+
+
+def drawn_views(grid, scene):
+    """Colours and disparity (px per step of DENSE) of all views of a grid over the same viewpoints as DENSE."""
+    step = (DENSE.rows - 1) / (grid.rows - 1)
+    views = {}
+    for at in np.ndindex(*grid):
+        colors, disparity = render(scene, SIZE, ViewOffset(*(step * part for part in grid.offset(*at))), samples=2)
+        views[at] = bytes_from_encoded(colors), disparity
+    return views
+
+
+def flat_view(row, column, grey, disparity=0.0, size=(12, 16)):
+    return GivenView(row, column, np.full((*size, 3), grey, np.uint8), np.full(size, disparity, np.float32))
+
+
+def test_views_between_are_better_than_from_the_centre_alone_and_given_ones_come_back():
+    gains = []
+    for seed in (11, 12):
+        scene = random_scene(np.random.default_rng(seed), SIZE, 2.0)
+        sparse, dense = drawn_views(SPARSE, scene), drawn_views(DENSE, scene)
+        given = [GivenView(*at, colors, 2 * disparity) for at, (colors, disparity) in sparse.items()]
+        made = by_index(list(densify(given, SPARSE, DENSE)))
+        assert set(made) == set(dense)
+        for (row, column), (colors, _) in sparse.items():
+            assert (made[2 * row, 2 * column].colors == colors).all()
+        colors, disparity = sparse[1, 1]
+        photo, disparity = photo_of(encoded_from_stored(colors)), disparity_of(disparity)
+        alone = by_index(list(generate(photo, disparity, literal_plan(photo, disparity, 5))))
+        new = [at for at in dense if at[0] % 2 or at[1] % 2]
+        gains += [
+            bounded_psnr(made[at].colors, dense[at][0]) - bounded_psnr(alone[at].colors, dense[at][0]) for at in new
+        ]
+        wrong = [np.abs(made[at].disparity - dense[at][1]) > 0.25 for at in new]
+        assert np.mean(wrong) < 0.05
+    assert np.mean(gains) > 3
+
+
+def test_a_view_is_the_mean_of_what_the_views_around_show_by_nearness_and_coverage():
+    scene = random_scene(np.random.default_rng(13), SIZE, 2.0)
+    sparse = drawn_views(SPARSE, scene)
+    given = [GivenView(*at, colors, 2 * disparity) for at, (colors, disparity) in sparse.items()]
+    made = by_index(list(densify(given, SPARSE, DENSE)))[1, 3]
+    total, weights = np.zeros((*SIZE, 3)), np.zeros(SIZE)
+    with ViewSynthesis() as synthesis:
+        for (row, column), (colors, disparity) in sparse.items():
+            away = ViewOffset(1.0 - 2 * row, 3.0 - 2 * column)
+            if max(abs(away.t), abs(away.s)) > 2:
+                continue
+            view, covered = synthesis.render_seen(rays_of_photo(encoded_from_stored(colors), disparity, 2, 0), away)
+            for y, x in np.ndindex(*SIZE):
+                if not view.occluded[y, x]:
+                    near = (1 - abs(away.t) / 2) * (1 - abs(away.s) / 2) + BESIDE_WEIGHT
+                    total[y, x] += near * covered[y, x] ** 2 * view.colors[y, x]
+                    weights[y, x] += near * covered[y, x] ** 2
+    seen = weights > 0
+    assert (seen == ~made.inpainted).all()
+    assert np.abs(made.colors[seen] / 255 - np.clip(total[seen] / weights[seen][:, None], 0, 1)).max() < 0.6 / 255
+
+
+def test_what_no_given_view_shows_is_inpainted_once_and_shared():
+    # A panel before a wall, with a slit through which every view sees another part of the wall.
+    wall = bytes_from_encoded(smooth_texture(40, 64))
+    given = []
+    for column in (0, 1):
+        disparity, colors = np.zeros((40, 64), np.float32), wall.copy()
+        slit = slice(34 - 10 * column, 38 - 10 * column)
+        disparity[8:32], colors[8:32] = 10.0, (200, 30, 30)
+        disparity[:, slit], colors[:, slit] = 0.0, wall[:, slit]
+        given.append(GivenView(0, column, colors, disparity))
+    views = by_index(list(densify(given, GridShape(1, 2), GridShape(1, 6))))
+    completing, beside = views[0, 2], views[0, 3]
+    # The slit stands at 30 .. 33 and 28 .. 31: both see the wall at 30 and 31.
+    shared = np.s_[12:28, 30:32]
+    assert completing.inpainted[shared].all()
+    assert beside.inpainted[shared].all()
+    assert np.abs(completing.colors[shared].astype(int) - beside.colors[shared]).max() <= 1
+    assert np.abs(completing.disparity[shared]).max() < 0.1
+    assert np.abs(completing.colors[shared].astype(int) - (200, 30, 30)).max(axis=-1).min() > 40
+
+
+def test_views_that_contradict_each_other_stay_between_and_pass_over_smoothly():
+    given = [flat_view(0, 0, 20), flat_view(0, 1, 220)]
+    views = by_index(list(densify(given, GridShape(1, 2), GridShape(1, 9))))
+    greys = [views[0, column].colors for column in range(9)]
+    assert all(np.ptp(grey) == 0 for grey in greys)
+    levels = [int(grey[0, 0, 0]) for grey in greys]
+    assert levels == sorted(levels)
+    assert levels[0] == 20
+    assert levels[-1] == 220
+    assert max(np.diff(levels)) < 35
+
+
+@pytest.mark.parametrize("nonsense", [1e6, -1e6, 3e30])
+def test_disparities_beyond_all_measure_give_finite_views(nonsense):
+    given = [flat_view(row, column, 90, nonsense) for row, column in np.ndindex(2, 2)]
+    for view in densify(given, GridShape(2, 2), GridShape(3, 3)):
+        assert np.isfinite(view.disparity).all()
+
+
+def test_unknown_disparity_is_refused():
+    with pytest.raises(InputError, match="row 1, column 0: its disparity is not finite"):
+        flat_view(1, 0, 90, np.nan)
+
+
+def test_hdr_views_stay_hdr():
+    given = [GivenView(0, u, np.full((12, 16, 3), 4.0, np.float16), np.zeros((12, 16), np.float32)) for u in (0, 1)]
+    middle = by_index(list(densify(given, GridShape(1, 2), GridShape(1, 3))))[0, 1]
+    assert middle.colors.dtype == np.float16
+    assert np.abs(middle.colors - 4.0).max() < 0.01
+
+
+def test_it_ends_when_it_should_stop():
+    given = [flat_view(row, column, 90) for row, column in np.ndindex(2, 2)]
+    assert len(list(densify(given, GridShape(2, 2), GridShape(5, 5), should_stop=lambda: True))) == 4
+
+
+@pytest.mark.parametrize(
+    ("sparse", "dense", "steps"), [((3, 3), (9, 9), 4), ((2, 2), (9, 9), 8), ((1, 3), (1, 5), 2), ((2, 3), (4, 7), 3)]
+)
+def test_grids_that_fit_say_how_many_steps(sparse, dense, steps):
+    assert require_steps(GridShape(*sparse), GridShape(*dense)) == steps
+
+
+@pytest.mark.parametrize(
+    ("sparse", "dense", "advice"),
+    [
+        ((3, 3), (8, 8), "5x5, 7x7, 9x9"),
+        ((3, 3), (3, 3), "5x5"),
+        ((3, 3), (2, 2), "5x5"),
+        ((3, 3), (9, 5), "9x9"),
+        ((1, 3), (9, 9), "1x5"),
+        ((1, 1), (9, 9), "the picture itself"),
+    ],
+)
+def test_grids_that_do_not_fit_are_refused_with_those_that_do(sparse, dense, advice):
+    with pytest.raises(InputError, match=advice):
+        require_steps(GridShape(*sparse), GridShape(*dense))

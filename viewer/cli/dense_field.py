@@ -1,0 +1,51 @@
+"""`iibr generate FIELD --grid N`: the views of a light field and those between them, on disk."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from iibr_core.types import GridShape, image_size
+from viewer.cli.options import inputs_with_sidecar, require_existing
+from viewer.cli.scene_options import NOT_FOR_LIGHT_FIELDS
+from viewer.cli.terminal import print_notes, show_progress
+from viewer.cli.view_writing import write_views
+
+if TYPE_CHECKING:
+    from viewer.model.state.app_state import Source
+
+NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal"}
+"""Options that say nothing about views between those of a light field."""
+
+
+def write_dense_field(
+    source: Source, grid: GridShape, out: Path, layout: str, with_disparity: bool, force: bool
+) -> None:
+    """Raises InputError, also where the views find no places on the grid."""
+    from iibr_core.formats.light_fields.registry import open_light_field, writer_for
+
+    require_existing(source)
+    new_writer = writer_for(layout)
+    new_writer.require_place(out, inputs_with_sidecar(source), force)
+
+    from iibr_core.formats.light_fields.views import grid_of
+    from iibr_core.generation.dense_field import densify, require_steps
+    from iibr_core.generation.given_views import read_given_views
+    from iibr_core.generation.memory_model import budget_of
+    from iibr_core.inpainting.registry import load_inpainter
+
+    field = open_light_field(Path(source.path))
+    require_steps(grid_of(field), grid, source.path)
+    inpainter = load_inpainter(source.inpaint)
+    with show_progress("reading") as show:
+        given = read_given_views(field, budget_of(source.depth.memory_bytes), report_progress=show)
+    size = image_size(given[0].colors)
+    with (
+        new_writer(out, grid, field.focal_px or float(size.width), field.name, with_disparity) as writer,
+        show_progress("making views") as show,
+        closing(densify(given, grid_of(field), grid, inpainter=inpainter)) as views,
+    ):
+        said = write_views(views, writer, grid, size, show)
+    print(f"{said}: {out}")
+    print_notes(field.notes)
