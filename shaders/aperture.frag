@@ -1,17 +1,14 @@
 #version 330 core
 // Light through the aperture: the weighted sum over its samples, each sheared to the focus plane.
-// REPROJECT: other views stand in for those wanted. TILES: tiles without a layer's content skip it, and where all is
-// sharp few samples suffice.
+// REPROJECT: other views stand in for those wanted. TILES: where all is sharp few samples suffice.
 #include "samples.glsl"
 #include "layers.glsl"
 
 uniform float share;     // of this pass in the picture; the rest comes from the pinhole pass
 #ifdef TILES
-uniform sampler2D tiles; // see defocus_tiles.frag
-#ifndef BLURRED
+uniform sampler2D tiles;    // see defocus_tiles.frag
 uniform int sparse_count;   // the first samples that suffice where all is sharp
 uniform float sparse_up_to_px;
-#endif
 #endif
 
 in vec2 uv, target_uv;
@@ -33,66 +30,38 @@ vec3 place_of(int i, float focus, inout float weight) {
     return place;
 }
 
-#ifdef BLURRED
-void main() {
-    float focus = focus_at(uv);
-    vec2 line = blur_from_depth(focus);
-    vec4 front = vec4(0.0), back = vec4(0.0);
-    float all = 0.0;
-    // Tiles without defocused light add to the weights only.
-    bool is_empty = false;
-#ifdef TILES
-    vec2 widest = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xy;
-    is_empty = max(widest.x, widest.y) <= sharp_up_to_px.x;
-#endif
-    for (int i = 0; i < (is_empty ? sample_count : 0); i++) {
-        float weight = samples[i].w;
-        place_of(i, focus, weight);
-        all += weight;
-    }
-    for (int i = 0; i < (is_empty ? 0 : sample_count); i++) {
-        float weight = samples[i].w;
-        vec3 place = place_of(i, focus, weight);
-        all += weight;
-        vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
-        float blur = blur_beyond_range(light.a * line.x + line.y);
-        // Alpha-weighted light, less the share of the sharp layer, on its side of the focus plane.
-        vec4 weighted = vec4(light.rgb, 1.0) * (weight - weight * sharpness(blur));
-        front += blur > 0.0 ? weighted : vec4(0.0);
-        back += blur > 0.0 ? vec4(0.0) : weighted;
-    }
-    in_front = share * front;
-    behind = share * back;
-    weights = vec4(all, front.a, 0.0, 0.0) * share;
-}
-#else
 void main() {
     float focus = focus_at(uv);
     int count = sample_count;
+    bool is_sparse = false;
 #ifdef TILES
-    vec3 tile = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xyz;
-    // All sharp: the first few samples suffice, with weights of their own. All defocused: nothing to gather.
-    bool is_sparse = max(tile.x, tile.y) < sparse_up_to_px;
+    // All sharp: the first few samples suffice, with weights of their own.
+    vec2 widest = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xy;
+    is_sparse = max(widest.x, widest.y) < sparse_up_to_px;
     if (is_sparse) count = sparse_count;
-    if (tile.z >= sharp_up_to_px.y) count = 0;
 #endif
-#ifdef SHARP
+    vec4 all = vec4(0.0), sharp = vec4(0.0), front = vec4(0.0);
+#ifdef LAYERS
     vec2 line = blur_from_depth(focus);
 #endif
-    vec4 sum = vec4(0.0);
     for (int i = 0; i < count; i++) {
-        float weight = samples[i].w;
-#ifdef TILES
-        if (is_sparse) weight = reprojections[i].w;
-#endif
+        float weight = is_sparse ? reprojections[i].w : samples[i].w;
         vec3 place = place_of(i, focus, weight);
         // Backward warp: the sample's light from its view, in linear light.
         vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
-#ifdef SHARP
-        weight *= sharpness(blur_beyond_range(light.a * line.x + line.y));
+        vec4 weighted = weight * vec4(light.rgb, 1.0);
+        all += weighted;
+#ifdef LAYERS
+        float blur = blur_beyond_range(light.a * line.x + line.y), share_in_focus = sharpness(blur);
+        sharp += share_in_focus * weighted;
+        front += (blur > 0.0 ? 1.0 - share_in_focus : 0.0) * weighted;
 #endif
-        sum += weight * vec4(light.rgb, 1.0);
     }
-    in_focus = share * sum;
-}
+#ifdef LAYERS
+    in_focus = share * sharp;
+    in_front = share * front;
+    behind = share * max(all - sharp - front, 0.0);
+#else
+    in_focus = share * all;
 #endif
+}

@@ -1,6 +1,6 @@
 #version 330 core
-// Per tile of the picture: the widest blur in front of the focus plane (x) and behind it (y), and the least of all (z),
-// in output px from one sample to the next.
+// Per tile of the picture: the widest blur in front of the focus plane (x) and behind it (y), in output px from one
+// sample to the next.
 // REPROJECT: see aperture.frag.
 #include "part.glsl"
 #include "samples.glsl"
@@ -26,7 +26,6 @@ vec2 disparities_at(int i, vec2 place, float focus) {
 void main() {
     vec2 tile = floor(gl_FragCoord.xy);
     vec2 widest = vec2(0.0);
-    float least = 1e6;
     // Places of the tile, borders included, and for each what every sample sees there.
     for (int y = 0; y < taps; y++)
         for (int x = 0; x < taps; x++) {
@@ -37,8 +36,7 @@ void main() {
                 vec2 beside = disparities_at(i, place, focus) - focus;
                 beside -= clamp(beside, -focus_range, focus_range);
                 widest = max(widest, vec2(beside.y, -beside.x));
-                least = min(least, max(beside.x, -beside.y));
             }
         }
-    width_px = vec4(blur_px * widest, blur_px * max(least, 0.0), 0.0);
+    width_px = vec4(blur_px * widest, 0.0, 0.0);
 }

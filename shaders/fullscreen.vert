@@ -7,10 +7,6 @@
 
 out vec2 uv, target_uv;
 
-// Of the four pixels that one of half the size covers, the first stands for all: in their middle, at a texel's corner,
-// surfaces would mix. Passes of half the size look there.
-uniform vec2 nudge;
-
 #if defined(FLAT) || defined(EDGES)
 uniform sampler2D intervals_of_0_and_1;
 flat out ivec2 tile;
@@ -21,7 +17,7 @@ void main() {
     tile = ivec2(number % tiles.x, number / tiles.x);
     bool is_flat = texelFetch(intervals_of_0_and_1, tile, 0).y < 0.0;
     vec2 at = vec2(tile) + vec2(corner == 1 || corner > 3, corner == 2 || corner == 3 || corner == 5);
-    target_uv = at / vec2(tiles) + nudge;
+    target_uv = at / vec2(tiles);
     uv = picture_uv(target_uv);
     gl_Position = vec4(at / vec2(tiles) * 2.0 - 1.0, 0.0, 1.0);
 #ifdef FLAT
@@ -33,7 +29,7 @@ void main() {
 #else
 void main() {
     vec2 corner = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
-    target_uv = corner + nudge;
+    target_uv = corner;
     uv = picture_uv(target_uv);
     gl_Position = vec4(corner * 2.0 - 1.0, 0.0, 1.0);
 }

@@ -85,19 +85,14 @@ void main() {
         total += weight;
     }
     vec4 light = vec4(sum.rgb / total, 1.0) * share;
-#if defined(SHARP) || defined(BLURRED)
+    in_focus = light;
+#ifdef LAYERS
     // Its defocus decides which layer the light goes to.
     vec2 line = blur_from_depth(focus_at(uv));
     float blur = blur_beyond_range(sum.a / total * line.x + line.y);
     float sharp = sharpness(blur);
-#endif
-#ifdef BLURRED
+    in_focus = sharp * light;
     in_front = (blur > 0.0 ? 1.0 - sharp : 0.0) * light;
     behind = (1.0 - sharp) * light - in_front;
-    weights = vec4(share, in_front.a, 0.0, 0.0);
-#elif defined(SHARP)
-    in_focus = sharp * light;
-#else
-    in_focus = light;
 #endif
 }

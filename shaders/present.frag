@@ -6,8 +6,8 @@
 
 uniform sampler2D focus_layer;
 #ifdef LAYERS
-uniform sampler2D weights;  // r: of all layers, g: of the foreground
-uniform sampler2D smooth_front, smooth_back;
+#include "smoothing.glsl"
+uniform sampler2D front_layer, back_layer, smooth_front, smooth_back;
 #endif
 uniform float exposure;  // factor
 
@@ -17,14 +17,15 @@ out vec4 color;
 #ifdef LAYERS
 // In-focus and smoothed background share what the smoothed foreground leaves free; where either is unknown (deep inside
 // the foreground) the foreground's own colour stands in.
-vec3 composed(vec2 at) {
-    vec2 half_at = at + 0.5 / vec2(textureSize(focus_layer, 0));  // see fullscreen.vert
-    vec4 front = textureLod(smooth_front, half_at, 0.0), back = textureLod(smooth_back, half_at, 0.0);
-    vec4 focus = texelFetch(focus_layer, ivec2(at * vec2(textureSize(focus_layer, 0))), 0);
-    vec2 weight = textureLod(weights, half_at, 0.0).rg;
-    float total = max(weight.r, 1e-9);
+vec3 composed(vec2 at, ivec2 here) {
+    vec4 focus = texelFetch(focus_layer, here, 0);
+    vec4 front = texelFetch(front_layer, here, 0), back = texelFetch(back_layer, here, 0);
+    float back_weight = back.a, total = max(focus.a + front.a + back_weight, 1e-9);
+    // Less is smoothed than half the size blurs: a mean of both is as wide as asked for.
+    vec2 smoothed = min(blur_width_px(at) * blur_width_px(at) / HALF_SIZE_BLUR, 1.0);
+    front = mix(front, textureLod(smooth_front, at, 0.0), smoothed.x);
+    back = mix(back, textureLod(smooth_back, at, 0.0), smoothed.y);
     // The smoothed background gets the weight that it had before smoothing.
-    float back_weight = max(total - focus.a - weight.g, 0.0);
     float back_scale = back_weight / max(back.a, 1e-4 * total);
     // Over both lies the smoothed foreground (alpha compositing).
     vec4 beyond = focus + back_scale * back + 1e-3 * front;
@@ -34,10 +35,11 @@ vec3 composed(vec2 at) {
 
 void main() {
     vec2 at = vec2(uv.x, 1.0 - uv.y);
+    ivec2 here = ivec2(at * vec2(textureSize(focus_layer, 0)));
 #ifdef LAYERS
-    vec3 light = composed(at);
+    vec3 light = composed(at, here);
 #else
-    vec4 sum = texelFetch(focus_layer, ivec2(at * vec2(textureSize(focus_layer, 0))), 0);
+    vec4 sum = texelFetch(focus_layer, here, 0);
     vec3 light = sum.rgb / max(sum.a, 1e-12);
 #endif
     light = in_target(light * exposure);

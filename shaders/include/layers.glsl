@@ -1,12 +1,9 @@
-// Output of the passes that gather light: sums weighted by alpha, which the last pass divides by. Light is kept in
-// three layers by its defocus, so that what is strongly defocused is gathered at half size and smoothed by what lies
-// between neighbouring samples. One program gathers what is sharp (SHARP), one the rest (BLURRED), one all (neither).
-#ifdef BLURRED
-layout(location = 0) out vec4 in_front;
-layout(location = 1) out vec4 behind;
-layout(location = 2) out vec4 weights;  // r: of all three layers, g: of what is in front
-#else
+// Output of the passes that gather light: sums weighted by alpha, which the last pass divides by. LAYERS: light is kept
+// apart by its defocus, so that what is defocused can be smoothed by what lies between neighbouring samples.
 layout(location = 0) out vec4 in_focus;
+#ifdef LAYERS
+layout(location = 1) out vec4 in_front;
+layout(location = 2) out vec4 behind;
 #endif
 
 uniform float blur_px;         // output px that one px of disparity beside the focus moves from one sample to the next
@@ -26,7 +23,7 @@ float blur_beyond_range(float blur) {
 #endif
 }
 
-// Share of the sharp layer.
+// Share of the sharp layer; of what is left, all lies on its own side of the focus plane.
 float sharpness(float blur) {
     return clamp(sharp_up_to_px.y / (sharp_up_to_px.y - sharp_up_to_px.x) - abs(blur), 0.0, 1.0);
 }

@@ -49,38 +49,66 @@ class RenderTarget:
             texture.release()
 
 
+class LayerTargets:
+    """Light kept apart by its defocus, see shaders/include/layers.glsl.
+
+    sums: sharp, in front, behind. across, smooth: front and behind, smoothed, at half
+    the size.
+    """
+
+    def __init__(self, ctx: moderngl.Context, sharp: moderngl.Texture) -> None:
+        """sharp: where its layer is summed up, not released with the others."""
+        size_px = ScreenSize(*sharp.size)
+        self._added = [_light(ctx, size_px) for _ in range(2)]
+        self.sums = RenderTarget(ctx, [sharp, *self._added])
+        half = ScreenSize((size_px.width + 1) // 2, (size_px.height + 1) // 2)
+        self.across = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
+        self.smooth = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
+
+    def release(self) -> None:
+        """Free framebuffers and textures."""
+        self.sums.framebuffer.release()
+        for texture in self._added:
+            texture.release()
+        self.across.release()
+        self.smooth.release()
+
+
 class RenderTargets:
     """The targets of one picture size.
 
-    light: all of it, or what is sharp. blurred: in front, behind, and all weights, at half size, see
-    shaders/include/layers.glsl. half_across, half_smooth: front and behind, smoothed. tiles, wide_tiles: blur widths.
-    spans: where searches begin and end. image: the finished picture, RGBA8, rows bottom-up.
+    light: all of it, or what is sharp. tiles, wide_tiles: blur widths. spans: where searches begin and end. image: the
+    finished picture, RGBA8, rows bottom-up.
     """
 
     def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, tile_px: int) -> None:
         self._ctx = ctx
         width, height = self.size_px = size_px
-        half = ScreenSize((width + 1) // 2, (height + 1) // 2)
         tiles = ScreenSize(-(-width // tile_px), -(-height // tile_px))
         self.image = RenderTarget(ctx, [ctx.texture(size_px, 4)])
         self.light = RenderTarget(ctx, [_light(ctx, size_px)])
-        self.blurred = RenderTarget(ctx, [_light(ctx, half), _light(ctx, half), _light(ctx, half, 2)])
-        self.half_across = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
-        self.half_smooth = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
         self.tiles = RenderTarget(ctx, [_light(ctx, tiles)])
         self.wide_tiles = RenderTarget(ctx, [_light(ctx, tiles)])
         self.spans = RenderTarget(ctx, [_light(ctx, tiles) for _ in range(2)])
+        self._layers: LayerTargets | None = None
 
-    def of_layer(self, layer: str) -> RenderTarget:
-        """Where a layer is summed up: "BLURRED", or "SHARP" or "" for all light."""
-        return self.blurred if layer == "BLURRED" else self.light
+    @property
+    def layers(self) -> LayerTargets:
+        """Allocated when first asked for: most pictures that are sharp all over need none."""
+        if self._layers is None:
+            self._layers = LayerTargets(self._ctx, self.light.textures[0])
+        return self._layers
+
+    def sum_of(self, keeps_layers: bool) -> RenderTarget:
+        """Where light is summed up, apart by its defocus or not."""
+        return self.layers.sums if keeps_layers else self.light
 
     def release(self) -> None:
         """Free framebuffers and textures."""
         unbind(self._ctx)
-        for target in (self.image, self.light, self.blurred, self.half_across, self.half_smooth, self.tiles):
-            target.release()
-        for target in (self.wide_tiles, self.spans):
+        if self._layers is not None:
+            self._layers.release()
+        for target in (self.image, self.light, self.tiles, self.wide_tiles, self.spans):
             target.release()
 
 
@@ -89,8 +117,8 @@ def unbind(ctx: moderngl.Context) -> None:
     ctx.detect_framebuffer(0).use()
 
 
-def _light(ctx: moderngl.Context, size_px: ScreenSize, components: int = 4) -> moderngl.Texture:
-    texture = ctx.texture(size_px, components, dtype="f4")
+def _light(ctx: moderngl.Context, size_px: ScreenSize) -> moderngl.Texture:
+    texture = ctx.texture(size_px, 4, dtype="f4")
     texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = False
     return texture

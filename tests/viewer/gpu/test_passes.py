@@ -137,60 +137,74 @@ def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targ
     assert np.array_equal(around, windows.max((-2, -1)))
 
 
+def half_size(image: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The mean of every two by two pixels."""
+    return image.reshape(image.shape[0] // 2, 2, image.shape[1] // 2, 2, -1).mean((1, 3))
+
+
 @pytest.mark.parametrize("width_px", [3.0, 9.3, 40.0])
 def test_smoothing_is_a_box_as_wide_as_told(
     renderer: Renderer, passes: Passes, targets: RenderTargets, width_px: float
 ) -> None:
     SCENE.fill(renderer, GRID)
-    half = (SIZE[1] + 1) // 2, (SIZE[0] + 1) // 2
-    layers = [RANDOM.random((*half, 4)).astype(np.float32) for _ in range(2)]
-    for texture, layer in zip(targets.blurred.textures, layers):
+    layers = [RANDOM.random((SIZE[1], SIZE[0], 4)).astype(np.float32) for _ in range(2)]
+    for texture, layer in zip(targets.layers.sums.textures[1:], layers):
         texture.write(layer.tobytes())
-    tiles = np.zeros((SIZE[1] // TILE_PX, SIZE[0] // TILE_PX, 4), np.float32)
-    tiles[..., 0] = width_px
-    targets.wide_tiles.textures[0].write(tiles.tobytes())
+    fill_tiles(targets, width_px, 0.0)
     passes.smooth(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), targets, narrowing=1.0)
-    reach = 0.25 * np.sqrt(max(width_px**2 - 8, 4.0))
+    reach = 0.25 * np.sqrt(max(width_px**2 - 11, 4.0))
     whole = int(np.ceil(reach - 0.5))
     taps = np.clip(reach + 0.5 - np.abs(np.arange(-whole, whole + 1)), 0, 1) / (2 * reach)
-    expected = layers[0].astype(float)
+    expected = half_size(layers[0].astype(float))
     for axis in (1, 0):
         padded = np.pad(expected, [(whole, whole) if a == axis else (0, 0) for a in range(3)], mode="edge")
         expected = np.apply_along_axis(lambda line: np.convolve(line, taps, "valid"), axis, padded)
-    assert read(targets.half_smooth.textures[0]) == pytest.approx(expected, abs=1e-5)
-    assert not read(targets.half_smooth.textures[1]).any(), "nothing is smoothed where tiles tell of nothing"
+    smooth = [read(texture) for texture in targets.layers.smooth.textures]
+    # Beyond the border a fetch is of its last pixels, not the mean of two by two.
+    inner = np.s_[whole : -whole or None, whole : -whole or None]
+    assert smooth[0][inner] == pytest.approx(expected[inner], abs=1e-4)
+    assert np.isfinite(smooth[0]).all()
+    assert not smooth[1].any(), "nothing is smoothed where tiles tell of nothing"
 
 
-def test_layers_are_laid_over_each_other(renderer: Renderer, passes: Passes, targets: RenderTargets) -> None:
-    """Sharp background in the left half, half of it covered by foreground of two brightnesses."""
+def fill_tiles(targets: RenderTargets, front_px: float, behind_px: float) -> None:
+    """The same blur all over."""
+    tiles = np.zeros((SIZE[1] // TILE_PX, SIZE[0] // TILE_PX, 4), np.float32)
+    tiles[..., :2] = front_px, behind_px
+    targets.wide_tiles.textures[0].write(tiles.tobytes())
+
+
+@pytest.mark.parametrize("width_px", [0.0, 2.0, 5.0])
+def test_layers_are_laid_over_each_other(
+    renderer: Renderer, passes: Passes, targets: RenderTargets, width_px: float
+) -> None:
+    """Sharp background, covered by foreground: of two brightnesses where smoothed, of two others where not."""
     SCENE.fill(renderer, GRID)
     wide = replace(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), exposure=1.0)
     assert wide.keeps_layers
-    height, width = (SIZE[1] + 1) // 2, (SIZE[0] + 1) // 2
-    sharp, front, back = (
-        np.full((SIZE[1], SIZE[0], 4), 0.0, "f4"),
-        np.zeros((height, width, 4), "f4"),
-        np.zeros((height, width, 4), "f4"),
-    )
-    covered = 0.5
-    sharp[:] = (1 - covered) * np.array([0.2, 0.4, 0.6, 1.0])
-    front[:, : width // 2] = covered * np.array([0.8, 0.8, 0.8, 1.0])
-    front[:, width // 2 :] = covered * np.array([0.1, 0.1, 0.1, 1.0])
-    weights = np.zeros((height, width, 2), "f4")
-    weights[:] = 1.0, covered
+    covered, bright = 0.5, {"raw": (0.3, 0.6), "smooth": (0.8, 0.1)}
+    sharp = np.full((SIZE[1], SIZE[0], 4), (1 - covered) * np.array([0.2, 0.4, 0.6, 1.0]), "f4")
+    front = {name: np.zeros((SIZE[1] // half, SIZE[0] // half, 4), "f4") for name, half in (("raw", 1), ("smooth", 2))}
+    for name, layer in front.items():
+        for side, value in zip(np.split(layer, 2, axis=1), bright[name]):
+            side[:] = covered * np.array([value, value, value, 1.0])
     for texture, values in (
         (targets.light.textures[0], sharp),
-        (targets.half_smooth.textures[0], front),
-        (targets.half_smooth.textures[1], back),
-        (targets.blurred.textures[2], weights),
+        (targets.layers.sums.textures[1], front["raw"]),
+        (targets.layers.sums.textures[2], np.zeros_like(front["raw"])),
+        (targets.layers.smooth.textures[0], front["smooth"]),
+        (targets.layers.smooth.textures[1], np.zeros_like(front["smooth"])),
     ):
         texture.write(values.tobytes())
+    fill_tiles(targets, width_px, 0.0)
     targets.image.use()
-    passes.present(wide, targets, is_linear=False)
+    passes.present(wide, targets, narrowing=1.0, is_linear=False)
     renderer._shown = targets
     image = renderer.read_image()
-    for columns, bright in ((slice(0, 70), 0.8), (slice(90, 160), 0.1)):
-        expected = srgb_from_linear(0.5 * np.array([0.2, 0.4, 0.6]) + 0.5 * bright) * 255
+    smoothed = min(width_px**2 / 11, 1.0)
+    for side, columns in enumerate((slice(0, 70), slice(90, 160))):
+        shown = (1 - smoothed) * bright["raw"][side] + smoothed * bright["smooth"][side]
+        expected = srgb_from_linear(0.5 * np.array([0.2, 0.4, 0.6]) + 0.5 * shown) * 255
         assert np.abs(image[:, columns] - expected).max() < 1
 
 

@@ -23,8 +23,11 @@ from viewer.model.lens.limits import clamp_to_grid
 MAX_PASSES = 16
 """A still picture is the mean of at most so many passes, each with its samples elsewhere."""
 
+ONE_PASS_UP_TO_PX = 3.0
+"""As long as neighbouring samples are no farther apart, smoothing tells as much as more samples would."""
+
 PASS_BLUR_PX = 1.5
-"""So many passes are drawn that neighbouring samples are no farther apart than this."""
+"""Elsewhere so many passes are drawn that they are no farther apart than this."""
 
 STILL_SAMPLES = 600
 """More passes than these samples need are not worth the wait."""
@@ -64,7 +67,7 @@ class ProgressiveAccumulation:
 def pass_count(lens: Lens, field: LightFieldTexture) -> int:
     """How many passes, until neighbouring samples are close and edges smooth."""
     count = 1
-    if lens.aperture_share > 0 and lens.keeps_layers:
+    if lens.aperture_share > 0 and lens.keeps_layers and lens.widest_blur_px > ONE_PASS_UP_TO_PX:
         affordable = STILL_SAMPLES // len(lens.samples(field.grid, field.present))
         count = min(math.ceil((lens.widest_blur_px / PASS_BLUR_PX) ** 2), MAX_PASSES, affordable)
     is_warped = field.has_disparity.any() and (lens.has_dolly or not is_stored(lens.eye, field))
@@ -124,8 +127,7 @@ class Accumulator:
         """
         self._disable_tests()
         if not field.present.any():
-            for target in (targets.light, targets.blurred):
-                target.framebuffer.clear()
+            targets.sum_of(accumulation.lens.keeps_layers).framebuffer.clear()
             accumulation.pass_index = len(accumulation.places)
             return
         end = time.perf_counter() + budget_s
@@ -164,11 +166,12 @@ class Accumulator:
         the result.
         """
         self._disable_tests()
-        if accumulation.lens.keeps_layers:
-            narrowing = _smoothing_spread(accumulation.lens) / math.sqrt(max(accumulation.pass_index, 1))
-            self.passes.smooth(accumulation.lens, targets, min(narrowing, 1.0))
+        lens = accumulation.lens
+        narrowing = min(_smoothing_spread(lens) / math.sqrt(max(accumulation.pass_index, 1)), 1.0)
+        if lens.keeps_layers:
+            self.passes.smooth(lens, targets, narrowing)
         framebuffer.use()
-        self.passes.present(accumulation.lens, targets, is_linear, color_space)
+        self.passes.present(lens, targets, narrowing, is_linear, color_space)
 
     def _draw_some(
         self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets, count: int
@@ -191,18 +194,17 @@ class Accumulator:
             self._start_pass(field, accumulation, targets)
         batch = _first_batch(accumulation.samples[accumulation.at :][:count], field)
         has_pinhole = accumulation.at == 0 and lens.aperture_share < 1
-        for layer in ("SHARP", "BLURRED") if lens.keeps_layers else ("",):
-            target = targets.of_layer(layer)
-            keeps = target.holds_sum
-            for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
-                self._disable_tests()
-                self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, layer, rows, keeps)
-                yield
-            keeps = target.holds_sum
-            for rows in _row_bands(target, pixels_per_step / len(batch)) if batch else ():
-                self._disable_tests()
-                self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, layer, rows, keeps)
-                yield
+        target = targets.sum_of(lens.keeps_layers)
+        keeps = target.holds_sum
+        for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
+            self._disable_tests()
+            self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows, keeps)
+            yield
+        keeps = target.holds_sum
+        for rows in _row_bands(target, pixels_per_step / len(batch)) if batch else ():
+            self._disable_tests()
+            self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, rows, keeps)
+            yield
         accumulation.at += len(batch)
         accumulation.done += max(len(batch), 1)
         if accumulation.at >= len(accumulation.samples):
@@ -227,8 +229,7 @@ class Accumulator:
             )
         if accumulation.pass_index > 0:
             return
-        targets.light.start_sum()
-        targets.blurred.start_sum()
+        targets.sum_of(lens.keeps_layers).start_sum()
         if lens.has_dolly:
             self.passes.update_fallback_views(field)
         if lens.keeps_layers:

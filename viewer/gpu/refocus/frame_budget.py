@@ -92,7 +92,7 @@ class DrawCost:
     def fetches(self) -> float:
         """How many fetches of a texel it costs, about."""
         of_samples = self.samples * (REPROJECTION_FETCHES if self.has_reprojection else 1.0)
-        of_pinhole = (PINHOLE_FETCHES + SOURCE_FETCHES * self.sources) * (1.5 if self.keeps_layers else 1.0)
+        of_pinhole = PINHOLE_FETCHES + SOURCE_FETCHES * self.sources
         of_picture = PICTURE_FETCHES + LAYERS_FETCHES * self.keeps_layers
         return self.pixels * (of_picture + of_samples + of_pinhole * (self.sources > 0))
 

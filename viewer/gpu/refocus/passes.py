@@ -23,7 +23,7 @@ from viewer.gpu.refocus.view_sampling import (
     pinhole_sources,
     pinhole_weights,
 )
-from viewer.gpu.render_targets import RenderTarget, RenderTargets
+from viewer.gpu.render_targets import RenderTargets
 
 MAX_SAMPLES = 512
 """As in shaders/include/samples.glsl; larger apertures are summed in several draws."""
@@ -63,17 +63,16 @@ class Passes:
         lens: Lens,
         within_px: ViewOffset,
         targets: RenderTargets,
-        layer: str,
         rows: PictureCell,
         keeps: bool,
     ) -> None:
-        """Add the share of the pinhole view in some rows of its target. layer: "SHARP", "BLURRED", or "" for all light.
+        """Add the share of the pinhole view in some rows of the target.
 
         within_px: where in a pixel of the target it is asked which surface shows, from the middle. keeps: whether to
         add to what is there; else it is replaced.
         """
         kinds = ("FLAT", "EDGES") if self.adaptive and field.has_disparity.any() else ("",)
-        target = targets.of_layer(layer)
+        target = targets.sum_of(lens.keeps_layers)
         size_px = target.framebuffer.size
         for cell in _cells(field, lens):
             drawn = lens.part.in_target(cell).within(rows)
@@ -84,7 +83,7 @@ class Passes:
             target.framebuffer.scissor = _pixels_of(drawn, *size_px)
             target.add(keeps)
             for kind in kinds:
-                self._draw_pinhole_tiles(field, lens, cell, drawn, within_px, targets, layer, kind)
+                self._draw_pinhole_tiles(field, lens, cell, drawn, within_px, targets, kind)
         target.framebuffer.scissor = 0, 0, *size_px
 
     def _draw_pinhole_tiles(
@@ -95,16 +94,16 @@ class Passes:
         drawn: PictureCell,
         within_px: ViewOffset,
         targets: RenderTargets,
-        layer: str,
         kind: str,
     ) -> None:
         """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES". drawn: what of it is asked for."""
-        program, quad = self._programs.get("pinhole.frag", _switches(lens, layer, lens.has_dolly and "DOLLY", kind))
-        target = targets.of_layer(layer)
-        width, height = target.framebuffer.size
+        program, quad = self._programs.get(
+            "pinhole.frag", _switches(lens, _layers(lens), lens.has_dolly and "DOLLY", kind)
+        )
+        width, height = targets.size_px
         self._set_field(program, field, lens)
         self._set_sources(program, field, lens, cell)
-        program.set_uniforms(share=1.0 - lens.aperture_share, nudge=_nudge(target, layer))
+        program.set_uniforms(share=1.0 - lens.aperture_share)
         pixel_uv = lens.part.width / width, lens.part.height / height
         within = (within_px.s + OFF_BORDER_PX) * pixel_uv[0], (within_px.t + OFF_BORDER_PX) * pixel_uv[1]
         program.set_uniforms(within_pixel=within)
@@ -130,7 +129,7 @@ class Passes:
         self._set_field(program, field, lens)
         self._set_sources(program, field, lens, cell)
         self._set_blocks(program, field, targets)
-        width, height = targets.blurred.framebuffer.size
+        width, height = targets.size_px
         program.set_uniforms(pixel_uv=(lens.part.width / width, lens.part.height / height))
         target = targets.spans
         target.framebuffer.scissor = _covering_pixels(drawn, *target.framebuffer.size)
@@ -168,26 +167,29 @@ class Passes:
         samples: list[ApertureSample],
         sparse: dict[ViewOffset, float],
         targets: RenderTargets,
-        layer: str,
         rows: PictureCell,
         keeps: bool,
     ) -> None:
-        """Add samples of the lens, at most MAX_SAMPLES. layer, rows, keeps: see `draw_pinhole`.
+        """Add samples of the lens, at most MAX_SAMPLES. rows, keeps: see `draw_pinhole`.
 
         sparse: weights of the samples that suffice where all is sharp; those among `samples` must come first.
         """
-        tiles = self.adaptive and bool(layer)
+        tiles = self.adaptive and lens.keeps_layers
         reprojects = _needs_reprojection(field, lens, samples)
         program, quad = self._programs.get(
             "aperture.frag",
             _switches(
-                lens, layer, tiles and "TILES", reprojects and "REPROJECT", reprojects and lens.has_dolly and "DOLLY"
+                lens,
+                _layers(lens),
+                tiles and "TILES",
+                reprojects and "REPROJECT",
+                reprojects and lens.has_dolly and "DOLLY",
             ),
         )
         self._set_field(program, field, lens)
         self._set_samples(program, field, lens, samples, sparse)
-        target = targets.of_layer(layer)
-        program.set_uniforms(share=lens.aperture_share, nudge=_nudge(target, layer))
+        target = targets.sum_of(lens.keeps_layers)
+        program.set_uniforms(share=lens.aperture_share)
         if tiles:
             self._bind(targets.tiles.textures[0], "tiles")
             sparse_count = sum(sample.wanted in sparse for sample in samples)
@@ -239,30 +241,41 @@ class Passes:
         program.set_uniforms(
             front_layer=0, back_layer=1, tiles=2, narrowing=narrowing, empty_up_to_px=lens.sharp_up_to_px[0]
         )
-        across = targets.blurred.textures[:2], targets.half_across, (1, 0)
-        down = targets.half_across.textures, targets.half_smooth, (0, 1)
+        layers = targets.layers
+        across = layers.sums.textures[1:], layers.across, (1, 0)
+        down = layers.across.textures, layers.smooth, (0, 1)
         for (front, back), target, direction in (across, down):
             front.use(0)
             back.use(1)
-            program.set_uniforms(direction=direction)
+            width, height = target.framebuffer.size
+            program.set_uniforms(texel_step=(direction[0] / width, direction[1] / height))
             target.use()
             quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def present(self, lens: Lens, targets: RenderTargets, is_linear: bool, color_space: ColorSpace = SRGB) -> None:
-        """The finished picture, into the framebuffer in use. is_linear: as light, unbounded, not encoded. color_space:
-        of the result.
+    def present(
+        self,
+        lens: Lens,
+        targets: RenderTargets,
+        narrowing: float,
+        is_linear: bool,
+        color_space: ColorSpace = SRGB,
+    ) -> None:
+        """The finished picture, into the framebuffer in use. narrowing: as smoothed with. is_linear: as light,
+        unbounded, not encoded. color_space: of the result.
         """
         self._ctx.disable(moderngl.BLEND)
         converts = lens.color_space != color_space and "OTHER_PRIMARIES"
-        switches = lens.keeps_layers and "LAYERS", is_linear and "LINEAR", converts
+        switches = _layers(lens), is_linear and "LINEAR", converts
         program, quad = self._programs.get("present.frag", tuple(switch for switch in switches if switch))
         set_primaries(program, color_space, lens.color_space)
         targets.light.textures[0].use(0)
         program.set_uniforms(focus_layer=0, exposure=lens.exposure)
         if lens.keeps_layers:
-            for unit, texture in enumerate((targets.blurred.textures[2], *targets.half_smooth.textures), start=1):
+            layers = (*targets.layers.sums.textures[1:], *targets.layers.smooth.textures)
+            for unit, texture in enumerate((*layers, targets.wide_tiles.textures[0]), start=1):
                 texture.use(unit)
-            program.set_uniforms(weights=1, smooth_front=2, smooth_back=3)
+            program.set_uniforms(front_layer=1, back_layer=2, smooth_front=3, smooth_back=4, tiles=5)
+            program.set_uniforms(narrowing=narrowing)
         quad.render(moderngl.TRIANGLES, vertices=3)
 
     def update_fallback_views(self, field: LightFieldTexture) -> None:
@@ -347,10 +360,8 @@ def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
     return tuple(str(name) for name in (*names, *by_lens) if name)
 
 
-def _nudge(target: RenderTarget, layer: str) -> tuple[float, float]:
-    """From the middle of the four pixels that one of half the size covers to the first; see shaders/fullscreen.vert."""
-    width, height = target.framebuffer.size
-    return (-0.25 / width, -0.25 / height) if layer == "BLURRED" else (0.0, 0.0)
+def _layers(lens: Lens) -> str:
+    return "LAYERS" if lens.keeps_layers else ""
 
 
 def _needs_reprojection(field: LightFieldTexture, lens: Lens, samples: list[ApertureSample]) -> bool:

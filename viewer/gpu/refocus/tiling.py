@@ -8,7 +8,7 @@ from itertools import product
 from viewer.model.layout import ScreenSize
 
 PART_PX = 2048
-"""A part is no larger than this: its targets take about 50 bytes a pixel."""
+"""A part is no larger than this: its targets take about 70 bytes a pixel."""
 
 MARGIN_PX = 128
 """Farther than smoothing reaches, see shaders/smooth.frag."""
