@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.depth.editing.brush import DepthCanvas
+from iibr_core.depth.editing.canvas import DepthCanvas
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.resources import resource_folder

@@ -25,7 +25,7 @@ from viewer.model.layout import Layout, Rect, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.lens.limits import focus_limits
 from viewer.model.state.app_state import AppState, Hover, ReadTruthTask, Scene, Source, source_beside, source_with_map
-from viewer.model.state.depth_editing import DropStroke, Paint, SetBrush
+from viewer.model.state.depth_editing import DepthSample, DropStroke, Paint, PickDepth, SetBrush
 from viewer.model.state.inspection import MoveDivider, ShowGrid
 from viewer.model.state.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, SetFocus
 from viewer.model.zoom import SetZoom
@@ -232,7 +232,9 @@ def _zoom_actions(pointer: Pointer, layout: Layout, frame: Rect) -> list[Action]
 def _paint_actions(
     pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
 ) -> list[Action]:
-    """Paint on the surface under the pointer, wherever it lies in the photo; the wheel makes the brush larger."""
+    """Paint on the surface under the pointer, wherever it lies in the photo, or with Ctrl pick its depth; the wheel
+    makes the brush larger.
+    """
     frame = layout.frame or picture
     if pointer.wheel and frame.contains(pointer.x, pointer.y):
         return [SetBrush(replace(state.brush, radius=state.brush.radius * BRUSH_NOTCH**pointer.wheel))]
@@ -242,7 +244,10 @@ def _paint_actions(
     x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
     disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
     x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
-    return [Paint(((x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height))]
+    place = (x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height
+    if state.stroke is None and pointer.holds_ctrl:
+        return [PickDepth(DepthSample(place, disparity))]
+    return [Paint(place)]
 
 
 def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:

@@ -35,7 +35,7 @@ from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.depth_editing import DepthSettings
 
 if TYPE_CHECKING:
-    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.editing.canvas import DepthCanvas
     from iibr_core.depth.search import PhotoWithDepth
 
 TELL_EVERY_S = 0.1
@@ -225,7 +225,7 @@ def still_disparity(source: Source, before_strokes: FloatImage) -> float:
 
 def prepare_brush() -> None:
     """Have the brush compiled, so that the first stroke does not wait for it."""
-    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.editing.canvas import DepthCanvas
     from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 
     strokes = tuple(Stroke(tool, ((0.5, 0.5),), 0.1, 0.5) for tool in BRUSH_TOOLS)
@@ -240,7 +240,7 @@ def _prepare(
     file: tuple[ImageSize, tuple[int, ...]],
     should_stop: ShouldStop,
 ) -> LoadedPhoto:
-    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.editing.canvas import DepthCanvas
 
     values = found.disparity
     canvas = DepthCanvas(found.photo.pixels, values.values)
@@ -253,7 +253,7 @@ def _prepare(
 
 
 def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> LoadedPhoto:
-    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.editing.canvas import DepthCanvas
     from iibr_core.depth.refine import refine
 
     values = loaded.found.values

@@ -16,7 +16,7 @@ from viewer.model.reducers.depth_editing import current_depth_settings
 from viewer.model.state.app_state import AppState, Scene
 
 if TYPE_CHECKING:
-    from iibr_core.depth.editing.brush import DepthCanvas
+    from iibr_core.depth.editing.canvas import DepthCanvas
 
 
 class DepthPreview:
@@ -45,7 +45,7 @@ class DepthPreview:
 
     def _field_disparity(self, edits: DepthEdits, scene: Scene, loaded: LoadedPhoto) -> np.ndarray:
         """In px per view step of the plan that the views before were made with."""
-        from iibr_core.depth.editing.brush import DepthCanvas
+        from iibr_core.depth.editing.canvas import DepthCanvas
 
         assert scene.plan is not None
         self._canvas = self._canvas or DepthCanvas(loaded.photo.pixels, loaded.refined.values)

@@ -86,7 +86,13 @@ COMPARE_WORDS: dict[Comparison, str] = {
     "kept": "Compare with the kept state",
     "difference": "Difference to the kept state",
 }
-BRUSH_WORDS: dict[BrushTool, str] = {"nearer": "Nearer", "farther": "Farther", "smooth": "Smooth"}
+BRUSH_WORDS: dict[BrushTool, str] = {
+    "nearer": "Nearer",
+    "farther": "Farther",
+    "smooth": "Smooth",
+    "level": "Level",
+    "fill": "Bucket",
+}
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
 
 

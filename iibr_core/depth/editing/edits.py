@@ -13,8 +13,10 @@ import numpy as np
 
 from iibr_core.types import FloatImage, InputError
 
-BrushTool = Literal["nearer", "farther", "smooth"]
-BRUSH_TOOLS: tuple[BrushTool, ...] = ("nearer", "farther", "smooth")
+BrushTool = Literal["nearer", "farther", "smooth", "level", "fill"]
+BRUSH_TOOLS: tuple[BrushTool, ...] = ("nearer", "farther", "smooth", "level", "fill")
+DEPTH_TOOLS: tuple[BrushTool, ...] = ("level", "fill")
+"""Those that lead to one depth, taken from some place: along the stroke, or of the surface under it (the bucket)."""
 
 GAMMA_LIMITS = (0.25, 4.0)
 RADIUS_LIMITS = (0.002, 0.25)
@@ -36,13 +38,15 @@ class Stroke:
 
     points: its path, (x, y) as shares of the photo's width and height (0 = left or top border). radius: as a share of
     the photo's width. strength: 0..1; of "nearer" and "farther" the share of the map's range that its middle is moved,
-    of "smooth" how far it goes to the smoothed map.
+    of "smooth" how far it goes to the smoothed map, of "level" and "fill" to the depth that was before the stroke at
+    the place `taken_from`, None: where the stroke begins.
     """
 
     tool: BrushTool
     points: tuple[tuple[float, float], ...]
     radius: float
     strength: float
+    taken_from: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,8 @@ def require_sound(edits: DepthEdits) -> None:
         if stroke.tool not in BRUSH_TOOLS or not 1 <= len(stroke.points) <= MOST_POINTS:
             raise InputError(f"depth edits: a stroke {stroke.tool!r} with {len(stroke.points)} points; paint it anew")
         checks += [("brush radius", stroke.radius, RADIUS_LIMITS), ("brush strength", stroke.strength, (0.0, 1.0))]
-        checks += [("place of a stroke", at, (-inf, inf)) for point in stroke.points for at in point]
+        places = (*stroke.points, *([stroke.taken_from] if stroke.taken_from else []))
+        checks += [("place of a stroke", at, (-inf, inf)) for place in places for at in place]
     for name, value, (low, high) in checks:
         if not (isfinite(value) and low <= value <= high):
             raise InputError(f"depth edits: {name} {value} is not from {low:g} to {high:g}")
@@ -114,7 +119,7 @@ def extent_of(disparity: FloatImage) -> tuple[float, float]:
 
 
 def apply_tone(disparity: FloatImage, edits: DepthEdits, extent: tuple[float, float] | None = None) -> FloatImage:
-    """The map (H, W), inverted, clipped and bent; its strokes are left to `brush.edited`. Edits must be sound.
+    """The map (H, W), inverted, clipped and bent; its strokes are left to `canvas.DepthCanvas`. Edits must be sound.
 
     extent: see `extent_of`, of this map where None. What is not finite is the far end. Values keep their order
     (inverted ones the opposite); those beyond the extent stay beyond it unless they are clipped. Without edits, finite

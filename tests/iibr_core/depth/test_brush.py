@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from dataclasses import replace
 from math import floor, hypot
 
 import numpy as np
@@ -10,17 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iibr_core.depth.editing.brush import (
+from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
+from iibr_core.depth.editing.smoothing import smooth_within_contours
+from iibr_core.depth.editing.stroke_distance import (
     CONTOUR_CONTRAST,
+    GUIDE_STEPS,
     LIKENESS,
-    DepthCanvas,
-    apply_edits,
     falloff,
-    smooth_within_contours,
+    guide_of,
     stroke_colours,
     stroke_distance,
 )
-from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
 from iibr_core.types import InputError
 
 HEIGHT, WIDTH = 30, 40
@@ -52,7 +54,8 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
     distance = np.ones((height, width))
     distance[row, column] = hypot(column - (x * width - 0.5), row - (y * height - 0.5)) / radius
     waiting = [(distance[row, column], row, column)]
-    colors = stroke_colours(photo, stroke, 0)
+    guide = guide_of(photo)
+    photo, colors = guide[1:-1, 1:-1] / GUIDE_STEPS, stroke_colours(guide, stroke, 0).T / GUIDE_STEPS
     away = np.linalg.norm(photo[:, :, None] - colors, axis=3).min(axis=2)
     unlike = np.maximum(away - LIKENESS, 0)  # of blocks of 5 x 5: there are no specks but at the window's border
     while waiting:
@@ -78,7 +81,7 @@ def test_distances_are_shortest_ways(seed: int, radius: float, x: float, y: floa
     rng = np.random.default_rng(seed)
     photo = rng.uniform(0, 0.4, (HEIGHT // 5, WIDTH // 5, 3)).repeat(5, 0).repeat(5, 1).astype(np.float32)
     stroke = dab(x=x, y=y, radius=radius)
-    np.testing.assert_allclose(stroke_distance(photo, stroke), slow_distance(photo, stroke), atol=1e-5)
+    np.testing.assert_allclose(stroke_distance(guide_of(photo), stroke), slow_distance(photo, stroke), atol=1e-5)
 
 
 @pytest.mark.parametrize(("tool", "sign"), [("nearer", 1), ("farther", -1)])
@@ -108,16 +111,16 @@ def test_a_stroke_does_not_cross_a_contour(tool: BrushTool) -> None:
 def test_noise_is_no_contour() -> None:
     rng = np.random.default_rng(0)
     photo = np.clip(0.5 + rng.normal(0, 0.005, (HEIGHT, WIDTH, 3)), 0, 1).astype(np.float32)
-    plain = stroke_distance(np.full_like(photo, 0.5), dab())
-    assert np.abs(falloff(stroke_distance(photo, dab())) - falloff(plain)).max() < 0.15
+    plain = stroke_distance(guide_of(np.full_like(photo, 0.5)), dab())
+    assert np.abs(falloff(stroke_distance(guide_of(photo), dab())) - falloff(plain)).max() < 0.15
 
 
 def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
     photo = plain_photo(0.9, 0.9)
     photo[:, : WIDTH // 2 : 2] = 0.1
     photo[:, 1 : WIDTH // 2 : 2] = 0.4
-    near = falloff(stroke_distance(photo, dab(x=0.25)))
-    plain = falloff(stroke_distance(np.full_like(photo, 0.5), dab(x=0.25)))
+    near = falloff(stroke_distance(guide_of(photo), dab(x=0.25)))
+    plain = falloff(stroke_distance(guide_of(np.full_like(photo, 0.5)), dab(x=0.25)))
     np.testing.assert_allclose(near[:, : WIDTH // 2], plain[:, : WIDTH // 2], atol=1e-5)
     assert not near[:, WIDTH // 2 :].any()
 
@@ -145,6 +148,7 @@ strokes = st.builds(
     st.lists(st.tuples(st.floats(-0.2, 1.2), st.floats(-0.2, 1.2)), min_size=1, max_size=4).map(tuple),
     st.floats(0.01, 0.25),
     st.floats(0, 1),
+    st.none() | st.tuples(st.floats(-0.2, 1.2), st.floats(-0.2, 1.2)),
 )
 edits = st.builds(
     lambda inverted, gamma, strokes: DepthEdits(inverted, gamma=gamma, strokes=tuple(strokes)),
@@ -159,7 +163,7 @@ def begun(wanted: DepthEdits, points: int) -> DepthEdits:
     if not wanted.strokes:
         return wanted
     last = wanted.strokes[-1]
-    short = Stroke(last.tool, last.points[:points], last.radius, last.strength)
+    short = replace(last, points=last.points[:points])
     return DepthEdits(wanted.is_inverted, gamma=wanted.gamma, strokes=(*wanted.strokes[:-1], short))
 
 
@@ -184,6 +188,31 @@ def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdi
             np.testing.assert_array_equal(shown, before, "what was handed out must not change")
 
 
+@pytest.mark.parametrize("tool", DEPTH_TOOLS)
+def test_level_and_bucket_lead_to_the_depth_where_they_begin_or_to_one_taken_elsewhere(tool: BrushTool) -> None:
+    photo, disparity = plain_photo(), plane()
+    for taken_from, at in ((None, int(0.3 * WIDTH)), ((0.9, 0.1), int(0.9 * WIDTH)), ((7.0, -2.0), WIDTH - 1)):
+        stroke = replace(dab(tool, x=0.3, strength=1.0), taken_from=taken_from)
+        result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke,)))
+        assert result[HEIGHT // 2, int(0.3 * WIDTH)] == pytest.approx(disparity[0, at], abs=0.02)
+        np.testing.assert_array_equal(result[:, WIDTH // 2 :], disparity[:, WIDTH // 2 :])
+
+
+def test_the_bucket_fills_the_whole_surface_and_as_far_as_its_strength() -> None:
+    photo, disparity = plain_photo(), plane()
+    stroke = replace(dab("fill", x=0.1, radius=0.05, strength=0.5), taken_from=(0.9, 0.5))
+    result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke,)))
+    half_way = (disparity + disparity[0, int(0.9 * WIDTH)]) / 2
+    np.testing.assert_allclose(result[:, : WIDTH // 2], half_way[:, : WIDTH // 2], atol=1e-6)
+    np.testing.assert_array_equal(result[:, WIDTH // 2 :], disparity[:, WIDTH // 2 :])
+
+
+def test_dragged_over_an_edge_the_bucket_fills_both_sides() -> None:
+    stroke = Stroke("fill", ((0.2, 0.5), (0.8, 0.5)), 0.05, 1.0)
+    result = apply_edits(plain_photo(), plane(), DepthEdits(strokes=(stroke,)))
+    np.testing.assert_array_equal(result, np.full_like(result, result[0, 0]))
+
+
 def test_the_map_before_strokes_is_not_painted() -> None:
     photo, disparity = plain_photo(), plane()
     canvas = DepthCanvas(photo, disparity)
@@ -197,7 +226,7 @@ def test_tiny_photos_can_be_painted_on(shape: tuple[int, int], tool: BrushTool) 
     photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
     result = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, 0.5, 0.5, 0.25),)))
     assert np.isfinite(result).all()
-    assert tool == "smooth" or result.any()
+    assert tool in ("smooth", *DEPTH_TOOLS) or result.any()
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)

@@ -101,6 +101,31 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
     np.testing.assert_array_equal(disparity_of(viewer.app), made)
 
 
+def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_elsewhere(viewer: Driver) -> None:
+    given = disparity_of(viewer.app).copy()
+    viewer.app.do(SetBrush(Brush(radius=0.15)))
+    viewer.press("Bucket")
+    viewer.until(lambda app: app.state.brush.is_on)
+    viewer.send("mousemove", *viewer.position(0.1, 0.9))
+    viewer.until_idle()
+    viewer.send("keydown", "ctrl", "mousedown", 1)
+    viewer.until(lambda app: app.state.brush.sample is not None)
+    viewer.send("mouseup", 1, "keyup", "ctrl")
+    viewer.until_idle()
+    assert viewer.app.state.brush.tool == "fill"
+    np.testing.assert_array_equal(disparity_of(viewer.app), given)
+    press_at(viewer, 0.5, 0.5)
+    viewer.send("mouseup", 1)
+    viewer.until(lambda app: app.state.stroke is None and is_made(app))
+    viewer.until_idle()
+    is_far = np.isclose(disparity_of(viewer.app), FAR)
+    assert is_far[given == FAR].all()
+    assert is_far[given == NEAR].mean() > 0.7
+    viewer.send("key", "ctrl+z")
+    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
+    np.testing.assert_array_equal(disparity_of(viewer.app), given)
+
+
 def test_the_disparity_as_colours_follows_the_brush(viewer: Driver) -> None:
     viewer.app.do(SetOverlay("disparity"), SetOpacity(1.0), SetBrush(Brush("farther", 0.1, 1.0, is_on=True)))
     viewer.until_idle()
@@ -169,7 +194,7 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
     assert 0 < viewer.app.state.depth.edits.far_clip < 0.5
     assert viewer.app.state.generation == 2
     # where `find` looks
-    viewer.app.do(SetTone(replace(viewer.app.state.depth.edits, near_clip=0.73), is_finished=True), EndGesture())
+    viewer.app.do(SetTone(replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True), EndGesture())
     viewer.until(is_made)
     viewer.until_idle()
     x, y = viewer.find("handle near_clip")

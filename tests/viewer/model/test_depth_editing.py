@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.editing.edits import GAMMA_LIMITS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
+from iibr_core.depth.editing.edits import (
+    DEPTH_TOOLS,
+    GAMMA_LIMITS,
+    RADIUS_LIMITS,
+    UNEDITED,
+    BrushTool,
+    DepthEdits,
+    Stroke,
+)
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import GridShape, ImageSize, InputError
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
@@ -22,16 +30,18 @@ from viewer.background.loaded_photo import apply_depth_settings, load_photo, mak
 from viewer.background.scene_worker import SceneRequest, results_of
 from viewer.model.actions import AskToSave, EndGesture, OpenFailed, OpenPath, Redo, SceneOpened, Undo
 from viewer.model.commands import BY_NAME, action_for_path
-from viewer.model.layout import layout_of
+from viewer.model.layout import ScreenSize, layout_of
 from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.state.app_state import AppState, DepthOrigin, PathPrompt, SavePrompt, Source
 from viewer.model.state.depth_editing import (
     Brush,
+    DepthSample,
     DepthSettings,
     DropStroke,
     Paint,
+    PickDepth,
     ResetDepth,
     SetBrush,
     SetRefine,
@@ -42,6 +52,7 @@ from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
 GRID = GridShape(3, 3)
 TONE = DepthEdits(True, 0.1, 0.9, 2.0)
+SAMPLE = DepthSample((0.7, 0.2), 1.5)
 STROKE = Stroke("nearer", ((0.2, 0.5), (0.8, 0.5)), 0.05, 0.5)
 
 
@@ -90,6 +101,7 @@ def test_clips_do_not_cross_and_values_are_clamped() -> None:
         SetRefine(float("inf"), True),
         SetBrush(Brush(radius=float("nan"))),
         Paint((float("nan"), 0.0)),
+        PickDepth(DepthSample((0.5, 0.5), float("inf"))),
     ],
     ids=lambda action: type(action).__name__,
 )
@@ -113,6 +125,35 @@ def test_a_stroke_becomes_an_edit_when_the_pointer_goes_up() -> None:
     assert reduce(twice, Undo()).depth == ended.depth
     assert after(twice, Undo(), Undo()).depth == start.depth
     assert after(twice, Undo(), Undo(), Redo(), Redo()).depth == twice.depth
+
+
+@pytest.mark.parametrize("tool", DEPTH_TOOLS)
+def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens(tool: BrushTool) -> None:
+    start = reduce(opened(), SetBrush(Brush(tool, strength=0.2, is_on=True)))
+    stroke = reduce(start, Paint((0.1, 0.1))).stroke
+    assert stroke is not None
+    assert (stroke.strength, stroke.taken_from) == (1.0, None)
+    picked = reduce(start, PickDepth(SAMPLE))
+    stroke = reduce(picked, Paint((0.1, 0.1))).stroke
+    assert stroke is not None
+    assert (stroke.tool, stroke.taken_from) == (tool, SAMPLE.place)
+    settings = replace(UNEDITED, strokes=(stroke,))
+    saved = settings_of(replace(picked, depth=DepthSettings(edits=settings)), ScreenSize(10, 10))
+    assert settings_from_text(settings_text(saved), "a").depth_edits == settings
+    elsewhere = reduce(picked, SceneOpened(picked.generation, scene_of(GRID, source=Source("b.png"))))
+    assert elsewhere.brush.sample is None
+
+
+def test_picking_a_depth_takes_the_tool_in_hand_that_gives_it() -> None:
+    picked = reduce(opened(), PickDepth(SAMPLE))
+    assert picked.brush.tool == "level"
+    moved = after(picked, SetBrush(replace(picked.brush, tool="smooth")), Paint((0.1, 0.1))).stroke
+    assert moved is not None
+    assert moved.taken_from is None
+    pointer, layout = pointer_at(0.5, 0.25, is_down=True, is_pressed=True, holds_ctrl=True)
+    (action,) = actions_from_pointer(pointer, layout, opened(), lambda x, y: 3.0)  # type: ignore[arg-type]
+    assert isinstance(action, PickDepth)
+    assert action.sample == DepthSample(pytest.approx((0.5, 0.25)), 3.0)  # type: ignore[arg-type]
 
 
 def test_escape_takes_a_stroke_back_then_puts_the_brush_away() -> None:

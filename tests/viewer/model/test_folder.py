@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from tests.viewer.model.test_reducers import scene_of
+from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.reducers.folder import filmstrip_range, in_order, photos_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Source
@@ -49,6 +51,19 @@ def test_steps_do_nothing_where_no_photo_of_the_folder_is_open() -> None:
     elsewhere = replace(state_at("img_9.jpg"), source=Source("/other/img_9.jpg"))
     for state in (AppState(), elsewhere, state_at("gone.jpg")):
         assert reduce(state, StepPhoto(1)) is state
+
+
+def test_a_walk_through_a_folder_leaves_one_recent_file() -> None:
+    state = replace(state_at("img_9.jpg"), recent=("/other/a.jpg", "/other/b.jpg"))
+    state = reduce(state, SceneOpened(0, scene_of(source=Source("/photos/img_9.jpg"))))
+    for _ in range(2):
+        state = reduce(state, StepPhoto(1))
+        assert state.source is not None
+        state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
+    assert state.recent == ("/photos/IMG_11.jpg", "/other/a.jpg", "/other/b.jpg")
+    state = reduce(state, OpenPath(Source("/photos/img_9.jpg")))
+    state = reduce(state, SceneOpened(state.generation, scene_of(source=Source("/photos/img_9.jpg"))))
+    assert state.recent[:2] == ("/photos/img_9.jpg", "/photos/IMG_11.jpg")
 
 
 def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step() -> None:

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.choice import BETTER_WAYS, DepthOrigin
-from iibr_core.depth.editing.edits import DepthEdits, Stroke
+from iibr_core.depth.editing.edits import BrushTool, DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.display.depth_preview import DepthPreview
 from viewer.model.actions import AskToSave, SetFontScale, SetHover, SetTheme
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState, Hover, Theme
-from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
+from viewer.model.state.depth_editing import Brush, DepthSample, SetBrush, SetTone
 from viewer.model.state.inspection import SetOpacity, SetOverlay
 
 SIZE = 640, 800
@@ -64,8 +64,12 @@ def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: Headle
 
 
 @pytest.mark.parametrize("scale", [0.8, 1.5, 2.0])
-def test_the_panel_ends_at_its_border_at_any_size_of_text(viewer: HeadlessViewer, scale: float) -> None:
-    viewer.do(SetFontScale(scale), SetBrush(Brush(is_on=True)))
+@pytest.mark.parametrize("tool", ["nearer", "fill"])
+def test_the_panel_ends_at_its_border_at_any_size_of_text(
+    viewer: HeadlessViewer, scale: float, tool: BrushTool
+) -> None:
+    sample = DepthSample((0.5, 0.5), 1.0)
+    viewer.do(SetFontScale(scale), SetBrush(Brush(tool, is_on=True, sample=sample)))
     panel = viewer.screen((900, 1800))[:, -int(PANEL_WIDTH * scale) :]
     ground = panel[2:-2, 3]
     assert (ground == ground[0]).all(), "nothing reaches over the left border"

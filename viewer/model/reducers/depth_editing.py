@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from math import hypot, isfinite
 
-from iibr_core.depth.editing.edits import GAMMA_LIMITS, MOST_POINTS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
+from iibr_core.depth.editing.edits import (
+    DEPTH_TOOLS,
+    GAMMA_LIMITS,
+    MOST_POINTS,
+    RADIUS_LIMITS,
+    UNEDITED,
+    DepthEdits,
+    Stroke,
+)
 from viewer.model.lens.limits import clamp
 from viewer.model.reducers.history import record_edit
 from viewer.model.reducers.notices import add_notice
@@ -16,6 +24,7 @@ from viewer.model.state.depth_editing import (
     DepthSettings,
     DropStroke,
     Paint,
+    PickDepth,
     ResetDepth,
     SetBrush,
     SetRefine,
@@ -47,6 +56,9 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
             return replace(state, brush=_clamp_brush(brush))
         case Paint(place) if all(map(isfinite, place)):
             return _paint(state, place)
+        case PickDepth(sample) if all(map(isfinite, (*sample.place, sample.disparity))):
+            tool = state.brush.tool if state.brush.tool in DEPTH_TOOLS else "level"
+            return replace(state, brush=replace(state.brush, tool=tool, sample=sample))
         case DropStroke() if state.stroke is not None:
             # the worker was stopped when the stroke began
             return replace(state, stroke=None, generation=state.next_generation)
@@ -95,7 +107,10 @@ def _paint(state: AppState, place: tuple[float, float]) -> AppState:
     scene, stroke, brush = state.scene, state.stroke, state.brush
     assert scene is not None
     if stroke is None:
-        return replace(state, stroke=Stroke(brush.tool, (place,), brush.radius, brush.strength))
+        is_whole = brush.tool in DEPTH_TOOLS  # half the way to a depth would be no depth that anybody chose
+        taken_from = brush.sample.place if brush.sample is not None and is_whole else None
+        stroke = Stroke(brush.tool, (place,), brush.radius, 1.0 if is_whole else brush.strength, taken_from)
+        return replace(state, stroke=stroke)
     last = stroke.points[-1]
     step = hypot(place[0] - last[0], (place[1] - last[1]) * scene.height / scene.width)
     if step < POINT_SPACING * stroke.radius or len(stroke.points) >= MOST_POINTS:

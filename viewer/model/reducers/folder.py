@@ -49,6 +49,11 @@ def photo_after(state: AppState, steps: int) -> Source | None:
     return source_beside(state.source, str(PurePath(folder.path) / folder.photos[wanted].name))
 
 
+def is_stepped_to(folder: PhotoFolder | None, source: Source) -> bool:
+    """Whether this is what the last step from photo to photo asked for."""
+    return folder is not None and str(PurePath(folder.path) / folder.stepped_to) == source.path
+
+
 def photos_ahead(state: AppState) -> tuple[Source, ...]:
     """What will be wanted soon, the likeliest first."""
     step = state.folder.step if state.folder is not None else 1

@@ -225,7 +225,8 @@ def _step_photo(state: AppState, steps: int) -> AppState:
     source = photo_after(state, steps)
     if source is None or state.folder is None:
         return state
-    folder = replace(state.folder, step=1 if steps > 0 else -1, scrolled=0)
+    name = PurePath(source.path).name
+    folder = replace(state.folder, step=1 if steps > 0 else -1, stepped_to=name, scrolled=0)
     return _file_or_prompt(replace(state, folder=folder), OpenPath(source))
 
 

@@ -8,6 +8,7 @@ from pathlib import PurePath
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerEvent
+from viewer.model.reducers.folder import is_stepped_to
 from viewer.model.reducers.history import map_optics
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
@@ -70,7 +71,10 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     # the same file, opened again, is new
     notices = (*map(notice_in_window, scene.notes), *_offers(scene))[-NOTICES_KEPT:]
     motion = Motion(speed=state.motion.speed)
-    recent = remember_recent(state.recent, scene.source.path)
+    recent = state.recent
+    if old is not None and is_stepped_to(state.folder, scene.source):
+        recent = tuple(path for path in recent if path != old.source.path)  # or a walk would be all that is left there
+    recent = remember_recent(recent, scene.source.path)
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection, zoom=None)
     depth = DepthSettings(scene.source.depth.refine)
@@ -85,6 +89,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         recent=recent,
         depth=depth,
         stroke=None,
+        brush=replace(state.brush, sample=None),
         saved_edits=UNEDITED,
         has_chosen_focus=False,
         has_chosen_aperture=False,

@@ -19,13 +19,25 @@ class DepthSettings:
 
 
 @dataclass(frozen=True)
+class DepthSample:
+    """A place whose depth was picked, (x, y) as shares of the photo's width and height; the disparity seen there."""
+
+    place: tuple[float, float]
+    disparity: float
+
+
+@dataclass(frozen=True)
 class Brush:
-    """What dragging over the picture does while it is on. radius, strength: see `Stroke`."""
+    """What dragging over the picture does while it is on. radius, strength: see `Stroke`.
+
+    sample: where the depth is taken from that "level" and "fill" lead to, None: where the stroke begins.
+    """
 
     tool: BrushTool = "nearer"
     radius: float = 0.03
     strength: float = 0.25
     is_on: bool = False
+    sample: DepthSample | None = None
 
 
 @dataclass(frozen=True)
@@ -61,6 +73,13 @@ class Paint:
 
 
 @dataclass(frozen=True)
+class PickDepth:
+    """Have the brush lead to the depth of this place."""
+
+    sample: DepthSample
+
+
+@dataclass(frozen=True)
 class DropStroke:
     """Take the stroke under way back."""
 
@@ -70,4 +89,4 @@ class ResetDepth:
     """Depth as it was found and opened."""
 
 
-DepthAction = SetRefine | SetTone | SetBrush | Paint | DropStroke | ResetDepth
+DepthAction = SetRefine | SetTone | SetBrush | Paint | PickDepth | DropStroke | ResetDepth

@@ -23,12 +23,14 @@ class FolderPhoto:
 class PhotoFolder:
     """A folder and its photos, in the order in which one goes through them. step: of the last, 1 or -1.
 
-    scrolled: the filmstrip shows what lies so many photos after the one that is open.
+    stepped_to: the name of the photo that the last step asked for, "" before the first. scrolled: the filmstrip
+    shows what lies so many photos after the one that is open.
     """
 
     path: str
     photos: tuple[FolderPhoto, ...]
     step: int = 1
+    stepped_to: str = ""
     scrolled: int = 0
 
 

@@ -51,6 +51,7 @@ MOUSE = (
     ("Drop", "Open a photo, a folder, a disparity map"),
     ("Ctrl+click a slider", "Type a value"),
     ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
+    ("Ctrl+click with the depth brush", "Pick the depth that Level and Bucket give"),
     ("Gamepad", "Viewpoint, focus; triggers: aperture"),
     ("Esc", "Close what is open, put the brush away"),
 )

@@ -6,6 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
+from iibr_core.depth.editing.edits import DEPTH_TOOLS
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
@@ -15,6 +16,7 @@ from viewer.ui.style import DARK, pack_color
 
 RETICLE_RADIUS = 11.0
 HANDLE_RADIUS = 8.0
+SAMPLE_RADIUS = 6.0
 SHARP_WITHIN = 0.04
 """Of the scene's disparity: what lies this close to the plane of focus is called sharp."""
 
@@ -30,6 +32,7 @@ def overlays(state: AppState, layout: Layout) -> None:
     if state.tilt_handles is not None:
         _draw_handles(state.tilt_handles, layout, picture)
     if state.brush.is_on and scene.plan is not None:
+        _draw_sample(state, layout, picture)
         if state.hover is not None:
             _draw_brush(state, scene, state.hover, layout, picture)
     elif state.hover is not None and state.hover.disparity is not None:
@@ -95,11 +98,22 @@ def _draw_brush(state: AppState, scene: Scene, hover: Hover, layout: Layout, pic
     x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
     y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
     _ring(draw, x, y, max(state.brush.radius * picture.width, 2 * scale), scale, pack_color(DARK.text))
-    if state.brush.tool != "smooth":
+    if state.brush.tool in ("nearer", "farther"):
         arm = 4 * scale
         draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), pack_color(DARK.text), 1.5 * scale)
     if state.brush.tool == "nearer":
         draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), pack_color(DARK.text), 1.5 * scale)
+
+
+def _draw_sample(state: AppState, layout: Layout, picture: Rect) -> None:
+    """A small ring where the brush takes its depth from; it moves with what lies there."""
+    sample, eye, scene = state.brush.sample, state.optics.eye, state.scene
+    if sample is None or scene is None or state.brush.tool not in DEPTH_TOOLS:
+        return
+    x = picture.x + (sample.place[0] - sample.disparity * eye.s / scene.width) * picture.width
+    y = picture.y + (sample.place[1] - sample.disparity * eye.t / scene.height) * picture.height
+    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
+    _ring(draw, x, y, SAMPLE_RADIUS * scale, scale, pack_color(DARK.accent))
 
 
 def _draw_handles(handles: TiltHandles, layout: Layout, picture: Rect) -> None:

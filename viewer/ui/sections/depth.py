@@ -7,13 +7,13 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from iibr_core.depth.choice import DepthStart
-from iibr_core.depth.editing.edits import BRUSH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
 from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthStrength
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.state.app_state import AppState, ChooseTask, Scene, source_with_depth
-from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetRefine, SetTone
+from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
 from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
@@ -36,7 +36,11 @@ BRUSH_TIPS: dict[BrushTool, str] = {
     "nearer": "Drag over the picture to bring it nearer; strokes end at the photo's edges (B puts the brush away).",
     "farther": "Drag over the picture to push it away; strokes end at the photo's edges (B puts the brush away).",
     "smooth": "Drag over the picture to smooth its depth, along the photo's edges (B puts the brush away).",
+    "level": "Drag over the picture to give it one depth, up to the photo's edges (B puts the brush away).",
+    "fill": "Click a surface to give it one depth, up to edges of the photo and of depth (B puts the bucket away).",
 }
+
+TOOLS_A_ROW = 3
 
 
 def depth_line(scene: Scene, layout: Layout) -> None:
@@ -146,9 +150,9 @@ def _brush(state: AppState, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     imgui.text("Brush")
     spacing = 4 * layout.ui_scale
-    width = (imgui.get_content_region_avail().x - spacing * (len(BRUSH_TOOLS) - 1)) / len(BRUSH_TOOLS)
+    width = (imgui.get_content_region_avail().x - spacing * (TOOLS_A_ROW - 1)) / TOOLS_A_ROW
     for i, tool in enumerate(BRUSH_TOOLS):
-        if i:
+        if i % TOOLS_A_ROW:
             imgui.same_line(0, spacing)
         is_in_hand = brush.is_on and brush.tool == tool
         if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), BRUSH_TIPS[tool]):
@@ -158,9 +162,23 @@ def _brush(state: AppState, layout: Layout) -> list[Action]:
         tip = "Radius, of the photo's width (wheel over the picture)."
         size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, tip, is_logarithmic=True)
         actions += [] if size is None else [SetBrush(replace(brush, radius=size / 100))]
-        percent = slider("Strength", 100 * brush.strength, (0.0, 100.0), "%.0f %%", layout, "Of one stroke.")
-        actions += [] if percent is None else [SetBrush(replace(brush, strength=percent / 100))]
+        actions += _sample(brush, layout) if brush.tool in DEPTH_TOOLS else _strength(brush, layout)
     return actions
+
+
+def _strength(brush: Brush, layout: Layout) -> list[Action]:
+    percent = slider("Strength", 100 * brush.strength, (0.0, 100.0), "%.0f %%", layout, "Of one stroke.")
+    return [] if percent is None else [SetBrush(replace(brush, strength=percent / 100))]
+
+
+def _sample(brush: Brush, layout: Layout) -> list[Action]:
+    """Which depth the tool gives, and how to take another."""
+    if brush.sample is None:
+        quiet("Gives the depth where you press; Ctrl+click picks another.")
+        return []
+    quiet("Gives the depth of the marked place; Ctrl+click picks another.")
+    is_dropped = button("Forget it", layout, "Give the depth where you press, again.")
+    return [SetBrush(replace(brush, sample=None))] if is_dropped else []
 
 
 def _files(state: AppState, layout: Layout) -> list[Action]:

@@ -1,0 +1,189 @@
+"""A disparity map that follows its edits while they are made: tone, then the strokes of the brush, one on the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from iibr_core.depth.editing.edits import (
+    DEPTH_TOOLS,
+    UNEDITED,
+    BrushTool,
+    DepthEdits,
+    Stroke,
+    apply_tone,
+    extent_of,
+    require_sound,
+)
+from iibr_core.depth.editing.smoothing import smooth_within_contours, texture_contrast
+from iibr_core.depth.editing.stroke_distance import Guide, Window, falloff, guide_of, measure_from, radius_px
+from iibr_core.depth.editing.surface import surface_at
+from iibr_core.runtime.jit import kernel
+from iibr_core.types import FloatImage, ImageSize
+
+MAPS_KEPT = 8
+"""Of those before the last strokes: so many can be taken back at once."""
+SIGNS: dict[BrushTool, float] = {"nearer": 1.0, "farther": -1.0}
+MOST = float(np.finfo(np.float32).max)
+
+
+def apply_edits(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
+    """The map with all its edits: (H, W) float32, finite; the map itself where nothing is edited.
+
+    photo: (H, W, 3), sRGB-encoded, guides the strokes. disparity: (H, W), any unit in which larger is closer.
+    Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known.
+    """
+    return DepthCanvas(photo, disparity).apply(edits)
+
+
+class DepthCanvas:
+    """A map that follows its edits: where they only go on, only what is new is worked out.
+
+    `shown` gives the same as `apply_edits`, to the bit, whatever was shown before.
+    """
+
+    def __init__(self, photo: FloatImage, disparity: FloatImage) -> None:
+        """photo: (H, W, 3), sRGB-encoded; disparity: (H, W). Raises ValueError where the sizes differ."""
+        if photo.shape != (*disparity.shape, 3):
+            raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
+        self._photo, self._given = photo, np.asarray(disparity, np.float32)
+        self._guide: Guide | None = None
+        self._is_known = bool(np.isfinite(self._given).all())
+        self._extent: tuple[float, float] | None = None
+        self._edits = UNEDITED.tone
+        self._toned: FloatImage | None = None
+        self._values: FloatImage = self._given
+        self._open: _OpenStroke | None = None
+        self._trail: list[tuple[int, FloatImage]] = []  # (strokes, map) before the last ones, to go back to
+
+    def apply(self, edits: DepthEdits) -> FloatImage:
+        """The map with these edits, (H, W) float32; not to be written to. Raises InputError as `apply_edits` does."""
+        if edits == UNEDITED and self._is_known:
+            return self._given
+        require_sound(edits)
+        self._extent = self._extent or extent_of(self._given)
+        if self._toned is None or self._edits.tone != edits.tone:
+            self._toned = apply_tone(self._given, edits, self._extent)
+            self._forget(edits)
+        self._return_to(edits)
+        for stroke in edits.strokes[len(self._edits.strokes) :]:
+            self._begin(stroke)
+        return self._values
+
+    def before_strokes(self, edits: DepthEdits) -> FloatImage:
+        """The map without the strokes of these edits: what stays as it is where the brush does not go."""
+        self.apply(edits)
+        return self._given if self._toned is None else self._toned
+
+    def _forget(self, edits: DepthEdits) -> None:
+        assert self._toned is not None
+        self._edits, self._values, self._open = edits.tone, self._toned, None
+        self._trail.clear()
+
+    def _return_to(self, edits: DepthEdits) -> None:
+        """Keep of what was painted what these strokes begin with, and go on with the last one if it became longer."""
+        done, wanted = self._edits.strokes, edits.strokes
+        if wanted[: len(done)] == done:
+            return
+        alike = next((i for i, (a, b) in enumerate(zip(done, wanted)) if a != b), min(len(done), len(wanted)))
+        is_last = self._open is not None and alike == len(done) - 1 < len(wanted)
+        if is_last and _goes_on(done[-1], wanted[alike]):
+            self._go_on(wanted[alike], first=len(done[-1].points))
+            return
+        while self._trail and self._trail[-1][0] > alike:
+            self._trail.pop()
+        if not self._trail:
+            self._forget(edits)
+            return
+        count, self._values = self._trail.pop()
+        self._open, self._edits = None, replace(self._edits, strokes=done[:count])
+
+    def _begin(self, stroke: Stroke) -> None:
+        under = self._values
+        self._trail = [*self._trail, (len(self._edits.strokes), under)][-MAPS_KEPT:]
+        self._open = _OpenStroke(under, np.ones(under.shape, np.float32), self._target(stroke, under))
+        self._edits = replace(self._edits, strokes=(*self._edits.strokes, stroke))
+        self._paint(stroke, first=0)
+
+    def _go_on(self, stroke: Stroke, first: int) -> None:
+        self._edits = replace(self._edits, strokes=(*self._edits.strokes[:-1], stroke))
+        self._paint(stroke, first)
+
+    def _target(self, stroke: Stroke, under: FloatImage) -> FloatImage | None:
+        """The map that a stroke leads to, None where it moves what is there."""
+        if stroke.tool == "smooth":
+            radius = radius_px(stroke, ImageSize(*under.shape))
+            return smooth_within_contours(self._photo, under, radius, texture_contrast(self._photo))
+        if stroke.tool in DEPTH_TOOLS:
+            return np.full_like(under, _value_at(under, stroke.taken_from or stroke.points[0]))
+        return None
+
+    def _paint(self, stroke: Stroke, first: int) -> None:
+        """Lay the stroke on the map, from its point of this index on. Maps handed out before stay as they are."""
+        assert self._open is not None
+        assert self._extent is not None
+        under, distance, target = self._open.under, self._open.distance, self._open.target
+        values = self._values.copy()
+        for i in range(first, len(stroke.points)):
+            window = self._reach(stroke, i, self._open)
+            if target is None:
+                amount = stroke.strength * (self._extent[1] - self._extent[0]) * SIGNS[stroke.tool]
+                _move(values[window], under[window], distance[window], amount)
+            else:
+                _blend(values[window], under[window], target[window], distance[window], stroke.strength)
+        self._values = values
+
+    def _reach(self, stroke: Stroke, index: int, open_stroke: _OpenStroke) -> Window:
+        """Bring the distances up to the stroke's point of this index. Returns the window in which they changed."""
+        assert self._extent is not None
+        self._guide = guide_of(self._photo) if self._guide is None else self._guide
+        if stroke.tool != "fill":
+            return measure_from(self._guide, stroke, index, open_stroke.distance)
+        if _value_at(open_stroke.distance, stroke.points[index]) > 0:  # else it is filled already
+            surface = surface_at(self._guide, open_stroke.under, stroke, index, self._extent)
+            open_stroke.distance[surface] = 0
+        return np.s_[:, :]
+
+
+@dataclass(frozen=True, eq=False)
+class _OpenStroke:
+    """The last stroke, which may go on. under: the map without it. distance: of every pixel from it, 1 = out of reach.
+
+    target: the map that it leads to, None where it moves what is there.
+    """
+
+    under: FloatImage
+    distance: FloatImage
+    target: FloatImage | None
+
+
+def _value_at(values: FloatImage, place: tuple[float, float]) -> float:
+    """What lies at a place (x, y), as shares of width and height; at the border where it lies outside."""
+    height, width = values.shape
+    x, y = (min(max(share, 0.0), 1.0) for share in place)
+    return float(values[min(int(y * height), height - 1), min(int(x * width), width - 1)])
+
+
+def _goes_on(old: Stroke, new: Stroke) -> bool:
+    """Whether a stroke is another one, continued."""
+    return replace(new, points=old.points) == old and new.points[: len(old.points)] == old.points
+
+
+@kernel
+def _move(values, under, distance, amount):
+    """Lay a stroke that moves by an amount on what was there before."""
+    for y in range(distance.shape[0]):
+        for x in range(distance.shape[1]):
+            # In float64, which does not overflow.
+            values[y, x] = min(max(under[y, x] + falloff(distance[y, x]) * amount, -MOST), MOST)
+
+
+@kernel
+def _blend(values, under, target, distance, strength):
+    """Lay a stroke that leads to a target on what was there before."""
+    for y in range(distance.shape[0]):
+        for x in range(distance.shape[1]):
+            before = np.float64(under[y, x])
+            change = strength * (np.float64(target[y, x]) - before)
+            values[y, x] = min(max(before + falloff(distance[y, x]) * change, -MOST), MOST)

@@ -1,0 +1,131 @@
+"""The bucket's surface: its pieces against scipy's, and what bounds it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from iibr_core.depth.editing import surface
+from iibr_core.depth.editing.edits import Stroke
+from iibr_core.depth.editing.stroke_distance import guide_of
+from iibr_core.depth.editing.surface import EDGE, SPACE, SURFACE, surface_at
+
+HEIGHT, WIDTH = 60, 80
+
+
+def photo_of(color: float = 0.4) -> np.ndarray:
+    return np.full((HEIGHT, WIDTH, 3), color, np.float32)
+
+
+def filled(
+    photo: np.ndarray, disparity: np.ndarray | None = None, x: float = 0.1, y: float = 0.5, radius: float = 0.03
+):
+    disparity = np.zeros(photo.shape[:2], np.float32) if disparity is None else disparity
+    return surface_at(guide_of(photo), disparity, Stroke("fill", ((x, y),), radius, 1.0), 0, (0.0, 1.0))
+
+
+def test_a_photo_edge_ends_it_where_the_colours_change() -> None:
+    photo = photo_of()
+    photo[:, 50:] = 0.7
+    expected = np.zeros((HEIGHT, WIDTH), bool)
+    expected[:, :50] = True
+    np.testing.assert_array_equal(filled(photo), expected)
+    np.testing.assert_array_equal(filled(photo, x=0.9), ~expected)
+
+
+def test_a_blurred_edge_belongs_half_to_each_side() -> None:
+    photo = photo_of()
+    photo[:, 50:] = 0.8
+    photo = ndimage.gaussian_filter(photo, (0, 1, 0))
+    left, right = filled(photo), filled(photo, x=0.9)
+    assert not (left & right).any()
+    assert (left | right).all()
+    assert abs(int(left[30].sum()) - 50) <= 1
+
+
+def test_a_depth_edge_ends_it_where_the_photo_has_none() -> None:
+    disparity = np.zeros((HEIGHT, WIDTH), np.float32)
+    disparity[:, 30:] = 0.5
+    expected = disparity == 0
+    np.testing.assert_array_equal(filled(photo_of(), disparity), expected)
+
+
+def test_slanted_surfaces_and_soft_shades_are_one() -> None:
+    shade = np.linspace(0.3, 0.5, WIDTH, dtype=np.float32)
+    photo = np.broadcast_to(shade[:, None], (HEIGHT, WIDTH, 3)).copy()
+    assert filled(photo, np.broadcast_to(shade, (HEIGHT, WIDTH)).copy()).all()
+
+
+def test_what_turns_softly_into_another_colour_is_left() -> None:
+    shade = np.linspace(0.1, 0.9, WIDTH, dtype=np.float32)
+    mask = filled(np.broadcast_to(shade[:, None], (HEIGHT, WIDTH, 3)).copy())
+    assert mask[:, :10].all()
+    assert not mask[:, WIDTH // 2 :].any()
+
+
+def test_it_does_not_run_out_through_a_gap() -> None:
+    photo = photo_of()
+    photo[:, 38:42] = 0.9
+    photo[30:33, 38:42] = 0.4
+    mask = filled(photo)
+    assert mask[:, :34].all(), "its mouth is as near to edges as the gap itself"
+    assert not mask[:, 42:].any()
+
+
+def test_texture_under_the_brush_is_no_edge() -> None:
+    photo = photo_of(0.3)
+    photo[:, ::2] = 0.6
+    photo[:, 60:] = [0.1, 0.9, 0.1]
+    assert filled(photo, radius=0.1)[:, :58].all()
+    assert not filled(photo, radius=0.1)[:, 60:].any()
+
+
+def test_holes_smaller_than_the_brush_are_filled_and_larger_ones_are_not() -> None:
+    photo = photo_of()
+    photo[10:13, 40:43] = 0.9
+    photo[30:45, 40:60] = 0.9
+    mask = filled(photo)
+    assert mask[:25].all()
+    assert not mask[32:43, 42:58].any()
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.5), (0.51, 0.1)])
+def test_thin_surfaces_and_clicks_on_edges_give_something(place: tuple[float, float]) -> None:
+    photo = photo_of()
+    photo[:, 40:43] = 0.9
+    assert filled(photo, x=place[0], y=place[1]).any()
+
+
+@pytest.mark.parametrize("place", [(-0.1, 0.5), (0.5, 1.0), (1e30, 0.5)])
+def test_outside_the_photo_there_is_none(place: tuple[float, float]) -> None:
+    assert not filled(photo_of(), x=place[0], y=place[1]).any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_clearance_is_the_chessboard_distance(seed: int) -> None:
+    edges = np.random.default_rng(seed).random((23, 31)) < 0.03
+    clearance = np.empty(edges.shape, np.int32)
+    surface._measure_clearance(np.where(edges, EDGE, SPACE).astype(np.uint8), clearance)
+    np.testing.assert_array_equal(clearance, ndimage.distance_transform_cdt(~edges, "chessboard"))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_flooding_finds_what_hangs_together(seed: int) -> None:
+    space = np.random.default_rng(seed).random((23, 31)) < 0.7
+    row, column = np.argwhere(space)[len(space) // 2]
+    parts = np.where(space, SPACE, EDGE).astype(np.uint8)
+    surface._flood(parts.copy(), parts, row, column)
+    labels, _ = ndimage.label(space)
+    np.testing.assert_array_equal(parts == SURFACE, labels == labels[row, column])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_enclosed_holes_up_to_a_size_are_filled(seed: int) -> None:
+    whole = np.random.default_rng(seed).random((23, 31)) < 0.6
+    parts = np.where(whole, SURFACE, EDGE).astype(np.uint8)
+    surface._fill_holes(parts, 3.0)
+    labels, count = ndimage.label(~whole)
+    border = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    small = [i for i in range(1, count + 1) if (labels == i).sum() <= 3 and i not in border]
+    np.testing.assert_array_equal(parts == SURFACE, whole | np.isin(labels, small))
