@@ -1,0 +1,57 @@
+"""How much of a far, round light a rough surface shows: the GGX microfacet lobe (Walter et al. 2007), energy bounded.
+
+The light is no point: its disc widens the lobe, so that a mirror shows the light itself and nothing is brighter.
+"""
+
+from __future__ import annotations
+
+from math import radians, sin, sqrt
+
+import numpy as np
+
+from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.runtime.jit import kernel
+from iibr_core.types import FloatImage
+
+
+def lobe_widths(gloss: Gloss) -> tuple[float, float]:
+    """(squared width of the lobe, squared sine of the light's radius): what the lobe's shape depends on.
+
+    A disc of radius r under a mirror is a lobe of width r / 2, as far as its peak goes; roughness and disc add up as
+    the variances of independent slopes do.
+    """
+    disc = sin(radians(gloss.light.radius_deg)) ** 2
+    return gloss.roughness**4 + disc / 4, disc
+
+
+def unit_direction(gloss: Gloss) -> FloatImage:
+    """Towards the light: (3,), of length 1."""
+    direction = np.array(gloss.light.direction, np.float64)
+    return np.asarray(direction / np.linalg.norm(direction), np.float32)
+
+
+@kernel
+def reflected_share(nx, ny, nz, vx, vy, vz, lx, ly, lz, width2, disc, reflectance):
+    """The share of the light's radiance that a surface shows, 0..1: GGX, Smith's shadowing, Schlick's Fresnel term.
+
+    n: normal, v: towards the eye, l: towards the light, each of length 1. width2, disc: see `lobe_widths`.
+    """
+    n_l = nx * lx + ny * ly + nz * lz
+    n_v = nx * vx + ny * vy + nz * vz
+    if not (n_l > 0 and n_v > 0):
+        return 0.0  # the light is behind the surface, or the eye is
+    hx, hy, hz = vx + lx, vy + ly, vz + lz
+    length = sqrt(hx * hx + hy * hy + hz * hz)
+    if not length > 1e-6:
+        return 0.0
+    hx, hy, hz = hx / length, hy / length, hz / length
+    n_h, v_h = nx * hx + ny * hy + nz * hz, vx * hx + vy * hy + vz * hz
+    # 1 - (n.h)^2 as a cross product: near the peak of a narrow lobe the difference would be rounding
+    sx, sy, sz = ny * hz - nz * hy, nz * hx - nx * hz, nx * hy - ny * hx
+    spread = width2 * n_h * n_h + sx * sx + sy * sy + sz * sz
+    # the disc's irradiance / pi times D pi, the height-correlated G / (4 n.l n.v), and n.l
+    masking = n_l * sqrt(n_v * n_v * (1 - width2) + width2) + n_v * sqrt(n_l * n_l * (1 - width2) + width2)
+    seen = disc * width2 / (spread * spread) * 0.5 / masking * n_l
+    grazing = 1 - min(v_h, 1.0)
+    fresnel = reflectance + (1 - reflectance) * grazing * grazing * grazing * grazing * grazing
+    return fresnel * min(seen, 1.0)
