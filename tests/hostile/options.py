@@ -72,6 +72,7 @@ _screenshot = [
         ("--aperture", ("", "x", "nan", "-1")),
         ("--size", ("", "12", "0x5", "axb", "99999x1", f"{HUGE}x1")),
         ("--backend", ("", "vulkan")),
+        ("--gloss", ("", "missing", "photo.png", "map.pfm")),
         ("--quality", ("", "best", "Exact")),
         ("--inpaint", ("", "magic", "diffusion", "diffusion:", "patch:folder")),
         ("--depth-strength", ("", "nan", "1e300")),
@@ -119,6 +120,7 @@ _export = [
         (("--to", "anaglyph", "-o", "saved.png"), "--force"),
         (("--to", "anaglyph", "-o", "missing/new.png"), "missing"),
         (("--to", "anaglyph", "-o", "new.png", "--view", "1,1"), "--view"),
+        (("--to", "hci", "-o", "new", "--gloss", "missing"), "missing"),
     )
 ]
 

@@ -134,6 +134,8 @@ def results_of(
 
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:
     """What the viewer says about a photo and its plan."""
+    from iibr_core.rendering.gloss.geometry import infinity_of
+
     height, width = loaded.photo.size
     return Scene(
         source=source,
@@ -155,6 +157,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         inverse_metres=loaded.disparity.inverse_metres if loaded.depth_settings.edits == UNEDITED else None,
         color_space=loaded.photo.color_space,
         own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
+        infinity_px=(infinity_of(loaded.disparity) - plan.disparity_zero) * plan.disparity_scale,
     )
 
 

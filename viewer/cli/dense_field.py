@@ -15,7 +15,7 @@ from viewer.cli.view_writing import write_views
 if TYPE_CHECKING:
     from viewer.model.state.app_state import Source
 
-NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal"}
+NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
 """Options that say nothing about views between those of a light field."""
 
 

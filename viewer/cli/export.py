@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.rendering.gloss.settings import Gloss
 from viewer.app.exports.registry import export_path, require_export_place, writer_of
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import LensOptions
@@ -95,7 +96,7 @@ def export(
     if to.is_drawn:
         _export_drawn(source, scene.depth_strength, lens, require_place, write)
     else:
-        _export_undrawn(source, scene.depth_strength, not to.layout, require_place, write)
+        _export_undrawn(source, scene.depth_strength, lens.gloss, not to.layout, require_place, write)
 
 
 def _export_drawn(
@@ -123,6 +124,7 @@ def _export_drawn(
 def _export_undrawn(
     source: Source,
     depth_strength: float,
+    gloss: Gloss | None,
     needs_disparity: bool,
     require_place: Callable[[Scene], None],
     write: Callable[[ExportSource], None],
@@ -131,6 +133,6 @@ def _export_undrawn(
     from viewer.app.exports.opening import open_undrawn
 
     with show_progress("reading") as show:
-        made = open_undrawn(source, depth_strength, needs_disparity, require_place, show)
+        made = open_undrawn(source, depth_strength, needs_disparity, require_place, show, gloss)
     with show_progress("exporting") as show:
         write(replace(made, report_progress=show))

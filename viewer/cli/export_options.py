@@ -98,7 +98,8 @@ HEEDED_BY_SOME = {field.name for record in (LensOptions, KindOptions) for field 
 
 def require_kind(context: typer.Context, kind: ExportKind) -> None:
     """Raise InputError for options given that this kind would not heed, and where packages are missing for it."""
-    given = (given_options(context) & HEEDED_BY_SOME) - set(kind.heeds)
+    heeded = {*kind.heeds, "gloss"} if kind.has_colors else set(kind.heeds)
+    given = (given_options(context) & HEEDED_BY_SOME) - heeded
     if given:
         options = sorted(parameter.opts[0] for parameter in context.command.params if parameter.name in given)
         name = next(name for name, known in EXPORTS.items() if known is kind)

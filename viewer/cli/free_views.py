@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 OWN_FILES = r"view_\d{4,5}\.(png|exr)"
 NOT_WITH_POSES = {"format": "--format", "depth_strength": "--depth-strength", "with_disparity": "--with-disparity",
-                  "quality": "--quality"}  # fmt: skip
+                  "quality": "--quality", "gloss": "--gloss"}  # fmt: skip
 """Parameters of light fields alone. Weights are the closed form's."""
 MOST_UNLIKE = 0.02
 """So far the sides of a pose's picture and the photo's may differ in their ratio: smaller copies are rounded."""

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iibr_core.formats.light_fields.registry import is_light_field
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field import NOT_FOR_DENSE_FIELDS, write_dense_field
 from viewer.cli.free_views import require_heeded_with_poses, write_free_views
+from viewer.cli.lens_options import GlossFile
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
     Force,
@@ -54,6 +56,7 @@ def generate(
         typer.Option(min=1, metavar="N", help="Which of the poses is the photo's.", show_default="the middle one"),
     ] = None,
     format: LightFieldFormat = "hci",
+    gloss: GlossFile = None,
     literal: Annotated[
         bool | None,
         typer.Option(
@@ -91,11 +94,18 @@ def generate(
         write_dense_field(scene.source(path, grid), grid, out, format, with_disparity, force)
         return
     source = scene.source(path, grid, is_literal=scene.disparity is not None if literal is None else literal)
-    _write_light_field(source, grid, out, format, scene.depth_strength, with_disparity, force)
+    _write_light_field(source, grid, out, format, scene.depth_strength, gloss, with_disparity, force)
 
 
 def _write_light_field(
-    source: Source, grid: GridShape, out: Path, layout: str, depth_strength: float, with_disparity: bool, force: bool
+    source: Source,
+    grid: GridShape,
+    out: Path,
+    layout: str,
+    depth_strength: float,
+    gloss: Gloss | None,
+    with_disparity: bool,
+    force: bool,
 ) -> None:
     from iibr_core.formats.light_fields.registry import writer_for
 
@@ -106,7 +116,9 @@ def _write_light_field(
 
     from iibr_core.color import photo_in_srgb
     from iibr_core.generation.light_field import generate as generated
+    from viewer.background.gloss import add_gloss
     from viewer.background.loaded_photo import inpainting_aids, load_photo, make_plan
+    from viewer.background.scene_worker import scene_of_photo
 
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
@@ -120,8 +132,9 @@ def _write_light_field(
             generated(
                 photo_read, disparity_read, plan, inpaint=source.inpaint, aids=inpainting_aids(source, loaded, show)
             )
-        ) as views,
+        ) as made,
     ):
+        views = add_gloss(made, gloss, scene_of_photo(source, loaded, plan))
         said = write_views(views, writer, grid, loaded.photo.size, show)
     print(f"{said}: {out}")
     print_notes(loaded.photo.notes + loaded.disparity.notes + plan.notes)

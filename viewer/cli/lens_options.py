@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import InputError, ViewOffset
 from viewer.cli.options import not_negative_from_text, number_option, view_from_text
 
@@ -30,6 +32,28 @@ Aperture = Annotated[
 ]
 
 
+def gloss_from_text(text: str) -> Gloss:
+    """The gloss that a file describes. Raises BadParameter."""
+    from viewer.model.gloss_file import read_gloss
+
+    try:
+        return read_gloss(Path(text))
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+GlossFile = Annotated[
+    Gloss | None,
+    typer.Option(
+        "--gloss",
+        parser=gloss_from_text,
+        metavar="FILE",
+        help="Make a surface glossy: a TOML file with roughness, reflectance, [surface] and [light].",
+        show_default=False,
+    ),
+]
+
+
 @dataclass(frozen=True)
 class LensOptions:
     """What the options say about the lens, None where they say nothing."""
@@ -37,14 +61,16 @@ class LensOptions:
     view: View = None
     focus: Focus = None
     aperture: Aperture = None
+    gloss: GlossFile = None
 
     def actions(self) -> list[Action]:
         """What sets the lens so."""
-        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss
 
         actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
         actions += [] if self.focus is None else [SetFocus(self.focus)]
-        return actions + ([] if self.aperture is None else [SetAperture(self.aperture)])
+        actions += [] if self.aperture is None else [SetAperture(self.aperture)]
+        return actions + ([] if self.gloss is None else [SetGloss(self.gloss)])
 
     def require_within(self, scene: Scene) -> None:
         """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.

@@ -28,8 +28,8 @@ class ExportKind:
     """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
     names of the options about exports and the lens that mean something to it. path: makes the file's name what players
     expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
-    expression. needs: packages, of the extra `export`. frames: pictures of a
-    stack. rate: frames a second. most_width_px: of pictures whose size nobody chose, 0: any.
+    expression. needs: packages, of the extra `export`. frames: pictures of a stack. rate: frames a second.
+    most_width_px: of pictures whose size nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it.
     """
 
     words: str
@@ -43,6 +43,7 @@ class ExportKind:
     frames: int = 0
     rate: float = 0.0
     most_width_px: int = 0
+    has_colors: bool = True
 
     @property
     def is_drawn(self) -> bool:
@@ -87,8 +88,8 @@ EXPORTS = {
         "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK, frames=9
     ),
     "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",)),
-    "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity"),
-    "depth": ExportKind("Depth map", MAP, "maps:write_depth", path="maps:depth_path"),
+    "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity", has_colors=False),
+    "depth": ExportKind("Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False),
     "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians"),
     "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud"),
     "llff": ExportKind("Cameras, LLFF", (), "cameras:write_llff_folder", own_files=CAMERA_FILES),

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import msgspec
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
+from iibr_core.rendering.gloss.settings import require_sound as require_sound_gloss
 from iibr_core.types import GridShape, InputError, Quality
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import BLADES_LIMITS
@@ -67,7 +68,7 @@ def settings_text(settings: SavedSettings) -> str:
     """The settings as JSON."""
     whole = {
         "format": FORMAT,
-        "optics": settings.optics,
+        "optics": _text_of_optics(settings.optics),
         "depth_strength": settings.depth_strength,
         "source": _text_of_source(settings.source),
         "size_px": settings.size_px,
@@ -92,6 +93,8 @@ def settings_from_text(text: str, name: str) -> SavedSettings:
         read = msgspec.convert(whole, SettingsText)
         _require_sound_shape(read.optics.aperture_shape)
         require_sound(read.depth_edits)
+        if read.optics.gloss is not None:
+            require_sound_gloss(read.optics.gloss)
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
         raise InputError(
@@ -162,6 +165,13 @@ def unknown_note(settings: SavedSettings) -> str:
         return ""
     more = f" and {len(names) - UNKNOWN_TOLD} more" if len(names) > UNKNOWN_TOLD else ""
     return f"Its settings hold what this program does not know and leaves out: {', '.join(names[:UNKNOWN_TOLD])}{more}."
+
+
+def _text_of_optics(optics: Optics) -> dict[str, Any]:
+    """By field; a gloss only where there is one, without the path of its surroundings: that is on one machine only."""
+    fields = {field.name: getattr(optics, field.name) for field in dataclasses.fields(optics)}
+    gloss = fields.pop("gloss")
+    return fields if gloss is None else {**fields, "gloss": dataclasses.replace(gloss, environment="")}
 
 
 def _json_value(value: Any) -> Any:

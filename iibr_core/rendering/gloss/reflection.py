@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.gloss.surface import SceneGeometry
+from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.types import FloatImage
 
 MOST_TURN = 3.0
@@ -140,7 +140,7 @@ def _harmonics(normals: FloatImage) -> FloatImage:
 
 
 def _points(disparity: FloatImage, geometry: SceneGeometry) -> FloatImage:
-    """Points (H, W, 3) in view steps; see `iibr_core.rendering.gloss.surface`."""
+    """Points (H, W, 3) in view steps; see `iibr_core.rendering.gloss.geometry`."""
     height, width = disparity.shape
     y, x = np.mgrid[:height, :width].astype(np.float32)
     ray = np.stack([x - (width - 1) / 2, y - (height - 1) / 2, np.full_like(x, geometry.focal_px)], axis=-1)

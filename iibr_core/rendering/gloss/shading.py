@@ -13,10 +13,11 @@ import numpy as np
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb, stored_from_encoded
 from iibr_core.rendering.gloss.environment import prefilter_environment
+from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.rendering.gloss.microfacet import lobe_widths, reflected_share, unit_direction
 from iibr_core.rendering.gloss.reflection import reflected_light, reflection_disparity, separate_light
 from iibr_core.rendering.gloss.settings import Gloss, require_sound
-from iibr_core.rendering.gloss.surface import SceneGeometry, fit_normals, surface_mask
+from iibr_core.rendering.gloss.surface import fit_normals, surface_mask
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate, image_size

@@ -1,26 +1,16 @@
-"""Where a glossy surface lies in space, which way it faces, and which pixels belong to it.
-
-A light field has no metric scale. Lengths count in view steps, so that the eye of view (t, s) stands at (s, t, 0), the
-camera's axes being x right, y down, z away. With a focal length of f px, a disparity of d px per view step and
-d_inf that of what is infinitely far (0 unless the plane that stays still is another), a point lies at the distance
-Z = f / (d - d_inf), and the photo's pixel (x, y) shows ((x - cx) Z / f, (y - cy) Z / f, Z). No other number is needed
-for the way that viewing directions change from view to view.
-"""
+"""Which way a glossy surface faces, and which pixels belong to it."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.rendering.gloss.settings import GlossStroke, GlossSurface
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
-LEAST_NEARNESS = 1e-3
-"""Of the nearest: nothing is farther than so many times its distance, the inverse of this."""
 TAPS = 4
 """To each side of a pixel that its normal is fitted to."""
 REACH = 0.012
@@ -31,20 +21,6 @@ STEP_SHARE = np.float32(1 / 128)
 """Of the disparity range: steps below it are the map's rounding, never an edge."""
 SOFT_DEPTH, SOFT_COLOR = 0.02, 0.05
 """Over so much beyond its limits, of the range of depth and of colour, a surface fades."""
-
-
-@dataclass(frozen=True)
-class SceneGeometry:
-    """focal_px: of the photo, px. infinity: disparity of what is infinitely far, px per view step."""
-
-    focal_px: float
-    infinity: float
-
-    def nearness(self, disparity: FloatImage) -> FloatImage:
-        """Disparity (any shape) above that of infinity, px per view step: f / Z, at least a share of the nearest."""
-        above = disparity - np.float32(self.infinity)
-        nearest = float(above.max(initial=0.0))
-        return np.asarray(np.maximum(above, max(LEAST_NEARNESS * nearest, 1e-6)), np.float32)
 
 
 def fit_normals(disparity: FloatImage, geometry: SceneGeometry, should_stop: ShouldStop = never) -> FloatImage:

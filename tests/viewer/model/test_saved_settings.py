@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.formats.images.photo import write_image
+from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import SceneOpened
@@ -46,6 +47,7 @@ optics = st.builds(
     shapes,
     numbers,
     numbers,
+    st.none() | st.just(Gloss(GlossSurface(0.2, 0.9, (0.5, 0.25, 1.0)), 0.1, light=GlossLight((0, 1, -2)))),
 )
 sources = st.builds(
     Source,
@@ -118,6 +120,8 @@ def changed(**changes: Any) -> str:
         changed(optics__dolly=None),
         changed(optics__focus_disparity=float("inf")),
         changed(optics__aperture_shape__kind="star"),
+        changed(optics__gloss={"roughness": 3.0}),
+        changed(optics__gloss={"light": {"direction": [0, 0, 0]}}),
         changed(optics__aperture_shape__blades=2),
         changed(optics__aperture_shape__mask={"name": "a", "rows": 2, "columns": 2, "values": "AAAA"}),
         changed(optics__aperture_shape__mask={"name": "a", "rows": 1, "columns": 3, "values": "AAAA"}),
@@ -127,7 +131,7 @@ def changed(**changes: Any) -> str:
         changed(source__max_pixels=-1),
         changed(size_px=[0, 10]),
     ],
-    ids=range(26),
+    ids=range(28),
 )
 def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
     with pytest.raises(InputError, match=r"a\.png") as error:

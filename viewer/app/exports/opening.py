@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.runtime.tiling import never
 from iibr_core.types import ReportProgress, ignore_progress
 from viewer.app.exports.source import ExportSource, undrawn
@@ -42,9 +43,10 @@ def open_undrawn(
     needs_disparity: bool,
     on_ready: Callable[[Scene], None],
     report_progress: ReportProgress = ignore_progress,
+    gloss: Gloss | None = None,
 ) -> ExportSource:
     """Read and planned, for kinds that make the views themselves. needs_disparity: of a light field too, which else is
-    taken as it is. on_ready, and what is raised: as `open_drawn`.
+    taken as it is. gloss: of these views. on_ready, and what is raised: as `open_drawn`.
     """
     request = SceneRequest(0, source, depth_strength, takes_drafts=not needs_disparity)
     results = results_of(
@@ -53,4 +55,4 @@ def open_undrawn(
     ready = next(results)
     assert isinstance(ready, SceneReady)
     on_ready(ready.scene)
-    return ExportSource(ready.scene, ready.loaded, Optics(), undrawn, ignore_progress, never)
+    return ExportSource(ready.scene, ready.loaded, Optics(gloss=gloss), undrawn, ignore_progress, never)

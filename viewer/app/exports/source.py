@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
 from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
+from viewer.background.gloss import add_gloss
 from viewer.background.loaded_photo import LoadedPhoto, inpainting_aids
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.model.layout import ScreenSize
@@ -90,8 +91,15 @@ class ExportSource:
                 inpaint=source.inpaint,
                 aids=aids,
             )
+        scene = self.scene if zero is None else replace(self.scene, infinity_px=self._infinity_px(zero))
+        made = add_gloss(made, self.optics.gloss, scene, self.should_stop)
         yield from self.watched(made, total, "making views")
         raise_if_stopped(self.should_stop)
+
+    def _infinity_px(self, zero: float) -> float:
+        """Of the scene's views where another disparity stays still."""
+        before, after = self.plan(), self.plan(zero)
+        return self.scene.infinity_px + (before.disparity_zero - after.disparity_zero) * after.disparity_scale
 
     def _views_of_folder(self) -> Iterator[ViewUpdate]:
         """As read; with disparity that was found where the scene has such."""

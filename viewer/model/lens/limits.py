@@ -6,7 +6,8 @@ import math
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.rendering.gloss.settings import require_sound
+from iibr_core.types import GridShape, InputError, ViewOffset
 from viewer.model.state.app_state import Scene
 from viewer.model.state.optics import LIMITS, ApertureShape, Optics
 
@@ -84,6 +85,16 @@ def aperture_limit(grid: GridShape) -> float:
 def is_finite(optics: Optics) -> bool:
     """Whether every number of the optics is."""
     return all(map(math.isfinite, (*_numbers_of(optics), *_numbers_of(optics.aperture_shape))))
+
+
+def has_sound_gloss(optics: Optics) -> bool:
+    """Whether its gloss, if there is any, makes sense."""
+    try:
+        if optics.gloss is not None:
+            require_sound(optics.gloss)
+    except InputError:
+        return False
+    return True
 
 
 def _numbers_of(record: Optics | ApertureShape) -> list[float]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from iibr_core.types import ViewOffset
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
-from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, is_finite
+from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, has_sound_gloss, is_finite
 from viewer.model.lens.presets import FIRST_APERTURE, preset_optics
 from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState, Notice, Scene, TiltHandles
@@ -24,6 +24,7 @@ from viewer.model.state.optics import (
     SetExposure,
     SetFocus,
     SetFocusRange,
+    SetGloss,
     SetHighlightRecovery,
     SetTilt,
 )
@@ -39,7 +40,7 @@ def reduce_lens(state: AppState, action: LensAction) -> AppState:
     if isinstance(action, MoveTiltHandle):
         return _move_handle(state, scene, action)
     optics = _edit_optics(state, scene, action)
-    if not is_finite(optics):
+    if not is_finite(optics) or not has_sound_gloss(optics):
         return state
     edited = replace(_note_choice(state, action), optics=clamp_optics(optics, scene))
     return _open_for_focus(edited, scene) if isinstance(action, FocusOn | SetFocus) else edited
@@ -91,6 +92,8 @@ def _edit_optics(state: AppState, scene: Scene, action: LensAction) -> Optics:
             return replace(optics, highlight_recovery=amount)
         case SetExposure(stops):
             return replace(optics, exposure_stops=stops)
+        case SetGloss(gloss):
+            return replace(optics, gloss=gloss)
         case ApplyPreset(name):
             return preset_optics(name, optics, scene, state.has_chosen_focus)
         case ResetOptics():

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)
@@ -64,7 +65,7 @@ class Optics:
     sharp in the middle of the picture (px per view step). focus_range: everything within this much disparity around it
     is sharp. focus_tilt: change of the sharp disparity from the picture's middle to its right and to its lower border.
     aperture_diameter: in view steps, 0 = pinhole. highlight_recovery: 0..1, how much brighter than white clipped
-    pixels count. exposure_stops: brightness as a power of two.
+    pixels count. exposure_stops: brightness as a power of two. gloss: of a surface, None where all are as they are.
     """
 
     eye: ViewOffset = CENTRE
@@ -76,6 +77,7 @@ class Optics:
     aperture_shape: ApertureShape = ApertureShape()
     highlight_recovery: float = within(0.0, 1.0, 0.0)
     exposure_stops: float = within(-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS, 0.0)
+    gloss: Gloss | None = None
 
 
 @dataclass(frozen=True)
@@ -159,6 +161,13 @@ class SetExposure:
 
 
 @dataclass(frozen=True)
+class SetGloss:
+    """Make a surface glossy, or leave all as they are."""
+
+    gloss: Gloss | None
+
+
+@dataclass(frozen=True)
 class ApplyPreset:
     """Set focus and aperture for a purpose."""
 
@@ -182,6 +191,7 @@ LensAction = (
     | SetApertureShape
     | SetHighlightRecovery
     | SetExposure
+    | SetGloss
     | ApplyPreset
     | ResetOptics
 )

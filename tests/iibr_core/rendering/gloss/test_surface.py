@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from iibr_core.rendering.gloss.geometry import SceneGeometry, infinity_of
 from iibr_core.rendering.gloss.settings import GlossStroke, GlossSurface
-from iibr_core.rendering.gloss.surface import SceneGeometry, fit_normals, surface_mask
+from iibr_core.rendering.gloss.surface import fit_normals, surface_mask
+from iibr_core.types import Disparity
 from tests.iibr_core.rendering.gloss.scenes import GEOMETRY, SIZE, disparity_of, plane, sphere
 
 
@@ -78,3 +80,12 @@ def test_strokes_beyond_the_picture_mark_what_of_it_they_reach():
     mask = surface_mask(GlossSurface(strokes=(far, corner), strokes_only=True), photo, flat)
     assert mask[0, 0] == 1
     assert mask.sum() < 10
+
+
+@pytest.mark.parametrize(
+    ("values", "inverse_metres", "infinity"),
+    [((1, 5), None, 0), ((-1, 3), None, -5), ((0, 9), (0.5, -1.0), 2), ((0, 9), (0.0, 1.0), 0), ((-2, -2), None, -2)],
+)
+def test_infinity_is_known_with_metres_and_else_a_guess(values, inverse_metres, infinity):
+    given = Disparity(np.array([values], np.float32), "a map", inverse_metres=inverse_metres)
+    assert infinity_of(given) == pytest.approx(infinity)

@@ -1,0 +1,77 @@
+"""`--gloss`, as a user gives it: what is written with it, and that it costs nothing without."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.viewer.cli.test_cli import run, run_apart
+
+GLOSS = """
+roughness = 0.5
+reflectance = 0.5
+[light]
+direction = [0, 0, -1]
+"""
+
+
+@pytest.fixture
+def gloss_path(tmp_path: Path) -> Path:
+    path = tmp_path / "gloss.toml"
+    path.write_text(GLOSS)
+    return path
+
+
+def views_of(folder: Path) -> np.ndarray:
+    return np.stack([np.asarray(Image.open(path)) for path in sorted(folder.glob("input_Cam*.png"))]).astype(int)
+
+
+def test_a_light_field_is_written_with_its_gloss(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, gloss_path: Path, tmp_path: Path
+) -> None:
+    plain, generated, exported = (tmp_path / name for name in ("plain", "generated", "exported"))
+    assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", plain) == 0
+    assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", generated, "--gloss", gloss_path) == 0
+    words = ("export", photo_path, "--to", "hci", "--grid", 3, "-o", exported, "--gloss", gloss_path)
+    assert run(monkeypatch, *words) == 0
+    gained = views_of(generated) - views_of(plain)
+    assert gained.min() >= 0
+    assert (gained.mean(axis=(1, 2, 3)) > 5).all()
+    assert np.array_equal(views_of(generated), views_of(exported))
+
+
+def test_an_environment_that_is_not_there_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, gloss_path: Path
+) -> None:
+    gloss_path.write_text('environment = "room.exr"')
+    words = ("generate", photo_path, "--grid", 3, "--out", photo_path.parent / "new", "--gloss", gloss_path)
+    assert run(monkeypatch, *words) == 2
+    assert "room.exr" in capsys.readouterr().err
+    assert not (photo_path.parent / "new").exists()
+
+
+def test_maps_take_no_gloss(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, gloss_path: Path
+) -> None:
+    words = ("export", photo_path, "--to", "depth", "-o", photo_path.parent / "new.png", "--gloss", gloss_path)
+    assert run(monkeypatch, *words) == 2
+    assert "--gloss" in capsys.readouterr().err
+
+
+def test_without_gloss_none_of_it_is_even_imported(photo_path: Path, tmp_path: Path) -> None:
+    code = """
+import sys
+from viewer.cli.main import main
+try:
+    main()
+except SystemExit as ended:
+    print(ended.code, [name for name in sys.modules if name.startswith("iibr_core.rendering.gloss.")])
+"""
+    ended = run_apart(code, "generate", photo_path, "--grid", 3, "--out", tmp_path / "new")
+    assert (
+        ended.stdout.splitlines()[-1]
+        == "0 ['iibr_core.rendering.gloss.settings', 'iibr_core.rendering.gloss.geometry']"
+    ), ended.stderr

@@ -1,0 +1,75 @@
+"""Gloss from TOML files: what they say, and one line for what makes no sense."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
+from iibr_core.types import InputError
+from viewer.model.gloss_file import read_gloss
+
+WHOLE = """
+roughness = 0
+reflectance = 0.5
+environment = "room.exr"
+photo_shines = true
+[surface]
+farthest = 0.25
+color = [1, 0, 0]
+strokes = [{points = [[0.5, 0.5], [0.6, 0.5]], radius = 0.1, erases = true}]
+[light]
+direction = [0, -1, -1]
+color = [2, 1.5, 1]
+radius_deg = 1
+"""
+
+
+def test_a_file_says_everything(tmp_path: Path) -> None:
+    path = tmp_path / "gloss.toml"
+    path.write_text(WHOLE)
+    stroke = GlossStroke(((0.5, 0.5), (0.6, 0.5)), 0.1, erases=True)
+    surface = GlossSurface(0.25, 1.0, (1, 0, 0), strokes=(stroke,))
+    light = GlossLight((0, -1, -1), (2, 1.5, 1), 1)
+    assert read_gloss(path) == Gloss(surface, 0, 0.5, light, str(tmp_path / "room.exr"), True)
+
+
+def test_what_a_file_leaves_out_is_as_usual(tmp_path: Path) -> None:
+    path = tmp_path / "gloss.toml"
+    path.write_text("# nothing")
+    assert read_gloss(path) == Gloss()
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("roughness = 2", "roughness"),
+        ("roughness = nan", "roughness"),
+        ('roughness = "dull"', "roughness"),
+        ("rough = 0.5", "rough"),
+        ("[light]\ncolour = [1, 1, 1]", "light.colour"),
+        ("[light]\ndirection = [1, 1]", "direction"),
+        ("[light]\ndirection = [0, 0, 0]", "direction"),
+        ("light = 3", "light"),
+        ("[[surface]]", "surface"),
+        ("= 3", "no gloss"),
+        ("\x00", "no gloss"),
+        ("a = " + "[" * 5000, "no gloss"),
+    ],
+)
+def test_what_makes_no_sense_is_named_in_one_line(tmp_path: Path, text: str, named: str) -> None:
+    path = tmp_path / "gloss.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=named) as refused:
+        read_gloss(path)
+    assert str(path) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"a" * 2_000_000])
+def test_files_that_are_no_text_or_too_large(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "gloss.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="no gloss"):
+        read_gloss(path)

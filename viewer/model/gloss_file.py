@@ -1,0 +1,49 @@
+"""A gloss as a TOML file: the fields of `Gloss` by their names, what is left out is as usual.
+
+Whoever needs this module imports it late, as `saved_settings`: msgspec costs the window time before its first frame.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+
+from iibr_core.formats.files import require_file
+from iibr_core.rendering.gloss.settings import Gloss, require_sound
+from iibr_core.types import InputError
+
+MOST_BYTES = 1_000_000
+
+
+def read_gloss(path: Path) -> Gloss:
+    """The gloss that a file describes; its environment's path counts from the file's folder.
+
+    Raises InputError, naming file and field, where it cannot be read or makes no sense.
+    """
+    require_file(path)
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise ValueError("it is too large")
+        whole = tomllib.loads(path.read_text("utf-8"))
+        unknown = _unknown_names(whole, msgspec.to_builtins(Gloss()))
+        if unknown:
+            raise ValueError(f"it knows no {unknown[0]}")
+        gloss = msgspec.convert(whole, Gloss)
+        require_sound(gloss)
+    except (OSError, ValueError, RecursionError) as error:
+        reason = " ".join(str(error).removeprefix("gloss: ").split())[:120]
+        raise InputError(f"{path}: is no gloss ({reason}); see `iibr generate --help`") from error
+    return replace(gloss, environment=str(path.parent / gloss.environment) if gloss.environment else "")
+
+
+def _unknown_names(given: dict[str, object], known: dict[str, object], within: str = "") -> list[str]:
+    """Names, with dots, that mean nothing: a misspelt one would silently be as usual."""
+    names = [f"{within}{name}" for name in given if name not in known]
+    for name, value in given.items():
+        inner = known.get(name)
+        if isinstance(value, dict) and isinstance(inner, dict):
+            names += _unknown_names(value, inner, f"{within}{name}.")
+    return names
