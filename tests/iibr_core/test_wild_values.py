@@ -28,13 +28,14 @@ from iibr_core.formats.images.picture_writers import write_picture
 from iibr_core.formats.images.xmp_packet import parse_packet
 from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
-from iibr_core.generation import cost_model, outer_views, plan, relief
+from iibr_core.generation import cost_model, free_views, outer_views, plan, relief
 from iibr_core.generation import light_field as generating
 from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes
 from iibr_core.rendering import (
     candidates,
     coherent_cells,
     disparity_statistics,
+    free_view,
     hypothesis_colors,
     hypothesis_features,
     joined_rays,
@@ -47,7 +48,7 @@ from iibr_core.rendering import (
 )
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
-from iibr_core.types import DISPLAY_P3, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
@@ -55,6 +56,12 @@ WILD = (math.nan, math.inf, -math.inf, 3e38, -3e38, 1e30, 1e-42, -1e-300, 0.0)
 SIZE = ImageSize(12, 14)
 GRID = GridShape(3, 3)
 OFFSETS = [ViewOffset(0, 0), ViewOffset(0, 1)]
+
+
+def camera(**changes):
+    """In the origin, looking ahead."""
+    straight = Camera(np.eye(3), np.zeros(3), SIZE, (20.0, 20.0), (6.5, 5.5), "test")
+    return dataclasses.replace(straight, **changes)
 
 
 def image(value):
@@ -300,6 +307,23 @@ FINITE = {
         outer_views.margins_beyond_frame(depths(v), [ViewOffset(1.0, -1.0)]),
         outer_views.margins_beyond_frame(depths(1.0), [ViewOffset(v, 1.0)]),
     ],
+    "generation.free_views.inverse_depth_of": lambda v, _: [
+        free_views.inverse_depth_of(Disparity(depths(v), "test").values, known) for known in (None, (1.0, 9.0))
+    ],
+    "generation.free_views.reach_of": lambda v, _: free_views.reach_of(
+        camera(), [camera(), camera(position=np.array([v, 0.0, 0.1]))], (1.0, 3.0)
+    ),
+    "generation.free_views.FreeViews": lambda v, _: [
+        free_views.FreeViews(image(0.5), near, camera(), [seen]).view(seen)
+        for near in (
+            np.full(SIZE, 0.5, np.float32),
+            free_views.inverse_depth_of(Disparity(depths(v), "test").values, None),
+        )
+        for seen in (camera(position=np.array([0.0, 0.1, v])), camera(focal_px=(v, v)), camera(centre_px=(v, 1.0)))
+    ],
+    "rendering.free_view.target_from_photo": lambda v, _: free_view.target_from_photo(
+        camera(), camera(position=np.array([0.0, v, 0.1]), focal_px=(v, 20.0)), 10.0
+    ),
     "inpainting.beyond_frame.extend_beyond_frame": lambda v, _: beyond_frame.extend_beyond_frame(
         np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2)
     )[0],
@@ -379,6 +403,11 @@ FINITE_BY_CONTRACT = {
     "geometry.offset_of_line": "lines along the plane give infinity or NaN, as it says",
     "geometry.pixel_of_line": "lines along the plane give infinity or NaN, as it says",
     "inpainting.background.fill_background": "of rendered views only",
+    "inpainting.background.continue_farthest": "of rendered views only",
+    "formats.poses.central_camera": "of Cameras, which refuse what is not finite",
+    "generation.free_views.depths_of": "of what `inverse_depth_of` gave",
+    "rendering.free_view.disparity_space": "of a Camera",
+    "rendering.free_view.render_free_view": "as `generation.free_views.FreeViews` calls it",
     "inpainting.diffusion.DiffusionInpainter": "of rendered views only; what a model paints is made finite",
     "inpainting.patch.fill_patches": "of rendered views only",
     "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
@@ -436,7 +465,8 @@ READS_OR_TELLS = {
     "formats.stereo": "anaglyph",
     "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
-    "atomic_write UnfinishedFolder remove_leftovers",
+    "atomic_write UnfinishedFolder remove_leftovers require_own_folder",
+    "formats.poses": "read_poses read_llff_poses",
     "formats.light_fields.numbered_grid": "read_numbered_grid NumberedGridWriter",
     "formats.light_fields.hci": "read_hci HciWriter",
     "formats.light_fields.folder_writer": "FolderWriter",
@@ -496,13 +526,13 @@ READS_OR_TELLS = {
     "runtime.extras": "is_installed require_extra",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
-    "require_own_size mebibytes",
+    "require_own_size require_free_views mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "depth.search": "estimator_of read_shown_photo",
     "rendering.large_views": "Part tiles_of whole",
     "rendering.view_synthesis": "ViewSynthesis",
-    "types": "ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",
+    "types": "Camera ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 
