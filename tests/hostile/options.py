@@ -100,6 +100,8 @@ _export = [
         (("--to", "quilt", "-o", "new.png", "--device", "holodeck"), "holodeck"),
         (("--to", "quilt", "-o", "new.png", "--frames", "3"), "--frames"),
         (("--to", "anaglyph", "-o", "new.png", "--device", "go"), "--device"),
+        (("--to", "anaglyph", "-o", "new.png", "--show"), "--show"),
+        (("--to", "quilt", "-o", "new.png", "--show", "--grid", "1"), "Looking Glass Bridge"),
         (("--to", "sbs", "-o", "new.png", "--eyes", "nan"), "--eyes"),
         (("--to", "gif", "-o", "new.gif", "--motion", "dance"), "--motion"),
         (("--to", "gif", "-o", "new.gif", "--frames", "0"), "--frames"),

@@ -54,6 +54,9 @@ def export(
     row: Annotated[
         int | None, typer.Option(min=0, max=MOST, help="Row of the picture.", show_default="the middle")
     ] = None,
+    show: Annotated[
+        bool, typer.Option("--show", help="On the Looking Glass display that is connected, by its Bridge.")
+    ] = False,
     *,
     scene: SceneOptions,
     literal: Literal = False,
@@ -79,7 +82,7 @@ def export(
     if not to.path:
         require_export_place(to, output, inputs, force)
     require_model(source.depth)
-    options = told.options(keys, row)
+    options = told.options(keys, row, show)
     target = output
 
     def require_place(made: Scene) -> None:

@@ -87,12 +87,12 @@ class KindOptions:
         float | None, typer.Option(parser=rate_from_text, metavar="X", help="Frames a second.", show_default="30")
     ] = None
 
-    def options(self, keys: Path | None = None, row: int | None = None) -> ExportOptions:
+    def options(self, keys: Path | None = None, row: int | None = None, show: bool = False) -> ExportOptions:
         """With what is said of a single photo."""
-        return ExportOptions(self.size, self.device, self.eyes, self.motion, keys, self.frames, self.rate, row)
+        return ExportOptions(self.size, self.device, self.eyes, self.motion, keys, self.frames, self.rate, row, show)
 
 
-HEEDED_BY_SOME = {field.name for record in (LensOptions, KindOptions) for field in fields(record)} | {"keys", "row"}
+HEEDED_BY_SOME = {"keys", "row", "show", *(field.name for field in (*fields(LensOptions), *fields(KindOptions)))}
 """Options that some kinds heed and others do not."""
 
 

@@ -58,7 +58,7 @@ class ExportKind:
 
 EXPORTS = {
     "quilt": ExportKind(
-        "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device"),
+        "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device", "show"),
         path="quilt:quilt_path",
     ),
     "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside"),

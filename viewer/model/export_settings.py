@@ -35,6 +35,7 @@ class ExportSettings:
     frames: int
     rate: float
     row: int
+    show: bool
 
 
 def settle(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> ExportSettings:
@@ -55,6 +56,7 @@ def settle(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optic
         options.frames or kind.frames or max(round(USUAL_SECONDS * rate), 2),
         rate,
         scene.height // 2 if options.row is None else options.row,
+        options.show,
     )
 
 

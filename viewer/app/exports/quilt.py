@@ -7,6 +7,7 @@ from pathlib import Path
 from iibr_core.formats.quilts import Quilt, lay_out, quilt_for, tagged
 from iibr_core.types import ImageSize
 from viewer.app.exports.framing import draw_framed
+from viewer.app.exports.looking_glass import Bridge
 from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
@@ -20,10 +21,14 @@ def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     return tagged(path, _quilt_of(scene, options.device).tag)
 
 
-def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """Raises InputError where it cannot be written, Cancelled once the export should stop."""
+def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> str | None:
+    """And show it, where that is asked for; returns a sentence about that.
+
+    Raises InputError where it cannot be written or shown, Cancelled once the export should stop.
+    """
     from iibr_core.formats.images.picture_writers import write_picture
 
+    bridge = Bridge() if settings.show else None  # before anything is drawn, for there may be none
     quilt = _quilt_of(source.scene, settings.device)
     frame = ScreenSize(quilt.tile.width, quilt.tile.height)
     drawn = (
@@ -31,6 +36,7 @@ def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> N
         for picture in side_pictures(source.scene, source.optics, quilt.views, settings.eyes)
     )
     write_picture(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")))
+    return bridge.show_quilt(path, quilt) if bridge is not None else None
 
 
 def _quilt_of(scene: Scene, device: str | None) -> Quilt:

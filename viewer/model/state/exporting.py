@@ -19,7 +19,7 @@ class ExportOptions:
 
     size: (width, height) of each picture in pixels. device: a display by name, see `DEVICES`. eyes: view steps between
     the two eyes. motion: of an animation. keys: file of a path of one's own. frames: of one turn, or pictures of a
-    stack. rate: frames a second. row: of the picture.
+    stack. rate: frames a second. row: of the picture. show: on a display, once it is written.
     """
 
     size: ScreenSize | None = None
@@ -30,6 +30,7 @@ class ExportOptions:
     frames: int | None = None
     rate: float | None = None
     row: int | None = None
+    show: bool = False
 
 
 USUAL_OPTIONS = ExportOptions()

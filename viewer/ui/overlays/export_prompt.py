@@ -25,7 +25,7 @@ from viewer.ui.overlays.prompt_rows import (
     size_rows,
     text_field,
 )
-from viewer.ui.widgets import gap, label, slider, whole_slider
+from viewer.ui.widgets import checkbox, gap, label, slider, whole_slider
 
 ANY_DISPLAY = "any"
 
@@ -67,7 +67,7 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
 
 
 def _device(options: ExportOptions, asked: _Asked) -> ExportOptions:
-    label("Display", asked.layout, "Without one, the photo's own shape.")
+    label("Made for", asked.layout, "A display; without one, the photo's own shape.")
     shown = asked.settings.device or ANY_DISPLAY
     device = choice_row("device", shown, {name: name for name in (ANY_DISPLAY, *DEVICES)})
     return replace(options, device=None if device == ANY_DISPLAY else device)
@@ -116,6 +116,13 @@ def _rate(options: ExportOptions, asked: _Asked) -> ExportOptions:
     return replace(options, rate=clamp(rate, *RATE_LIMITS)) if changed else options
 
 
+def _show(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("Display", asked.layout)
+    tip = "By Looking Glass Bridge, which must run."
+    show = checkbox("Show it there when it is written", options.show, asked.layout, tip)
+    return options if show is None else replace(options, show=show)
+
+
 ROWS: dict[str, Callable[[ExportOptions, _Asked], ExportOptions]] = {
     "device": _device,
     "motion": _motion,
@@ -125,5 +132,6 @@ ROWS: dict[str, Callable[[ExportOptions, _Asked], ExportOptions]] = {
     "size": _size,
     "frames": _frames,
     "rate": _rate,
+    "show": _show,
 }
 """In their order from above, by the names that `ExportKind.heeds` has."""
