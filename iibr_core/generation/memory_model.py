@@ -7,6 +7,7 @@ in advance too.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from iibr_core.generation.cost_model import (
@@ -25,7 +26,7 @@ from iibr_core.runtime.machine import (
     usual_budget_bytes,
 )
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS
-from iibr_core.types import GridShape, ImageSize, InputError
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 MIB = 2**20
 VIEWER_BYTES, WRITER_BYTES = 390 * MIB, 290 * MIB
@@ -176,6 +177,20 @@ def require_dense_field(budget: Budget, name: str, size: ImageSize, sparse: Grid
     each = STORED_HDR_BYTES * math.prod(sparse) + rays + CORES * (KEPT_BYTES + WORKING_BYTES)
     what = f"making views between {sparse.columns} x {sparse.rows} of {name} ({size})"
     budget.require(WRITER_BYTES + math.prod(size) * each, what, "raise --memory, or take fewer or smaller views")
+
+
+def require_matching(
+    budget: Budget, name: str, size: ImageSize, range_px: tuple[float, float], offsets: Sequence[ViewOffset]
+) -> None:
+    """Raise InputError where the disparity of the first of these views of this (height, width) cannot be found.
+
+    range_px: least and greatest that it may have.
+    """
+    from iibr_core.depth.multi_view.estimate import sweep_bytes
+
+    at = offsets[0]
+    reach = max(max(abs(offset.t - at.t), abs(offset.s - at.s)) for offset in offsets)
+    budget.require(sweep_bytes(size, range_px, reach), f"{name}: finding its disparity", "raise --memory")
 
 
 def require_picture(budget: Budget, size: ImageSize, is_float: bool) -> None:

@@ -111,6 +111,7 @@ class Exporter:
             partial(self._draw, export),
             partial(self._report_progress, export),
             export.is_given_up.is_set,
+            self._scene_view.centre,
         )
         self._exports.append(export)
         self._thread.submit(FileRequest(0, partial(_carry_out, writer_of(kind), export, source, task.options)))

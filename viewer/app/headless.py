@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ignore_progress
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ViewUpdate, ignore_progress
 from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
 from viewer.app.image_export import render_pixels
 from viewer.app.save_places import require_size
@@ -195,6 +195,11 @@ class HeadlessViewer:
         """A picture for an export, see `viewer.app.exports.source.Draw`."""
         require_size(size_px)
         return self._scene_view.picture(optics, size_px, is_linear, part)
+
+    @property
+    def centre(self) -> ViewUpdate | None:
+        """The centre view of what is open."""
+        return self._scene_view.centre
 
     @property
     def loaded(self) -> LoadedPhoto | None:

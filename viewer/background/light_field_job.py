@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.generation.memory_model import Budget, budget_of, require_field
+from iibr_core.generation.memory_model import Budget, budget_of, require_field, require_matching
 from iibr_core.runtime.machine import memory_bytes
 from iibr_core.runtime.tiling import ShouldStop
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewUpdate
+from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewUpdate, image_size
 from viewer.model.state.app_state import Progress, Scene, Source
 
 if TYPE_CHECKING:
@@ -37,13 +37,18 @@ class Showing:
 
 
 def showings_of_light_field(
-    source: Source, should_stop: ShouldStop, report_progress: Callable[[Progress], None], takes_drafts: bool
+    source: Source,
+    should_stop: ShouldStop,
+    report_progress: Callable[[Progress], None],
+    takes_drafts: bool,
+    known: FloatImage | None = None,
 ) -> Iterator[Showing]:
     """The light field of a folder or file, whatever its layout.
 
     takes_drafts: views without disparity are shown as read, then with a coarse one, then with the final one; else the
-    field is shown once, when all is known. The views of a showing must be taken before the next is asked for. Raises
-    InputError for a field or a map that cannot be read, Cancelled once should_stop is true.
+    field is shown once, when all is known. known: disparity of the centre view that was found before. The views of a
+    showing must be taken before the next is asked for. Raises InputError for a field or a map that cannot be read,
+    Cancelled once should_stop is true.
     """
     from iibr_core.formats.light_fields.registry import open_light_field
     from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
@@ -52,7 +57,7 @@ def showings_of_light_field(
     grid, (size, views) = grid_of(field), read_views(field)
     budget = budget_of(source.depth.memory_bytes or memory_bytes())
     require_field(budget, field.name, size, grid)
-    given = None if source.depth.file is None else _read_map(source, size)
+    given = known if source.depth.file is None else _read_map(source, size)
     read: list[ViewUpdate] = [next(views)]
     scene = _scene_as_read(source, field, grid, read[0], disparity_range(field))
     if (scene.has_view_disparity and given is None) or max(grid) == 1:
@@ -105,20 +110,22 @@ def _with_disparity(
     takes_drafts: bool,
 ) -> Iterator[Showing]:
     """The field with the given disparity of its centre view, with the one it came with, or one found from its views."""
-    from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+    from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
 
-    known = given if given is not None else field.views[0].disparity
-    if known is not None:
-        origin = field.scene.depth_source if given is None else Path(field.scene.source.depth.file or "").name
-        yield field.showing(known, origin, True, should_stop, _range_of(known))
+    if given is not None:
+        file = field.scene.source.depth.file
+        yield field.showing(given, Path(file).name if file else FROM_VIEWS, True, should_stop, _range_of(given))
+        return
+    own = field.views[0].disparity
+    if own is not None:
+        yield field.showing(own, field.scene.depth_source, True, should_stop, _range_of(own))
         return
     colors = [view.colors for view in field.views]
     offsets = [field.grid.offset(view.row, view.column) for view in field.views]
     report_progress(Progress(doing=FINDING))
     try:
         coarse = estimate_coarse(colors, offsets, 0, should_stop)
-        needed = sweep_bytes(coarse.values.shape, coarse.range_px, max(map(max, np.abs(offsets))))
-        field.budget.require(needed, f"{field.scene.name}: finding its disparity", "raise --memory")
+        require_matching(field.budget, field.scene.name, image_size(coarse.values), coarse.range_px, offsets)
     except InputError as error:
         # The views can be looked at without.
         yield Showing(replace(field.scene, notes=(*field.scene.notes, f"{error}.")), iter(field.views))

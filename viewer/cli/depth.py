@@ -12,12 +12,12 @@ from viewer.cli.terminal import print_notes, show_progress
 
 
 def depth(
-    field: Annotated[Path, typer.Argument(metavar="FOLDER", help="A light field, or a stereo pair.")],
+    field: Annotated[Path, typer.Argument(metavar="PATH", help="A light field, or a stereo photo.")],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="PFM, EXR, NPY or 16-bit PNG to write.")],
     memory: Memory = None,
     force: Force = False,
 ) -> None:
-    """Find the disparity of the centre view from all views, in pixels per view step.
+    """Find the disparity of the centre view, of a pair the left one, from all views, in pixels per view step.
 
     Example: iibr depth field -o field_disparity.pfm
     """
@@ -27,19 +27,25 @@ def depth(
     from iibr_core.formats.light_fields.views import grid_of, read_views
     from iibr_core.formats.maps.writer import write_map
     from iibr_core.formats.outputs import require_file_place
+    from iibr_core.generation.memory_model import budget_of, require_field, require_matching
 
     require_file_place(out, [field], force)
     scene = open_light_field(field)
-    grid, (_, views) = grid_of(scene), read_views(scene)
+    grid, (size, views) = grid_of(scene), read_views(scene)
+    budget = budget_of(memory)
+    require_field(budget, scene.name, size, grid)
     with show_progress("reading") as show:
         read = []
         for view in views:
             read.append(view)
             show(len(read), grid.rows * grid.columns)
+    # Of a pair it is the left one's.
+    read.sort(key=lambda view: (view.row, view.column) != scene.views[scene.centre].place)
     colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
     with show_progress("finding disparity") as show:
         show(0, 0)
         coarse = estimate_coarse(colors, offsets, 0)
+        require_matching(budget, scene.name, size, coarse.range_px, offsets)
         values = estimate_disparity(colors, offsets, 0, coarse.range_px)
     note = write_map(out, values)
     print(f"{scene.name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")

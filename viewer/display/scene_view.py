@@ -73,6 +73,11 @@ class SceneView:
         self._unprepared = list(USUAL_NEXT)
         self._view_came_at = 0.0
 
+    @property
+    def centre(self) -> ViewUpdate | None:
+        """The centre view as it came, None before anything is open."""
+        return self._centre
+
     def open(self, ready: SceneReady) -> None:
         """Show this scene from now on. Raises InputError where it does not fit the graphics card; the old one stays.
 

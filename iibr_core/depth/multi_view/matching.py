@@ -127,48 +127,54 @@ def _texture(luma: FloatImage) -> FloatImage:
 
 @kernel
 def _match(textures, offsets, disparity, most, parts):
-    """parts: mean squared difference at one disparity over the left, right, upper, lower views, and over all."""
+    """parts: mean squared difference at one disparity over the left, right, upper, lower views, and over all.
+
+    All of a view is shifted alike: row after row, so that one instruction compares several pixels.
+    """
     count, height, width = textures.shape
-    seen = np.float32(LEAST_SEEN * (count - 1))
+    least_seen = max(np.float32(LEAST_SEEN * (count - 1)), np.float32(1))
+    sums, counts, costs = (
+        np.empty((5, width), np.float32),
+        np.empty((5, width), np.float32),
+        np.empty(width, np.float32),
+    )
     for y in range(height):
+        sums[:] = 0
+        counts[:] = 0
+        for view in range(1, count):
+            t, s = offsets[view, 0], offsets[view, 1]
+            # Where the surface stands in that view (`iibr_core.types`).
+            row, shift = y - disparity * t, -disparity * s
+            if not (row >= 0 and row <= height - 1 and abs(shift) <= width - 1):
+                continue
+            y0, x_shift = min(int(row), max(height - 2, 0)), int(np.floor(shift))
+            down, across = np.float32(row - y0), np.float32(shift - x_shift)
+            # Columns that lie in both views; a shift by whole pixels needs no neighbour.
+            beside = 1 if across > 0 else 0
+            first, last = max(0, -x_shift), min(width, width - beside - x_shift)
+            upper, lower = textures[view, y0], textures[view, min(y0 + 1, height - 1)]
+            upper_left, upper_right = upper[first + x_shift :], upper[first + x_shift + beside :]
+            lower_left, lower_right = lower[first + x_shift :], lower[first + x_shift + beside :]
+            here = textures[0, y, first:last]
+            for x in range(len(here)):
+                top = upper_left[x] + (upper_right[x] - upper_left[x]) * across
+                bottom = lower_left[x] + (lower_right[x] - lower_left[x]) * across
+                difference = top + (bottom - top) * down - here[x]
+                costs[x] = min(difference * difference, most)
+            beside_part = 0 if s < 0 else 1 if s > 0 else -1
+            above_part = 2 if t < 0 else 3 if t > 0 else -1
+            for part in (beside_part, above_part, 4):
+                if part >= 0:
+                    own_sums, own_counts = sums[part, first:last], counts[part, first:last]
+                    for x in range(len(own_sums)):
+                        own_sums[x] += costs[x]
+                        own_counts[x] += np.float32(1)
         for x in range(width):
-            here = textures[0, y, x]
-            left = right = upper = lower = everything = np.float32(0)
-            lefts = rights = uppers = lowers = everyone = np.float32(0)
-            for view in range(1, count):
-                t, s = offsets[view, 0], offsets[view, 1]
-                # Where the surface stands in that view (`iibr_core.types`).
-                row, column = y - disparity * t, x - disparity * s
-                if not (row >= 0 and row <= height - 1 and column >= 0 and column <= width - 1):
-                    continue
-                y0, x0 = min(int(row), max(height - 2, 0)), min(int(column), max(width - 2, 0))
-                y1, x1 = min(y0 + 1, height - 1), min(x0 + 1, width - 1)
-                across, down = np.float32(column - x0), np.float32(row - y0)
-                top = textures[view, y0, x0] + (textures[view, y0, x1] - textures[view, y0, x0]) * across
-                bottom = textures[view, y1, x0] + (textures[view, y1, x1] - textures[view, y1, x0]) * across
-                difference = top + (bottom - top) * down - here
-                cost = min(difference * difference, most)
-                everything += cost
-                everyone += 1
-                if s < 0:
-                    left += cost
-                    lefts += 1
-                elif s > 0:
-                    right += cost
-                    rights += 1
-                if t < 0:
-                    upper += cost
-                    uppers += 1
-                elif t > 0:
-                    lower += cost
-                    lowers += 1
-            is_seen = everyone >= max(seen, np.float32(1))
-            mean = everything / everyone if is_seen else most
+            is_seen = counts[4, x] >= least_seen
+            mean = sums[4, x] / counts[4, x] if is_seen else most
             parts[4, y, x] = mean
-            parts[0, y, x] = left / lefts if is_seen and lefts > 0 else mean
-            parts[1, y, x] = right / rights if is_seen and rights > 0 else mean
-            parts[2, y, x] = upper / uppers if is_seen and uppers > 0 else mean
-            parts[3, y, x] = lower / lowers if is_seen and lowers > 0 else mean
+            for part in range(4):
+                parts[part, y, x] = sums[part, x] / counts[part, x] if is_seen and counts[part, x] > 0 else mean
 
 
 @kernel

@@ -34,7 +34,9 @@ def open_drawn(
         source, depth_strength, lambda made: report_progress(made.done, made.total, made.doing), on_ready=on_ready
     )
     viewer.do(*lens)
-    return ExportSource(viewer.scene, viewer.loaded, viewer.state.optics, viewer.draw, ignore_progress, never)
+    return ExportSource(
+        viewer.scene, viewer.loaded, viewer.state.optics, viewer.draw, ignore_progress, never, viewer.centre
+    )
 
 
 def open_undrawn(
@@ -55,4 +57,4 @@ def open_undrawn(
     ready = next(results)
     assert isinstance(ready, SceneReady)
     on_ready(ready.scene)
-    return ExportSource(ready.scene, ready.loaded, Optics(gloss=gloss), undrawn, ignore_progress, never)
+    return ExportSource(ready.scene, ready.loaded, Optics(gloss=gloss), undrawn, ignore_progress, never, ready.centre)

@@ -48,7 +48,8 @@ def undrawn(
 class ExportSource:
     """scene: that is open; loaded: its photo, None for a light field from disk. optics: as the window shows it.
 
-    report_progress: heard in whatever thread exports. should_stop: asked often.
+    report_progress: heard in whatever thread exports. should_stop: asked often. centre: the centre view as it is shown,
+    None where that is not known.
     """
 
     scene: Scene
@@ -57,6 +58,7 @@ class ExportSource:
     draw: Draw
     report_progress: ReportProgress
     should_stop: ShouldStop
+    centre: ViewUpdate | None = None
 
     def watched(self, items: Iterable[Item], total: int, doing: str) -> Iterator[Item]:
         """The items, telling how many were taken. Raises Cancelled once the export should stop."""
@@ -109,8 +111,17 @@ class ExportSource:
 
         if self.scene.depth_source in ("none", "light field"):
             return read_views(open_light_field(Path(self.scene.source.path)))[1]
-        showings = showings_of_light_field(self.scene.source, self.should_stop, self._tell, takes_drafts=False)
+        known = self._found_centre.disparity if self._found_centre is not None else None
+        showings = showings_of_light_field(
+            self.scene.source, self.should_stop, self._tell, takes_drafts=False, known=known
+        )
         return next(showings).views
+
+    @property
+    def _found_centre(self) -> ViewUpdate | None:
+        """The centre view of a light field from disk, whose disparity is known already and will stay."""
+        is_known = self.loaded is None and self.centre is not None and self.centre.is_final
+        return self.centre if is_known and self.centre is not None and self.centre.disparity is not None else None
 
     def _tell(self, progress: Progress) -> None:
         self.report_progress(progress.done, progress.total, progress.doing)
@@ -126,6 +137,8 @@ class ExportSource:
 
     def centre_view(self) -> ViewUpdate:
         """The centre view with its disparity, px per view step."""
+        if self._found_centre is not None:
+            return self._found_centre
         views = self.views()
         try:
             return next(views)

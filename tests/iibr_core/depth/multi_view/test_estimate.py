@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
 from iibr_core.depth.multi_view.guided_filter import GuidedFilter
-from iibr_core.depth.multi_view.matching import choose_views, luma_of, matching_views, sweep
+from iibr_core.depth.multi_view.matching import _match, choose_views, luma_of, matching_views, sweep
 from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.training.scenes.random_scene import random_scene
@@ -147,3 +148,26 @@ def test_the_guided_filter_is_what_its_paper_says():
     filtered = image.copy()
     GuidedFilter(guide, radius, smoothness).apply(filtered)
     np.testing.assert_allclose(filtered.ravel(), expected, atol=2e-4)
+
+
+@pytest.mark.parametrize("disparity", [0.0, 0.4, -1.25, 3.0])
+def test_matching_is_what_its_slow_twin_says(disparity):
+    """Every pixel by itself: its place in each view, the four pixels around that, the mean of each side's views."""
+    rng = np.random.default_rng(1)
+    textures = rng.normal(0, 0.02, (9, 7, 8)).astype(np.float32)
+    offsets = np.float32([(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1), (1, -1), (-2, 2)])
+    most = 9e-4
+    found = np.empty((5, 7, 8), np.float32)
+    _match(textures, offsets, np.float32(disparity), np.float32(most), found)
+    for y, x in np.ndindex(7, 8):
+        costs = []
+        for texture, (t, s) in zip(textures[1:], offsets[1:]):
+            row, column = y - disparity * t, x - disparity * s
+            if 0 <= row <= 6 and 0 <= column <= 7:
+                there = map_coordinates(texture.astype(np.float64), [[row], [column]], order=1)[0]
+                costs.append((t, s, min((there - textures[0, y, x]) ** 2, most)))
+        everything = np.mean([cost for *_, cost in costs]) if len(costs) >= 0.3 * 8 else most
+        sides = (lambda t, s: s < 0, lambda t, s: s > 0, lambda t, s: t < 0, lambda t, s: t > 0)
+        halves = [[cost for t, s, cost in costs if is_there(t, s)] for is_there in sides]
+        expected = [np.mean(half) if half and len(costs) >= 0.3 * 8 else everything for half in halves]
+        np.testing.assert_allclose(found[:, y, x], [*expected, everything], rtol=1e-4, atol=1e-8)
