@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.hostile.case import Case
-from tests.hostile.sandbox import BAD_MAPS, BAD_PICTURES
+from tests.hostile.sandbox import BAD_MAPS, BAD_PICTURES, BAD_VIEW_FILES
 
 LONG_NAME = "n" * 300 + ".png"
 NOT_UTF8 = os.fsdecode(b"\xff\xfe photo.png")
@@ -123,6 +123,15 @@ _maps = [
     for name in BAD_MAPS
 ]
 
+_view_files = [
+    *(Case(f"depth {name}", ("depth", name, "-o", "new.pfm"), says=name) for name in BAD_VIEW_FILES),
+    *(
+        Case(f"{command} {name}", _opening(command, name), says=name)
+        for command in ("plan", "generate", "screenshot")
+        for name in ("none_qs0x6a1.png", "odd_eslf.png", "raw.lfp", "thin_SBS.png")
+    ),
+]
+
 _fields = [
     Case("screenshot a folder without views", _opening("screenshot", "folder"), says="folder"),
     Case("screenshot a locked light field", _opening("screenshot", "field"), prepare=_lock("field"), is_bound=True),
@@ -156,4 +165,4 @@ _saved = [
     ),
 ]
 
-INPUT_CASES = (*_photos, *_odd_paths, *_permissions, *_maps, *_fields, *_saved)
+INPUT_CASES = (*_view_files, *_photos, *_odd_paths, *_permissions, *_maps, *_fields, *_saved)

@@ -12,6 +12,7 @@ from PIL import Image
 
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import SRGB, GridShape, ViewUpdate
@@ -35,6 +36,13 @@ BAD_MAPS = (
 """Of the template: what no disparity map of its photo is."""
 
 
+BAD_VIEW_FILES = (
+    "cut.mpo", "cut.lif", "lie.lif", "cut-pair.heic", "none_qs0x6a1.png", "many_qs32x32a1.png", "odd_eslf.png",
+    "uneven_qs2x2a1.png", "raw.lfp", "thin_SBS.png", "photo.png", "missing_SBS.png",
+)  # fmt: skip
+"""Of the template: files that hold no whole light field or stereo photo."""
+
+
 def make_template(folder: Path) -> None:
     """Fill the folder."""
     folder.mkdir()
@@ -43,6 +51,7 @@ def make_template(folder: Path) -> None:
     _make_good(folder, pixels)
     _make_bad_pictures(folder, pixels)
     _make_bad_maps(folder)
+    _make_bad_view_files(folder, pixels)
     (folder / "folder").mkdir()
     (folder / "text.txt").write_text("some words")
 
@@ -83,6 +92,24 @@ def _make_bad_pictures(folder: Path, pixels: np.ndarray) -> None:
     (folder / "zero.png").write_bytes(_png(0, 0))
     (folder / "loop.png").symlink_to("loop.png")
     (folder / "dangling.png").symlink_to("gone.png")
+
+
+def _make_bad_view_files(folder: Path, pixels: np.ndarray) -> None:
+    picture = Image.fromarray(pixels)
+    picture.save(folder / "cut.mpo", "MPO", save_all=True, append_images=[picture])
+    write_spatial_photo(folder / "cut-pair.heic", pixels, pixels, 30.0)
+    for name in ("cut.mpo", "cut-pair.heic"):
+        path = folder / name
+        path.write_bytes(path.read_bytes()[: path.stat().st_size * 4 // 5])
+    jpeg = (folder / "photo.jpg").read_bytes()
+    (folder / "cut.lif").write_bytes(jpeg)
+    (folder / "lie.lif").write_bytes(jpeg + struct.pack(">III", 2**31, 8, 2**31) + struct.pack(">I", 18) + b"\x1e\x1a")
+    for name in ("none_qs0x6a1.png", "many_qs32x32a1.png", "odd_eslf.png"):
+        picture.save(folder / name)
+    Image.fromarray(pixels).save(folder / "uneven_qs2x2a1.png")
+    (folder / "uneven_qs2x2a1.png").write_bytes((folder / "uneven_qs2x2a1.png").read_bytes()[:-200])
+    (folder / "raw.lfp").write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(1000))
+    Image.fromarray(pixels[:, :1]).save(folder / "thin_SBS.png")
 
 
 def _make_bad_maps(folder: Path) -> None:

@@ -526,7 +526,7 @@ READS_OR_TELLS = {
     "runtime.extras": "is_installed require_extra",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
-    "require_own_size require_free_views mebibytes",
+    "require_own_size require_free_views require_matching mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
     "depth.search": "estimator_of read_shown_photo",
