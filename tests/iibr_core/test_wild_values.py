@@ -21,14 +21,14 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.multi_view import estimate, matching
+from iibr_core.depth.multi_view import agreement, estimate, matching
 from iibr_core.formats.images import oiio_reader, photo
 from iibr_core.formats.images.picture_kinds import KINDS
 from iibr_core.formats.images.picture_writers import write_picture
 from iibr_core.formats.images.xmp_packet import parse_packet
 from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
-from iibr_core.generation import cost_model, free_views, outer_views, plan, relief
+from iibr_core.generation import cost_model, dense_field, free_views, outer_views, plan, relief
 from iibr_core.generation import light_field as generating
 from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes
 from iibr_core.rendering import (
@@ -155,6 +155,12 @@ def completed(values):
     return list(generating.ray_set(scene()[0], disparity, plan.plan_literal(scene()[0], disparity, GRID))[1])
 
 
+def dense(values):
+    """Views between two, of one disparity."""
+    given = [dense_field.GivenView(0, column, view, values) for column, view in enumerate(pair(0.5))]
+    return list(dense_field.densify(given, GridShape(1, 2), GridShape(1, 3)))
+
+
 def rendered(offset, value=0.5):
     with ViewSynthesis(keeps_entropy=True) as synthesis:
         return synthesis.render(rays(value), offset)
@@ -263,6 +269,13 @@ FINITE = {
     "inpainting.disparity_holes.say_filled": lambda v, _: disparity_holes.say_filled("map", v) and None,
     "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
     "depth.multi_view.matching.luma_of": lambda v, _: matching.luma_of(image(v).astype(np.float16)),
+    "depth.multi_view.agreement.estimate_all": lambda v, _: agreement.estimate_all(pair(v), OFFSETS, (-1.0, 1.0)),
+    "depth.multi_view.agreement.reconcile": lambda v, _: agreement.reconcile(
+        pair(v), [np.nan_to_num(depths(v)), depths(1.0)], OFFSETS
+    ),
+    "depth.multi_view.agreement.find_confirmed": lambda v, _: agreement.find_confirmed(
+        [depths(v), depths(1.0)], OFFSETS, 0
+    ),
     "depth.multi_view.estimate.estimate_coarse": lambda v, _: estimate.estimate_coarse(pair(v), OFFSETS, 0).values,
     "depth.multi_view.estimate.estimate_disparity": lambda v, _: estimate.estimate_disparity(
         pair(v), OFFSETS, 0, (-1.0, 1.0)
@@ -307,6 +320,7 @@ FINITE = {
         outer_views.margins_beyond_frame(depths(v), [ViewOffset(1.0, -1.0)]),
         outer_views.margins_beyond_frame(depths(1.0), [ViewOffset(v, 1.0)]),
     ],
+    "generation.dense_field.densify": lambda v, _: dense(depths(v)),
     "generation.free_views.inverse_depth_of": lambda v, _: [
         free_views.inverse_depth_of(Disparity(depths(v), "test").values, known) for known in (None, (1.0, 9.0))
     ],
@@ -511,6 +525,8 @@ READS_OR_TELLS = {
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
     "generation.light_field": "transformer_for",
     "generation.stored_views": "StoredViews",
+    "generation.dense_field": "GivenView require_steps",
+    "generation.given_views": "read_given_views",
     "generation.view_maker": "ViewMaker quantise_as_stored",
     "generation.outer_views": "outer_views outer_views_of_grid farthest_views",
     "generation.update_loop": "render_outer_views complete_ray_set",
@@ -526,6 +542,7 @@ READS_OR_TELLS = {
     "runtime.extras": "is_installed require_extra",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
+    "require_dense_field "
     "require_own_size require_free_views require_matching mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
