@@ -3,6 +3,7 @@
 // REPROJECT: other views stand in for those wanted. TILES: where all is sharp few samples suffice.
 #include "samples.glsl"
 #include "layers.glsl"
+#include "gloss.glsl"
 
 uniform float share;     // of this pass in the picture; the rest comes from the pinhole pass
 #ifdef TILES
@@ -30,6 +31,19 @@ vec3 place_of(int i, float focus, inout float weight) {
     return place;
 }
 
+// Light of sample i, with its gloss if there is any.
+vec4 light_at(int i, vec3 place) {
+    vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
+#ifdef GLOSS
+    vec2 ray = eye + dolly * (uv - 0.5) + samples[i].xy, view = ray;
+#ifdef REPROJECT
+    view += fallback_view_of(i, uv).reprojection;
+#endif
+    light.rgb = glossy(light.rgb, place.xy, view, light.a, ray);
+#endif
+    return light;
+}
+
 void main() {
     float focus = focus_at(uv);
     int count = sample_count;
@@ -48,7 +62,7 @@ void main() {
         float weight = is_sparse ? reprojections[i].w : samples[i].w;
         vec3 place = place_of(i, focus, weight);
         // Backward warp: the sample's light from its view, in linear light.
-        vec4 light = linear_from_stored(textureLod(colors, place, 0.0));
+        vec4 light = light_at(i, place);
         vec4 weighted = weight * vec4(light.rgb, 1.0);
         all += weighted;
 #ifdef LAYERS

@@ -6,6 +6,7 @@
 #include "sources.glsl"
 #include "first_hit.glsl"
 #include "layers.glsl"
+#include "gloss.glsl"
 
 uniform vec2 within_pixel;  // from its middle, texture coordinates
 #if defined(FLAT) || defined(EDGES)
@@ -84,12 +85,17 @@ void main() {
         sum += weight * linear_from_stored(textureLod(colors, vec3(mirrored(surfaces[i].at), sources[i].z), 0.0));
         total += weight;
     }
-    vec4 light = vec4(sum.rgb / total, 1.0) * share;
+    sum /= total;
+#ifdef GLOSS
+    vec2 ray = eye + dolly * (uv - 0.5);
+    sum.rgb = glossy(sum.rgb, uv, ray, sum.a, ray);
+#endif
+    vec4 light = vec4(sum.rgb, 1.0) * share;
     in_focus = light;
 #ifdef LAYERS
     // Its defocus decides which layer the light goes to.
     vec2 line = blur_from_depth(focus_at(uv));
-    float blur = blur_beyond_range(sum.a / total * line.x + line.y);
+    float blur = blur_beyond_range(sum.a * line.x + line.y);
     float sharp = sharpness(blur);
     in_focus = sharp * light;
     in_front = (blur > 0.0 ? 1.0 - sharp : 0.0) * light;

@@ -168,9 +168,11 @@ def needs_smaller(optics: Optics) -> bool:
 
 def is_full(scene: Scene, optics: Optics, size: ScreenSize) -> bool:
     """Whether a picture of this size is drawn from the photo at its own size: it shows more than the scene's views
-    hold, and there is memory for that. With a dolly it is drawn from the views, whatever its size.
+    hold, and there is memory for that. With a dolly or gloss it is drawn from the views, whatever its size.
     """
-    if scene.plan is None or scene.own_size is None or optics.dolly != 0 or math.prod(size) <= math.prod(scene.size):
+    if optics.dolly != 0 or optics.gloss is not None:
+        return False
+    if scene.plan is None or scene.own_size is None or math.prod(size) <= math.prod(scene.size):
         return False
     if math.prod(scene.own_size) <= math.prod(scene.size):
         return False

@@ -17,6 +17,7 @@ from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_sm
 from viewer.app.image_export import render_pixels
 from viewer.app.save_places import require_size
 from viewer.background.comparison_worker import ComparisonJob
+from viewer.background.gloss import answer
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.display.inspection_view import InspectionView
@@ -150,6 +151,7 @@ class HeadlessViewer:
         x, y, box_width, box_height = layout.frame_px
         box_size = layout.frame_px.size
         require_size(box_size)
+        self._prepare_gloss(self.state.optics)
         if is_full(scene, self.state.optics, box_size):
             light = self._full_picture(scene, box_size, report_progress)
             pixels = encode_light(light, is_linear, color_space, scene.color_space)
@@ -173,6 +175,12 @@ class HeadlessViewer:
         full = FullPicture(scene, scene.plan, loaded, optics, size, smaller)
         return full.draw(report_progress=report_progress)
 
+    def _prepare_gloss(self, optics: Optics) -> None:
+        """Have at hand what the optics' gloss means here. Raises InputError where its surroundings cannot be read."""
+        request = self._scene_view.gloss_request(optics.gloss)
+        if request is not None:
+            self._scene_view.take_gloss(answer(request))
+
     @property
     def scene(self) -> Scene:
         """What is open."""
@@ -194,6 +202,7 @@ class HeadlessViewer:
     ) -> NDArray[Any]:
         """A picture for an export, see `viewer.app.exports.source.Draw`."""
         require_size(size_px)
+        self._prepare_gloss(optics)
         return self._scene_view.picture(optics, size_px, is_linear, part)
 
     @property
@@ -223,6 +232,7 @@ class HeadlessViewer:
             zoom=self.state.zoom,
             own_width=self.own_size.width if scene else None,
         )
+        self._prepare_gloss(self.state.optics)
         has_picture = layout.frame_px and self._scene_view.converge(self.state, layout.frame_px.size, layout.part)
         texture = self._scene_view.texture if has_picture else None
         textures = self._draw_inspection(layout) if has_picture else NO_INSPECTION_TEXTURES

@@ -30,6 +30,7 @@ from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
 from viewer.background.comparison_worker import ComparisonWorker
+from viewer.background.gloss import GlossFound, GlossRequest, GlossWorker
 from viewer.background.jobs import Failed, ProgressReport
 from viewer.background.read_ahead import PhotoAhead, PhotosAhead, photos_within_budget
 from viewer.background.scene_worker import PhotosFound, SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
@@ -136,6 +137,8 @@ class App:
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self._depth = DepthPreview(self.scene_view)
+        self._gloss = GlossWorker(wake)
+        self._gloss_asked: GlossRequest | None = None
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, wake)
@@ -172,6 +175,7 @@ class App:
         self.do(*news)
         self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
         self._preview_depth()
+        self._show_gloss()
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
         if picture and self.scene_view.report != self.state.report:
@@ -244,6 +248,7 @@ class App:
         self._worker.close()
         self._ahead.close()
         self._comparisons.close()
+        self._gloss.close()
         self._keep()
         self._sessions.close(self.state)
         self._side_effects.close()
@@ -409,6 +414,20 @@ class App:
             self._depth.update(self.state)
         except InputError as error:
             self.do(Notify(Notice(str(error), is_error=True)), DropStroke())
+
+    def _show_gloss(self) -> None:
+        """What it means for the scene is found out beside the window; until then it looks as before."""
+        while (result := self._gloss.next_result()) is not None:
+            if isinstance(result, GlossFound):
+                self.scene_view.take_gloss(result)
+                self._is_busy = True
+            else:
+                self.do(Notify(Notice(result.message, is_error=True)))
+        request = self.scene_view.gloss_request(self.state.optics.gloss)
+        asked = self._gloss_asked
+        if request is not None and (asked is None or not asked.is_for(request.gloss, request.centre)):
+            self._gloss_asked = request
+            self._gloss.submit(request)
 
     def _keep_recent(self) -> None:
         """At once: they are what one misses after a crash."""

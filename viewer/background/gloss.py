@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
-from iibr_core.rendering.gloss.settings import Gloss
-from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.rendering.gloss.settings import Gloss, of_maps
+from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import FloatImage, ViewUpdate
+from viewer.background.jobs import Failed, Job, JobThread
 from viewer.model.state.app_state import Scene
 
 if TYPE_CHECKING:
@@ -35,6 +38,50 @@ def read_environment(gloss: Gloss) -> FloatImage | None:
     from iibr_core.formats.images.photo import read_photo
 
     return linear_from_srgb(read_photo(Path(gloss.environment), MOST_ENVIRONMENT_PIXELS).pixels)
+
+
+@dataclass(frozen=True, eq=False)
+class GlossRequest:
+    """What a gloss means for a scene is to be found out. centre: its centre view; normals: of that, where known."""
+
+    gloss: Gloss
+    scene: Scene
+    centre: ViewUpdate
+    normals: FloatImage | None = None
+
+    def is_for(self, gloss: Gloss, centre: ViewUpdate) -> bool:
+        """Whether the answer is the same for these."""
+        return of_maps(self.gloss) == of_maps(gloss) and self.centre is centre
+
+
+@dataclass(frozen=True, eq=False)
+class GlossFound:
+    """maps: None where there is no disparity."""
+
+    request: GlossRequest
+    maps: GlossMaps | None
+
+
+GlossResult = GlossFound | Failed[Gloss]
+
+
+class GlossWorker(JobThread[GlossRequest, GlossResult]):
+    """Finds out beside the window what a gloss means; the newest request wins."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when a result was posted."""
+        super().__init__("iibr-gloss", wake, _results_of, lambda asked, message: Failed(asked.gloss, message))
+
+
+def _results_of(job: Job[GlossRequest, GlossResult]) -> Iterator[GlossResult]:
+    with suppress(Cancelled):
+        yield answer(job.request, job.should_stop)
+
+
+def answer(request: GlossRequest, should_stop: ShouldStop = never) -> GlossFound:
+    """Raises as `maps_of_scene`."""
+    maps = maps_of_scene(request.gloss, request.scene, request.centre, should_stop, request.normals)
+    return GlossFound(request, maps)
 
 
 def maps_of_scene(

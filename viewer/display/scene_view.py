@@ -13,7 +13,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, ViewOffset, ViewUpdate
+from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
+from viewer.background.gloss import GlossFound, GlossRequest
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
@@ -49,8 +51,8 @@ PREVIEW_GRID = GridShape(1, 1)
 class SceneView:
     """Holds the renderer and the views of the scene that is shown.
 
-    generation: whose views these are. previews: of edited depth shown so far. views_uploaded: so far, those that came
-    twice counted twice. pictures_drawn: how often the picture was drawn.
+    generation: whose views these are. previews: of edited depth, and of gloss, shown so far. views_uploaded: so far,
+    those that came twice counted twice. pictures_drawn: how often the picture was drawn.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -63,6 +65,7 @@ class SceneView:
         self.previews = 0
         self._scene: Scene | None = None
         self._centre: ViewUpdate | None = None
+        self._gloss: GlossFound | None = None
         self._is_preview = False
         self._waiting: deque[ViewUpdate] = deque()
         self._is_final: dict[tuple[int, int], bool] = {}
@@ -84,7 +87,12 @@ class SceneView:
         Its first view is shown in a field of its own until the second comes: making room for all takes a while.
         """
         scene = ready.scene
-        self._open_field(scene, PREVIEW_GRID)
+        known, self._gloss = self._gloss, None
+        try:
+            self._open_field(scene, PREVIEW_GRID)
+        except InputError:
+            self._gloss = known
+            raise
         self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
         self.generation, self.loaded, self._scene, self._centre = ready.generation, ready.loaded, scene, ready.centre
         self._is_preview = True
@@ -111,6 +119,23 @@ class SceneView:
         self.renderer.upload_view(0, 0, centre.colors, disparity)
         self._disparities = {CENTRE: disparity}
         self.previews += 1
+
+    def gloss_request(self, gloss: Gloss | None) -> GlossRequest | None:
+        """What is to be found out before this gloss can be shown on the scene; None where nothing is."""
+        if gloss is None or self._scene is None or self._centre is None:
+            return None
+        known = self._gloss
+        if known is not None and known.request.is_for(gloss, self._centre):
+            return None
+        normals = known.maps.normals if known is not None and known.maps is not None else None
+        return GlossRequest(gloss, self._scene, self._centre, normals)
+
+    def take_gloss(self, found: GlossFound) -> None:
+        """Show gloss with these maps from now on, unless they are of another scene."""
+        if found.request.centre is self._centre:
+            self._gloss = found
+            self.renderer.set_gloss(found.maps)
+            self.previews += 1
 
     def add(self, view: ViewUpdate) -> None:
         """Take a view of the present scene; it is uploaded later. Raises InputError where they do not fit all."""
@@ -249,6 +274,8 @@ class SceneView:
         self.renderer.open_field(
             grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity, scene.color_space
         )
+        if self._gloss is not None:
+            self.renderer.set_gloss(self._gloss.maps)
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):

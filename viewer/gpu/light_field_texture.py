@@ -6,6 +6,7 @@ Colours are stored as the square root of linear light: summing light then costs 
 from __future__ import annotations
 
 from copy import copy
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
@@ -13,6 +14,9 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
+
+if TYPE_CHECKING:
+    from viewer.gpu.gloss_textures import GlossTextures
 
 _ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255).astype(np.uint8)
 
@@ -31,7 +35,7 @@ class LightFieldTexture:
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
     view step. blocks: RG16F, least and greatest disparity of each BLOCK_PX square. present, has_disparity: (V, U) bool.
     uploads: (V, U), how often each was stored.
-    color_space: of the light; sRGB until something else is said.
+    color_space: of the light; sRGB until something else is said. gloss: what gloss means for the field, None without.
     range_px: (farthest, nearest) disparity, known from the first view that has any.
     """
 
@@ -59,6 +63,7 @@ class LightFieldTexture:
         self.uploads = np.zeros(grid, int)
         self.range_px = (0.0, 0.0)
         self.color_space = SRGB
+        self.gloss: GlossTextures | None = None
         self._dtype = np.float16 if hdr else np.uint8
         layers = self._kept.rows * self._kept.columns
         self.colors = _allocate(ctx, (width, height, layers), 4, "f2" if hdr else "f1")
@@ -113,6 +118,8 @@ class LightFieldTexture:
         self.colors.release()
         self.disparities.release()
         self.blocks.release()
+        if self.gloss is not None:
+            self.gloss.release()
 
     def _viewport(self, row: int, column: int) -> tuple[int, int, int, int, int, int]:
         return 0, 0, self.layer(row, column), self.width, self.height, 1

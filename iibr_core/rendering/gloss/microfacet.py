@@ -5,36 +5,16 @@ The light is no point: its disc widens the lobe, so that a mirror shows the ligh
 
 from __future__ import annotations
 
-from math import radians, sin, sqrt
+from math import sqrt
 
-import numpy as np
-
-from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.runtime.jit import kernel
-from iibr_core.types import FloatImage
-
-
-def lobe_widths(gloss: Gloss) -> tuple[float, float]:
-    """(squared width of the lobe, squared sine of the light's radius): what the lobe's shape depends on.
-
-    A disc of radius r under a mirror is a lobe of width r / 2, as far as its peak goes; roughness and disc add up as
-    the variances of independent slopes do.
-    """
-    disc = sin(radians(gloss.light.radius_deg)) ** 2
-    return gloss.roughness**4 + disc / 4, disc
-
-
-def unit_direction(gloss: Gloss) -> FloatImage:
-    """Towards the light: (3,), of length 1."""
-    direction = np.array(gloss.light.direction, np.float64)
-    return np.asarray(direction / np.linalg.norm(direction), np.float32)
 
 
 @kernel
 def reflected_share(nx, ny, nz, vx, vy, vz, lx, ly, lz, width2, disc, reflectance):
     """The share of the light's radiance that a surface shows, 0..1: GGX, Smith's shadowing, Schlick's Fresnel term.
 
-    n: normal, v: towards the eye, l: towards the light, each of length 1. width2, disc: see `lobe_widths`.
+    n: normal, v: towards the eye, l: towards the light, each of length 1. width2, disc: see `Gloss.lobe_widths`.
     """
     n_l = nx * lx + ny * ly + nz * lz
     n_v = nx * vx + ny * vy + nz * vz

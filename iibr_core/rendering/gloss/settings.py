@@ -62,6 +62,13 @@ class GlossLight:
     radius_deg: float = 3.0
 
     @property
+    def unit_direction(self) -> Triple:
+        """Towards it, of length 1."""
+        length = hypot(*self.direction)
+        x, y, z = self.direction
+        return x / length, y / length, z / length
+
+    @property
     def radiance(self) -> Triple:
         """Of its disc, linear, 1 = the photo's white: what a perfect mirror shows of it."""
         red, green, blue = (value / sin(radians(self.radius_deg)) ** 2 for value in self.color)
@@ -84,6 +91,27 @@ class Gloss:
     light: GlossLight = GlossLight()
     environment: str = ""
     photo_shines: bool = False
+
+    @property
+    def lobe_widths(self) -> tuple[float, float]:
+        """(squared width of the lobe, squared sine of the light's radius): what the lobe's shape depends on.
+
+        A disc of radius r under a mirror is a lobe of width r / 2, as far as its peak goes; roughness and disc add up
+        as the variances of independent slopes do.
+        """
+        disc = sin(radians(self.light.radius_deg)) ** 2
+        return self.roughness**4 + disc / 4, disc
+
+
+USUAL = Gloss()
+
+
+def of_maps(gloss: Gloss) -> Gloss:
+    """What of a gloss its maps depend on: two that agree in it differ by uniforms only."""
+    if gloss.photo_shines:
+        return gloss
+    roughness = gloss.roughness if gloss.environment else USUAL.roughness
+    return Gloss(gloss.surface, roughness, environment=gloss.environment)
 
 
 def require_sound(gloss: Gloss) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from iibr_core.color import encoded_from_stored, linear_from_srgb, stored_from_encoded
 from iibr_core.rendering.gloss.environment import prefilter_environment
 from iibr_core.rendering.gloss.geometry import SceneGeometry
-from iibr_core.rendering.gloss.microfacet import lobe_widths, reflected_share, unit_direction
+from iibr_core.rendering.gloss.microfacet import reflected_share
 from iibr_core.rendering.gloss.reflection import reflected_light, reflection_disparity, separate_light
 from iibr_core.rendering.gloss.settings import Gloss, require_sound
 from iibr_core.rendering.gloss.surface import fit_normals, surface_mask
@@ -123,13 +123,13 @@ def shade(
             size, should_stop,
         )  # fmt: skip
     if environment is not None or any(gloss.light.color):
-        width2, disc = lobe_widths(gloss)
+        width2, disc = gloss.lobe_widths
+        light = np.array((gloss.light.unit_direction, gloss.light.radiance), np.float32)
         around = NO_ENVIRONMENT if environment is None else environment
         in_bands(
             lambda first, last: _add_lobes(
                 colors, disparity, near, maps.disparity, maps.normals, maps.mask, t, s, maps.geometry.focal_px,
-                unit_direction(gloss), np.array(gloss.light.radiance, np.float32), width2, disc, gloss.reflectance,
-                environment is not None, around, first, last,
+                light, width2, disc, gloss.reflectance, environment is not None, around, first, last,
             ),
             size, should_stop,
         )  # fmt: skip
@@ -137,13 +137,16 @@ def shade(
 
 @kernel
 def _add_lobes(
-    colors, disparity, near, photo_disparity, normals, mask, t, s, focal, light, light_color, width2, disc,
-    reflectance, has_environment, environment, first, last,
+    colors, disparity, near, photo_disparity, normals, mask, t, s, focal, light, width2, disc, reflectance,
+    has_environment, environment, first, last,
 ):  # fmt: skip
-    """Rows [first, last): the lobe of the light, and what is reflected of the surroundings, over the view's colours."""
+    """Rows [first, last): the lobe of the light, and what is reflected of the surroundings, over the view's colours.
+
+    light: its direction and its radiance, (2, 3).
+    """
     height, width = disparity.shape
     centre_y, centre_x = (height - 1) / 2, (width - 1) / 2
-    lx, ly, lz = light[0], light[1], light[2]
+    lx, ly, lz = light[0, 0], light[0, 1], light[0, 2]
     rows, columns = environment.shape[:2]
     for y in range(first, last):
         for x in range(width):
@@ -201,7 +204,7 @@ def _add_lobes(
                     upper = (1 - b) * environment[top, left, c] + b * environment[top, right, c]
                     lower = (1 - b) * environment[below, left, c] + b * environment[below, right, c]
                     linear += around * ((1 - a) * upper + a * lower - linear)
-                linear += lobe * (light_color[c] - linear)
+                linear += lobe * (light[1, c] - linear)
                 colors[y, x, c] = srgb_scalar(linear)
 
 

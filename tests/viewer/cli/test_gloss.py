@@ -43,6 +43,20 @@ def test_a_light_field_is_written_with_its_gloss(
     assert np.array_equal(views_of(generated), views_of(exported))
 
 
+def test_a_screenshot_shows_the_views_that_are_written(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, gloss_path: Path, tmp_path: Path
+) -> None:
+    generated, shot = tmp_path / "generated", tmp_path / "shot.png"
+    assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", generated, "--gloss", gloss_path) == 0
+    words = ("--grid", 3, "--view", "1,0", "--gloss", gloss_path, "-o", shot)
+    assert run(monkeypatch, "screenshot", photo_path, *words) == 0
+    drawn = np.asarray(Image.open(shot)).astype(int)
+    assert np.abs(drawn - views_of(generated)[5]).mean() < 2
+    again = tmp_path / "again.png"
+    assert run(monkeypatch, "screenshot", photo_path, "--grid", 3, "--like", shot, "-o", again) == 0
+    assert np.array_equal(np.asarray(Image.open(again)), drawn)
+
+
 def test_an_environment_that_is_not_there_is_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, gloss_path: Path
 ) -> None:

@@ -98,7 +98,8 @@ class Passes:
     ) -> None:
         """Draw a cell, or those of its tiles that are of a kind: "FLAT" or "EDGES". drawn: what of it is asked for."""
         program, quad = self._programs.get(
-            "pinhole.frag", _switches(lens, _layers(lens), lens.has_dolly and "DOLLY", kind)
+            "pinhole.frag",
+            _switches(lens, _layers(lens), lens.has_dolly and "DOLLY", kind, _has_gloss(field, lens) and "GLOSS"),
         )
         width, height = targets.size_px
         self._set_field(program, field, lens)
@@ -184,6 +185,7 @@ class Passes:
                 tiles and "TILES",
                 reprojects and "REPROJECT",
                 reprojects and lens.has_dolly and "DOLLY",
+                _has_gloss(field, lens) and "GLOSS",
             ),
         )
         self._set_field(program, field, lens)
@@ -317,6 +319,8 @@ class Passes:
             part=lens.part,
             sample_width=min(float(lens.stride), lens.diameter),
         )
+        if field.gloss is not None and lens.optics.gloss is not None and "gloss_surface" in program.declared:
+            field.gloss.use(program, lens.optics.gloss, (lens.eye.s, lens.eye.t))
 
     def _set_blocks(self, program: Program, field: LightFieldTexture, targets: RenderTargets) -> None:
         across, down = targets.tiles.framebuffer.size
@@ -362,6 +366,10 @@ def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
 
 def _layers(lens: Lens) -> str:
     return "LAYERS" if lens.keeps_layers else ""
+
+
+def _has_gloss(field: LightFieldTexture, lens: Lens) -> bool:
+    return field.gloss is not None and lens.optics.gloss is not None
 
 
 def _needs_reprojection(field: LightFieldTexture, lens: Lens, samples: list[ApertureSample]) -> bool:

@@ -9,6 +9,7 @@ import math
 import time
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors
 from viewer.gpu.context import GLContext
+from viewer.gpu.gloss_textures import GlossTextures
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, r2_sequence
@@ -36,6 +38,9 @@ from viewer.gpu.render_targets import RenderTargets
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import DrawReport
 from viewer.model.state.optics import Optics
+
+if TYPE_CHECKING:
+    from iibr_core.rendering.gloss.shading import GlossMaps
 
 PREPARED_SIZE = ScreenSize(16, 16)
 KEPT_SIZES = 2
@@ -106,6 +111,15 @@ class Renderer:
         if 0 <= row < field.grid.rows and 0 <= column < field.grid.columns and field.present[row, column]:
             self._stop_picture()
         field.upload(row, column, colors, disparity)
+        self._accumulation = None
+
+    def set_gloss(self, maps: GlossMaps | None) -> None:
+        """What gloss means for the field, for optics that have one; None where it means nothing."""
+        field = self._open_field()
+        self._stop_picture()
+        if field.gloss is not None:
+            field.gloss.release()
+        field.gloss = None if maps is None else GlossTextures(self.ctx, maps)
         self._accumulation = None
 
     def render(

@@ -473,8 +473,8 @@ class Picture:
     """Everything the picture depends on: the scene's generation, how many views were uploaded, the optics, its size in
     pixels.
 
-    samples: how far it has come on its way to the converged picture. previews: of edited depth shown so far. part: what
-    is drawn of it, as a share of it.
+    samples: how far it has come on its way to the converged picture. previews: of edited depth, and of gloss,
+    shown so far. part: what is drawn of it, as a share of it.
     """
 
     generation: int

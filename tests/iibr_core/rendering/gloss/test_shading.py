@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.rendering.gloss.geometry import SceneGeometry
-from iibr_core.rendering.gloss.microfacet import lobe_widths, reflected_share, unit_direction
+from iibr_core.rendering.gloss.microfacet import reflected_share
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.gloss.shading import make_gloss_maps, shade, shade_views
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
@@ -26,7 +26,7 @@ def plainly_shaded(maps, offset, photo):
     """The same of a flat map, whose disparity is known at every place: pixel by pixel, by the docstrings' formulas."""
     height, width = maps.mask.shape
     result = linear_from_srgb(photo)
-    light, focal = unit_direction(maps.gloss), maps.geometry.focal_px
+    light, focal = maps.gloss.light.unit_direction, maps.geometry.focal_px
     for y, x in np.ndindex(height, width):
         d = maps.disparity[y, x]
         v, u = y + d * offset[0], x + d * offset[1]
@@ -37,7 +37,7 @@ def plainly_shaded(maps, offset, photo):
         eye = np.array([offset[1], offset[0], 0]) - point
         eye /= np.linalg.norm(eye)
         normal = maps.normals[round(v), round(u)]
-        share = reflected_share(*map(float, (*normal, *eye, *light)), *lobe_widths(maps.gloss), maps.gloss.reflectance)
+        share = reflected_share(*map(float, (*normal, *eye, *light)), *maps.gloss.lobe_widths, maps.gloss.reflectance)
         for c in range(3):
             result[y, x, c] += share * (maps.gloss.light.radiance[c] - result[y, x, c])
     return srgb_from_linear(result)
