@@ -14,13 +14,14 @@ import argparse
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, radians, sin
+from functools import partial
+from math import cos, nan, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.evaluation.reference_warp import NOWHERE, SAMPLES, WarpedView, _fill_holes, _lanczos
+from iibr_core.evaluation.reference_warp import _fill_holes, reference_warp_to
 from iibr_core.generation.free_views import FreeViews
 from iibr_core.rendering.free_view import target_from_photo
 from iibr_core.training.scenes.random_scene import random_scene
@@ -96,61 +97,19 @@ def truth(scene: RaycastScene, camera: Camera) -> tuple[FloatImage, FloatImage]:
     return colors, disparity / np.float32(camera.focal_px[0])
 
 
-def landed(photo: Camera, camera: Camera, inverse_depth: FloatImage, samples: int) -> NDArray[np.float64]:
-    """(4, H * samples, W * samples): where points of the photo's pixels land, x, y and 1 / depth, and what is before
-    the camera.
-    """
-    height, width = inverse_depth.shape
-    y, x = (np.arange(samples * side) // samples for side in (height, width))
-    points_y, points_x = (((np.arange(samples * side) + 0.5) / samples - 0.5) for side in (height, width))
-    grid = np.stack(
-        [
-            *np.broadcast_arrays(points_x[None], points_y[:, None]),
-            np.ones((len(y), len(x))),
-            inverse_depth[y[:, None], x],
-        ]
-    )
-    result = np.einsum("ij,jyx->iyx", target_from_photo(photo, camera, 1.0), grid)
-    return np.stack([*(result[[0, 1, 3]] / result[2]), result[2] > 0])
-
-
-def nearest_points(at: NDArray[np.float64], size: ImageSize) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pixels of the target (flat) that something lands on, and which point (flat) is the nearest of all there."""
-    x, y, inverse_depth, is_before = (part.ravel() for part in at)
-    u, v = np.floor(x + 0.5), np.floor(y + 0.5)
-    inside = np.flatnonzero((is_before > 0) & (u >= 0) & (v >= 0) & (u < size.width) & (v < size.height))
-    order = inside[np.argsort(inverse_depth[inside], kind="stable")]
+def plain_warp(photo: FloatImage, disparity: FloatImage, matrix: NDArray[np.float64], size: ImageSize) -> FloatImage:
+    """Every pixel's colour on the pixel where its middle lands, the nearest on top; holes as in the reference warp."""
+    rows, columns = np.indices(disparity.shape)
+    landed = matrix @ np.stack([columns, rows, np.ones_like(rows), disparity]).reshape(4, -1)
+    x, y = np.floor(landed[:2] / landed[2] + 0.5)
+    nearness = landed[3] / landed[2]
+    inside = np.flatnonzero((landed[2] > 0) & (x >= 0) & (y >= 0) & (x < size.width) & (y < size.height))
+    inside = inside[np.argsort(nearness[inside])]
     best = np.full(size.height * size.width, -1)
-    best[(v[order] * size.width + u[order]).astype(int)] = order  # the last one, the nearest, stays
-    pixels = np.flatnonzero(best >= 0)
-    return pixels, best[pixels]
-
-
-def plain_warp(photo: FloatImage, inverse_depth: FloatImage, taken: Camera, camera: Camera) -> WarpedView:
-    """Colours carried to the nearest pixel."""
-    pixels, points = nearest_points(at := landed(taken, camera, inverse_depth, 1), camera.size)
-    colors, disparity = np.zeros((*camera.size, 3), np.float32), np.zeros(camera.size, np.float32)
-    hole = np.ones(camera.size, np.bool_)
-    colors.reshape(-1, 3)[pixels] = photo.reshape(-1, 3)[points]
-    disparity.reshape(-1)[pixels] = at[2].ravel()[points]
-    hole.reshape(-1)[pixels] = False
-    return WarpedView(_fill_holes(colors, hole, disparity), disparity, hole)
-
-
-def resampled_warp(photo: FloatImage, inverse_depth: FloatImage, taken: Camera, camera: Camera) -> WarpedView:
-    """`iibr_core.evaluation.reference_warp`, for any camera: only disparities are carried."""
-    pixels, points = nearest_points(at := landed(taken, camera, inverse_depth, SAMPLES), camera.size)
-    disparity, hole = np.full(camera.size, NOWHERE, np.float32), np.ones(camera.size, np.bool_)
-    disparity.reshape(-1)[pixels] = at[2].ravel()[points]
-    hole.reshape(-1)[pixels] = False
-    disparity[hole] = 0
-    y, x = np.indices(camera.size)
-    back = np.linalg.inv(target_from_photo(taken, camera, 1.0))
-    from_x, from_y, w, _ = np.einsum("ij,jyx->iyx", back, np.stack([x, y, np.ones_like(x), disparity]))
-    from_x, from_y = np.where(hole, 0, from_x / w), np.where(hole, 0, from_y / w)
-    height, width = photo.shape[:2]
-    hole |= (from_x < -0.5) | (from_y < -0.5) | (from_x > width - 0.5) | (from_y > height - 0.5)
-    return WarpedView(_fill_holes(_lanczos(photo, from_x, from_y), hole, disparity), disparity, hole)
+    best[(y[inside] * size.width + x[inside]).astype(int)] = inside  # the last one, the nearest, stays
+    hole = (best < 0).reshape(size)
+    colors = np.where(hole[..., None], 0, photo.reshape(-1, 3)[best].reshape(*size, 3)).astype(np.float32)
+    return _fill_holes(colors, hole, np.where(hole, 0, nearness[best].reshape(size)).astype(np.float32))
 
 
 def main() -> None:
@@ -186,18 +145,24 @@ def judge(
     taken = photo_camera(scene, size)
     photo, inverse_depth = truth(scene, taken)
     cameras = cameras_of(scene, size, 1 / float(inverse_depth.max()))
+    # In view steps of a fiftieth of the nearest's distance.
+    scale_px = scene.focal_px * 0.02 / float(inverse_depth.max())
+    disparity = inverse_depth * np.float32(scale_px)
+    start = time.process_time()
     ours = FreeViews(photo, inverse_depth, taken, list(cameras.values()))
-    ways: dict[str, Callable[[Camera], FloatImage]] = {
-        "warp": lambda camera: plain_warp(photo, inverse_depth, taken, camera).colors,
-        "resampled": lambda camera: resampled_warp(photo, inverse_depth, taken, camera).colors,
-        "ours": lambda camera: ours.view(camera).colors,
-    }
+    table.setdefault(("all", "ray set"), []).append((nan, nan, nan, 1e3 * (time.process_time() - start)))
     for name, camera in cameras.items():
         true, _ = truth(scene, camera)
-        judged = resampled_warp(photo, inverse_depth, taken, camera)
+        matrix = target_from_photo(taken, camera, scale_px)
+        judged = reference_warp_to(photo, disparity, matrix, size)
+        ways: dict[str, Callable[[], FloatImage]] = {
+            "warp": partial(plain_warp, photo, disparity, matrix, size),
+            "resampled": lambda at=matrix: reference_warp_to(photo, disparity, at, size).colors,
+            "ours": lambda at=camera: ours.view(at).colors,
+        }
         for way, make in ways.items():
             start = time.process_time()
-            made = np.clip(make(camera), 0, 1)
+            made = np.clip(make(), 0, 1)
             ms = 1e3 * (time.process_time() - start)
             figures = (bounded_psnr(made, true, mask) for mask in (None, judged.visible, judged.hole))
             table.setdefault((name, way), []).append((*figures, ms))

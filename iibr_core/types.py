@@ -206,6 +206,12 @@ class Camera:
         if not 0 < near < far:
             raise InputError(f"{self.source}: depths from {near:g} to {far:g} are not positive and ascending")
 
+    @property
+    def intrinsics(self) -> NDArray[np.float64]:
+        """(3, 3): pixels (x, y, 1) from directions (x / z, y / z, 1) by the camera's axes."""
+        (focal_x, focal_y), (x, y) = self.focal_px, self.centre_px
+        return np.array([[focal_x, 0.0, x], [0.0, focal_y, y], [0.0, 0.0, 1.0]])
+
     def resized(self, size: ImageSize) -> Camera:
         """The same with larger or smaller pictures."""
         (height, width), (focal_x, focal_y), (x, y) = self.size, self.focal_px, self.centre_px

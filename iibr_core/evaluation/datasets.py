@@ -11,11 +11,10 @@ from scipy.ndimage import map_coordinates
 
 from iibr_core.formats.files import entries_of, is_folder
 from iibr_core.formats.images.photo import read_picture
-from iibr_core.formats.images.picture_source import source_size
 from iibr_core.formats.light_fields.registry import LAYOUTS, find_light_field
 from iibr_core.formats.light_fields.scene import KnownDisparity, KnownView, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import Disparity, FloatImage, ImageSize, InputError
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
 
 
 def read_scene(folder: Path) -> MultiView | None:
@@ -53,24 +52,26 @@ def read_known_disparity(known: KnownDisparity, size: ImageSize, colors: FloatIm
     return read_disparity(known.path, size, known.scale, colors)
 
 
-def read_view(view: KnownView, max_pixels: int) -> tuple[FloatImage, NDArray[np.bool_]]:
-    """Colours (H, W, 3) sRGB-encoded in 0..1, and where they are known (H, W).
+def read_view(view: KnownView, max_pixels: int) -> FloatImage:
+    """Colours (H, W, 3) sRGB-encoded in 0..1."""
+    return np.clip(read_picture(view.picture, max_pixels).pixels, 0, 1)
 
-    A turned camera's picture is turned back, so that it looks as the given one does.
+
+def read_straight_view(view: KnownView, max_pixels: int) -> tuple[FloatImage, NDArray[np.bool_]]:
+    """The same, a turned camera's picture turned back so that it looks as the given one does, and where it is known
+    (H, W).
     """
-    pixels = np.clip(read_picture(view.picture, max_pixels).pixels, 0, 1)
-    if view.turned is None:
+    pixels = read_view(view, max_pixels)
+    if view.camera is None:
         return pixels, np.ones(pixels.shape[:2], np.bool_)
-    smaller = np.eye(3)
-    for axis, (stored, now) in enumerate(zip(source_size(view.picture)[::-1], pixels.shape[1::-1])):
-        smaller[axis, axis] = now / stored
-        smaller[axis, 2] = 0.5 * now / stored - 0.5
-    return undo_rotation(pixels, smaller @ view.turned @ np.linalg.inv(smaller))
+    camera = view.camera.resized(image_size(pixels))
+    own = camera.intrinsics
+    return undo_rotation(pixels, own @ camera.world_from_camera.T @ np.linalg.inv(own))
 
 
 def undo_rotation(pixels: FloatImage, turned: NDArray[np.float64]) -> tuple[FloatImage, NDArray[np.bool_]]:
     """The picture (H, W, 3) as an equal camera at its place would see it that looks as the given one does, and where
-    that is known. turned: see `KnownView`, for pictures of this size.
+    that is known. turned: (3, 3), takes a pixel (x, y, 1) of that camera's frame to this picture's.
     """
     height, width = pixels.shape[:2]
     y, x = np.mgrid[0:height, 0:width].astype(np.float64)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,15 +22,15 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
-from iibr_core.evaluation.datasets import read_view
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
 from iibr_core.evaluation.metrics import Mask, bounded_psnr, flip, ssim
-from iibr_core.evaluation.reference_warp import WarpedView, reference_warp
+from iibr_core.evaluation.reference_warp import WarpedView
 from iibr_core.evaluation.refocus import FocalStack, RefocusResult, foci_of, lens_focus, score_methods
+from iibr_core.evaluation.trial_views import PlaneViews, TrialViews, trial_views
 from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Trial, TrialInput, trial_input, trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.scene import MultiView
-from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
+from iibr_core.generation.view_maker import quantise_as_stored
 from iibr_core.types import (
     DEFAULT_QUALITY,
     Disparity,
@@ -185,15 +185,19 @@ class _Evaluator:
 
     def evaluate(self) -> EvaluationResult:
         trial, scene, start = self.trial, self.trial.scene, time.perf_counter()
-        offsets = [trial.offset(index) for index in trial.judged]
+        options = self.options
         with (
-            ViewMaker(self.given.photo, self.refined, offsets, self.options.qualities, self.should_stop) as maker,
+            trial_views(
+                trial, self.given.photo, self.refined, options.qualities, options.max_pixels, self.should_stop
+            ) as views,
             ThreadPoolExecutor(2, thread_name_prefix="iibr-metrics") as pool,
         ):
             for done, index in enumerate(trial.judged):
                 self.report_progress(done, len(trial.judged), f"{scene.name}: {scene.views[index].name}")
-                self._judge_view(index, maker, pool)
-            agreement = self._consistency(maker, offsets) if self.options.with_consistency else {}
+                self._judge_view(index, views, pool)
+            agreement = {}
+            if options.with_consistency and isinstance(views, PlaneViews):
+                agreement = self._consistency(views)
         rows = tuple(_row(method, of_views) for method, of_views in self.figures.items())
         return EvaluationResult(
             scene.name,
@@ -211,13 +215,13 @@ class _Evaluator:
             time.perf_counter() - start,
         )
 
-    def _judge_view(self, index: int, maker: ViewMaker, pool: ThreadPoolExecutor) -> None:
+    def _judge_view(self, index: int, views: TrialViews, pool: ThreadPoolExecutor) -> None:
         offset, view = self.trial.offset(index), self.trial.scene.views[index]
-        truth, known = read_view(view, self.options.max_pixels)
-        judge = reference_warp(self.given.photo, self.given.judge.values, offset)
-        made = {IDENTITY: (self.given.photo, 0.0), **self._reference_view(offset)}
-        for quality in self.options.qualities:
-            made_view, ms = maker.timed_view(quality, offset)
+        truth, known = views.truth(index)
+        judge = views.warp(self.given.judge.values, index)
+        made = {IDENTITY: (self.given.photo, 0.0), **self._reference_view(views, index)}
+        for quality in views.qualities:
+            made_view, ms = views.timed_view(quality, index)
             made[quality] = quantise_as_stored(made_view.colors), ms
         hole, visible = judge.hole & known, judge.visible & known
         self.hole_shares.append(float(hole.mean()))
@@ -231,13 +235,14 @@ class _Evaluator:
         pictures = {TRUTH: truth, **{method: image for method, (image, _) in made.items()}}
         if index == self.farthest:
             self.shown = view.name, {method: bytes_from_encoded(image) for method, image in pictures.items()}
-        self._keep_row(offset, pictures, judge)
+        if isinstance(views, PlaneViews):
+            self._keep_row(offset, pictures, judge)
         list(pool.map(lambda method: self.stacks[method].add(offset, pictures[method]), self.stacks))
 
     def _stacks(self) -> dict[str, FocalStack]:
         """Of each method's light field and of the true one; none where the views are no grid."""
         trial, photo = self.trial, self.given.photo
-        if any(view.turned is not None for view in trial.scene.views):
+        if any(view.camera is not None for view in trial.scene.views):
             return {}
         offsets = [trial.offset(index) for index in trial.judged]
         foci = foci_of(offsets, self.given.judge.values)
@@ -259,9 +264,9 @@ class _Evaluator:
         shown = DEFAULT_QUALITY if DEFAULT_QUALITY in qualities else (*qualities, REFERENCE)[0]
         return score_methods(self.stacks, TRUTH, shown, self.lens)
 
-    def _reference_view(self, offset: ViewOffset) -> dict[str, tuple[FloatImage, float]]:
+    def _reference_view(self, views: TrialViews, index: int) -> dict[str, tuple[FloatImage, float]]:
         start = time.perf_counter()
-        colors = reference_warp(self.given.photo, self.disparity.values, offset).colors
+        colors = views.warp(self.disparity.values, index).colors
         return {REFERENCE: (quantise_as_stored(colors), 1e3 * (time.perf_counter() - start))}
 
     def _figures(
@@ -294,12 +299,12 @@ class _Evaluator:
                 epis[method] = bytes_from_encoded(np.stack([line for _, line in every]))
         return epis
 
-    def _consistency(self, maker: ViewMaker, offsets: Sequence[ViewOffset]) -> dict[str, Consistency]:
+    def _consistency(self, views: PlaneViews) -> dict[str, Consistency]:
         found: dict[str, Consistency] = {}
-        for quality in self.options.qualities:
+        for quality in views.qualities:
             self.report_progress(0, 0, f"{self.trial.scene.name}: consistency, {quality}")
-            make = partial(maker.view, quality)
-            found[quality] = consistency(make, offsets, self.given.photo, self.refined)
+            make = partial(views.maker.view, quality)
+            found[quality] = consistency(make, views.offsets, self.given.photo, self.refined)
         if len(self.lines) + 1 >= LEAST_EPI_VIEWS:
             rms, off_px = line_straightness(self.given.photo, self.given.judge.values, self.lines)
             found[TRUTH] = Consistency(math.nan, math.nan, rms, off_px, 0)

@@ -15,7 +15,7 @@ import numpy as np
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.alignment import fit_to_truth, fit_to_views
-from iibr_core.evaluation.datasets import read_known_disparity, read_view
+from iibr_core.evaluation.datasets import read_known_disparity, read_straight_view, read_view
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.formats.light_fields.scene import KnownDisparity, MultiView
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
@@ -90,7 +90,7 @@ def _evenly_spaced(indices: list[int], most: int | None) -> list[int]:
 
 def _left_corners(scene: MultiView) -> tuple[int, int] | None:
     """The bottom left and the top left view of a grid of several rows and columns; None of other scenes."""
-    if any(view.turned is not None for view in scene.views):
+    if any(view.camera is not None for view in scene.views):
         return None
     places = np.array([view.offset for view in scene.views])
     (top, left), (bottom, right) = places.min(axis=0), places.max(axis=0)
@@ -113,7 +113,7 @@ def trial_input(
     Raises InputError where there is no disparity of the kind asked for, or it cannot be read.
     """
     scene, view = trial.scene, trial.scene.views[trial.given]
-    photo, _ = read_view(view, max_pixels)
+    photo = read_view(view, max_pixels)
     truth = _map_of(trial, {k: known for k, known in scene.disparity.items() if known.is_truth}, max_pixels)
     if source == "gt" and truth is None:
         raise InputError(
@@ -137,7 +137,7 @@ def _map_of(trial: Trial, maps: Mapping[int, KnownDisparity], max_pixels: int) -
         return None
     scene = trial.scene
     nearest = min(maps, key=lambda index: sum(part**2 for part in trial.offset(index)))
-    colors, _ = read_view(scene.views[nearest], max_pixels)
+    colors = read_view(scene.views[nearest], max_pixels)
     stored = read_known_disparity(maps[nearest], image_size(colors), colors)
     if nearest == trial.given:
         return stored
@@ -188,6 +188,6 @@ def _align_to_truth(
         values, to = fit_to_truth(estimate.values, truth.values), "the true disparity"
     else:
         farthest = sorted(trial.judged, key=lambda k: -max(map(abs, trial.offset(k))))[:ALIGNING_VIEWS]
-        truths = [(trial.offset(k), read_view(trial.scene.views[k], max_pixels)[0]) for k in farthest]
+        truths = [(trial.offset(k), read_straight_view(trial.scene.views[k], max_pixels)[0]) for k in farthest]
         values, to = fit_to_views(photo, estimate.values, truths), "true views"
     return Disparity(values, f"{estimate.source}, scale and shift fitted to {to}")

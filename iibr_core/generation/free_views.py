@@ -136,7 +136,7 @@ def _looked_at(photo: Camera, target: Camera, depths: tuple[float, float]) -> tu
     x, y = (np.linspace(-0.5, side - 0.5, LOOKED_AT) for side in target.size[::-1])
     pixels = np.stack([part.ravel() for part in (*np.meshgrid(x, y), np.ones((LOOKED_AT, LOOKED_AT)))])
     photo_from_world = photo.world_from_camera.T
-    rays = photo_from_world @ target.world_from_camera @ (np.linalg.inv(_intrinsics(target)) @ pixels)
+    rays = photo_from_world @ target.world_from_camera @ (np.linalg.inv(target.intrinsics) @ pixels)
     place = photo_from_world @ (target.position - photo.position)
     height, width = photo.size
     shown, crossed = [], []
@@ -144,7 +144,7 @@ def _looked_at(photo: Camera, target: Camera, depths: tuple[float, float]) -> tu
         with np.errstate(divide="ignore", invalid="ignore"):
             along = (depth - place[2]) / rays[2]
             points = place[:, None] + along * rays
-            at = (_intrinsics(photo) @ (points / depth))[:2].T
+            at = (photo.intrinsics @ (points / depth))[:2].T
             crossing = (place[:2, None] - place[2] / rays[2] * rays[:2]).T
         beyond = np.array([width, height]) * MOST_BEYOND
         before = along > 0
@@ -155,12 +155,6 @@ def _looked_at(photo: Camera, target: Camera, depths: tuple[float, float]) -> tu
     if not ((places > -0.5) & (places < np.array([width, height]) - 0.5)).all(axis=1).any():
         raise InputError(f"{target.source}: sees nothing of the photo, which looks elsewhere; leave this pose out")
     return places, np.concatenate(crossed)
-
-
-def _intrinsics(camera: Camera) -> Points:
-    """(3, 3): pixels from directions."""
-    (focal_x, focal_y), (x, y) = camera.focal_px, camera.centre_px
-    return np.array([[focal_x, 0.0, x], [0.0, focal_y, y], [0.0, 0.0, 1.0]])
 
 
 def _margins(size: ImageSize, places: Points) -> Margins:

@@ -45,15 +45,9 @@ Matrix = NDArray[np.float64]
 
 def disparity_space(camera: Camera, scale_px: float) -> Matrix:
     """(4, 4): from (x, y, 1, d) of a camera's picture to its (X, Y, Z, 1) / Z, for a disparity d of scale_px / Z."""
-    (focal_x, focal_y), (centre_x, centre_y) = camera.focal_px, camera.centre_px
-    return np.array(
-        [
-            [1 / focal_x, 0, -centre_x / focal_x, 0],
-            [0, 1 / focal_y, -centre_y / focal_y, 0],
-            [0, 0, 1, 0],
-            [0, 0, 0, 1 / scale_px],
-        ]
-    )
+    space = np.diag([1.0, 1.0, 1.0, 1 / scale_px])
+    space[:3, :3] = np.linalg.inv(camera.intrinsics)
+    return space
 
 
 def target_from_photo(photo: Camera, target: Camera, scale_px: float) -> Matrix:

@@ -11,12 +11,9 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from iibr_core.formats.files import entries_of, is_file
 from iibr_core.formats.images.picture_source import PictureSource, source_size
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import Camera, GridShape, ImageSize, InputError, ViewOffset
 
 PICTURE_EXTENSIONS = (".png", ".jpg", ".jpeg", ".ppm", ".exr", ".tif", ".tiff", ".bmp", ".webp")
 MAP_EXTENSIONS = (".pfm", ".npy", ".exr", ".png", ".pgm")
@@ -31,15 +28,15 @@ GridIndex = tuple[int, int]
 class KnownView:
     """One picture. offset: its viewpoint (t, s) in view steps, from any origin. picture: where its pixels are.
 
-    turned: (3, 3), takes a pixel (x, y, 1) of the given view's frame to this picture's where cameras are turned
-    against each other; None where all look the same way. name: for people ("v00 u08"). place: on the scene's grid,
+    camera: that took it, in view steps and by the axes of the given view's, where cameras stand freely; None where all
+    look the same way from a plane. name: for people ("v00 u08"). place: on the scene's grid,
     None where it has none.
     """
 
     name: str
     offset: ViewOffset
     picture: PictureSource
-    turned: NDArray[np.float64] | None = None
+    camera: Camera | None = None
     place: GridIndex | None = None
 
     @property

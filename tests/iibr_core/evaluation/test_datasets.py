@@ -8,7 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.datasets import find_scenes, read_known_disparity, read_scene, read_view, undo_rotation
+from iibr_core.evaluation.datasets import (
+    find_scenes,
+    read_known_disparity,
+    read_scene,
+    read_straight_view,
+    undo_rotation,
+)
+from iibr_core.evaluation.protocol import Options, evaluate
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.scene import KnownView, MultiView, nearest_view
@@ -200,7 +207,7 @@ def test_llff_viewpoints_and_turned_cameras(tmp_path: Path) -> None:
     assert offset_by_file(scene) == {f"IMG_{k:02d}": (y, x) for k, (x, y) in enumerate(places)}
     assert scene.range_px == pytest.approx((focal / 40, focal / 8))
     for k, (x, y) in enumerate(places):
-        pixels, known = read_view(scene.views[k], 10**6)
+        pixels, known = read_straight_view(scene.views[k], 10**6)
         wanted = seen_wall(np.array([x, y, 0.0]), straight, focal)
         assert known.mean() > 0.7
         assert np.abs(pixels - wanted)[known].max() < 0.02
@@ -216,10 +223,28 @@ def test_llff_in_a_turned_world_gives_the_same(tmp_path: Path) -> None:
         np.array([v.offset for v in plain.views]), np.array([v.offset for v in other.views]), atol=1e-9
     )
     for one, two in zip(plain.views, other.views):
-        assert one.turned is not None
-        assert two.turned is not None
-        np.testing.assert_allclose(one.turned, two.turned, atol=1e-6)
+        assert one.camera is not None
+        assert two.camera is not None
+        np.testing.assert_allclose(one.camera.world_from_camera, two.camera.world_from_camera, atol=1e-6)
+        np.testing.assert_allclose(one.camera.position, two.camera.position, atol=1e-6)
     assert "0.2 view steps before or behind" in plain.notes[0]
+
+
+def test_llff_views_are_made_for_their_cameras_as_they_are(tmp_path: Path) -> None:
+    """A wall at 10, seen by cameras that are turned and stand before and behind the plane."""
+    focal = 60.0
+    cameras = [
+        ((0.0, 0.0, 0.0), np.eye(3)),
+        ((1.0, 0.0, 0.8), rotation("y", 4)),
+        ((-1.0, 0.0, -0.8), rotation("z", -5)),
+    ]
+    folder = write_llff(tmp_path / "fern", cameras, focal)
+    np.save(tmp_path / "wall.npy", np.full((HEIGHT, WIDTH), focal / 10.0, np.float32))
+    (result,) = evaluate(scene_of(folder), Options(tmp_path / "wall.npy"))
+    rows = {row.method: row.mean for row in result.rows}
+    assert list(rows) == ["identity", "reference warp", "fast"]
+    assert rows["identity"].full_db < 25 < 35 < rows["fast"].visible_db
+    assert result.consistency == {}
 
 
 def test_turning_back_by_nothing_changes_nothing() -> None:
@@ -232,7 +257,7 @@ def test_turning_back_by_nothing_changes_nothing() -> None:
 def test_a_turned_view_made_smaller_is_the_small_turned_view(tmp_path: Path) -> None:
     cameras = [((0.0, 0.0, 0.0), np.eye(3)), ((1.0, 0.0, 0.0), rotation("y", 4)), ((-1.0, 0, 0), np.eye(3))]
     scene = scene_of(write_llff(tmp_path / "fern", cameras, 60.0))
-    small, known = read_view(scene.views[1], HEIGHT * WIDTH // 4)
+    small, known = read_straight_view(scene.views[1], HEIGHT * WIDTH // 4)
     full = seen_wall(np.array([1.0, 0, 0]), np.eye(3), 60.0)
     wanted = full.reshape(HEIGHT // 2, 2, WIDTH // 2, 2, 3).mean(axis=(1, 3))
     assert small.shape == wanted.shape
@@ -278,9 +303,9 @@ LLFF_DAMAGE: list[tuple[Damage, str]] = [
     (lambda f: (f / "poses_bounds.npy").write_bytes(b"no array"), "poses_bounds.npy"),
     (lambda f: np.save(f / "poses_bounds.npy", rows_of(f)[:, :16]), "17 numbers"),
     (lambda f: np.save(f / "poses_bounds.npy", np.zeros((3, 17), object), allow_pickle=True), "poses_bounds.npy"),
-    (lambda f: spoil(f, 0, 0, np.nan), "rotations"),
-    (lambda f: spoil(f, 1, 0, 3.0), "rotations"),
-    (lambda f: spoil(f, 1, 4, 0.0), "positive"),
+    (lambda f: spoil(f, 0, 0, np.nan), "NaN"),
+    (lambda f: spoil(f, 1, 0, 3.0), "rotation"),
+    (lambda f: spoil(f, 1, 4, 0.0), "pixels"),
     (lambda f: spoil(f, 2, 15, -1.0), "depths"),
 ]
 

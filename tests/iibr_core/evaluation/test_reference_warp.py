@@ -10,10 +10,10 @@ import pytest
 from iibr_core.evaluation.alignment import fit_to_truth, fit_to_views
 from iibr_core.evaluation.consistency import LineView, consistency, disagreement, line_straightness
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.evaluation.reference_warp import LOBES, SAMPLES, reference_warp
+from iibr_core.evaluation.reference_warp import LOBES, SAMPLES, reference_warp, reference_warp_to
 from iibr_core.evaluation.trials import warp_disparity
 from iibr_core.rendering.view_synthesis import RenderedView
-from iibr_core.types import ViewOffset
+from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import FRONT, HEIGHT, WALL, WIDTH, disparity_of_square, view_of_square, view_of_wall
 from tests.iibr_core.scenes import smooth_texture
 
@@ -63,6 +63,32 @@ def test_the_warp_is_its_slow_twin(offset: ViewOffset) -> None:
         assert warped.disparity[row, column] == nearest[row, column]
         wanted = slow_lanczos(photo, from_y[row, column], from_x[row, column])
         np.testing.assert_allclose(warped.colors[row, column], wanted, atol=1e-5)
+
+
+def test_to_a_camera_on_the_plane_it_is_the_same() -> None:
+    photo, disparity = smooth_texture(14, 17), np.full((14, 17), 0.5, np.float32)
+    disparity[4:9, 5:11] = 2.0
+    beside = np.eye(4)
+    beside[:2, 3] = -1.5, 0.75  # x - d s, y - d t
+    known = reference_warp(photo, disparity, ViewOffset(-0.75, 1.5))
+    warped = reference_warp_to(photo, disparity, beside, ImageSize(14, 17))
+    np.testing.assert_array_equal(warped.hole, known.hole)
+    np.testing.assert_allclose(warped.colors, known.colors, atol=1e-6)
+
+
+def test_to_a_camera_with_half_as_large_pictures_it_is_the_photo_made_smaller() -> None:
+    photo = smooth_texture(16, 20)
+    smaller = np.diag([0.5, 0.5, 1.0, 1.0])  # pixel 2 x becomes pixel x
+    warped = reference_warp_to(photo, np.ones((16, 20), np.float32), smaller, ImageSize(8, 10))
+    assert not warped.hole.any()
+    np.testing.assert_allclose(warped.colors, photo[::2, ::2], atol=1e-6)
+
+
+def test_what_is_behind_a_camera_does_not_land() -> None:
+    behind = np.diag([1.0, 1.0, -1.0, 1.0])
+    warped = reference_warp_to(smooth_texture(6, 7), np.ones((6, 7), np.float32), behind, ImageSize(6, 7))
+    assert warped.hole.all()
+    assert np.isfinite(warped.colors).all()
 
 
 def test_the_own_viewpoint_shows_the_photo() -> None:
