@@ -31,8 +31,9 @@ from iibr_core.generation.memory_model import (
     view_bytes,
     whole_bytes,
 )
+from iibr_core.generation.outer_views import outer_views_of_grid
 from iibr_core.generation.relief import Relief, measure_relief
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS
 from iibr_core.types import (
     DEFAULT_QUALITY,
     TOTAL_PARALLAX,
@@ -67,7 +68,8 @@ class PlanOverrides:
     """What the user decided; None leaves the choice to the plan.
 
     depth_strength multiplies the parallax the plan chose; focus_disparity (px per view step, as given) is the plane
-    that stays still. memory_bytes: what the whole process may take. quality: that views will be made in.
+    that stays still. memory_bytes: what the whole process may take. quality: that views will be made in. inpaint: what
+    will fill their holes, see `load_inpainter`.
     """
 
     grid: GridShape | None = None
@@ -75,6 +77,7 @@ class PlanOverrides:
     focus_disparity: float | None = None
     memory_bytes: int | None = None
     quality: Quality | None = None
+    inpaint: str = DEFAULT_INPAINTER
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ def plan_for_viewing(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
     reasons += _wild_reasons(given, relief)
-    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, budget)
+    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, wanted.inpaint, budget)
     _require_room(plan, photo, budget, keeps_views)
     return replace(plan, given_range=(relief.low, relief.high))
 
@@ -161,15 +164,16 @@ def plan_literal(
     memory_bytes: int | None = None,
     quality: Quality | None = None,
     keeps_views: bool = False,
+    inpaint: str = DEFAULT_INPAINTER,
 ) -> ScenePlan:
     """Plan for `--literal`: the given disparity is taken as it is, views at integer steps.
 
-    quality: None leaves it to the plan. keeps_views: else each is written and forgotten. Raises InputError if the grid
-    has no view or generating it does not fit into memory.
+    quality: None leaves it to the plan. inpaint: see `PlanOverrides`. keeps_views: else each is written and forgotten.
+    Raises InputError if the grid has no view or generating it does not fit into memory.
     """
     reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
     budget = budget_of(memory_bytes)
-    plan = _complete_plan(photo, disparity, grid, 1.0, 0.0, reasons, quality)
+    plan = _complete_plan(photo, disparity, grid, 1.0, 0.0, reasons, quality, inpaint)
     _require_room(plan, photo, budget, keeps_views)
     return replace(plan, notes=_wide_notes(plan, photo.size.width))
 
@@ -230,6 +234,7 @@ def _complete_plan(
     zero: float,
     reasons: list[str],
     wanted: Quality | None,
+    inpaint: str,
     draft_budget: Budget | None = None,
 ) -> ScenePlan:
     """The plan with what follows from grid and scale. wanted: the quality the user asked for. draft_budget: what it
@@ -259,7 +264,7 @@ def _complete_plan(
         peak_bytes,
         (
             *reasons,
-            *_edge_reasons(statistics),
+            *_edge_reasons(statistics, inpaint, len(outer_views_of_grid(grid))),
             *_quality_reasons(costs, quality, wanted is not None),
             f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(peak_bytes + draft_bytes)} to make them,"
             f" {mebibytes(in_all)} in all.",
@@ -286,13 +291,19 @@ def _wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
     return [f"{count} pixels lie far beyond that range, as mistakes do: they count as the nearest or the farthest."]
 
 
-def _edge_reasons(statistics: ParallaxStatistics) -> list[str]:
-    inpainted = (
-        f"holes behind them are inpainted, by {DEFAULT_INPAINTER} if nothing else is asked for: it measures best."
-        if statistics.has_disocclusion
-        else "nothing is disoccluded, so nothing is inpainted."
-    )
-    return [f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; {inpainted}"]
+def _edge_reasons(statistics: ParallaxStatistics, inpaint: str, outer_views: int) -> list[str]:
+    near_edges = f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; "
+    if not statistics.has_disocclusion:
+        return [near_edges + "nothing is disoccluded, so nothing is inpainted."]
+    name = inpaint.partition(":")[0]
+    why = "it measures best" if inpaint == DEFAULT_INPAINTER else "as asked"
+    reasons = [f"{near_edges}holes behind them are inpainted by {name}: {why}."]
+    if inpaint not in INPAINTERS:
+        reasons.append(
+            f"The model paints up to {outer_views} views, each in seconds on a GPU, in minutes without one; the times"
+            " told here leave it out."
+        )
+    return reasons
 
 
 def _quality_reasons(costs: CostEstimates, quality: Quality, is_asked: bool) -> list[str]:

@@ -87,6 +87,13 @@ class SetDepthStrength:
 
 
 @dataclass(frozen=True)
+class SetInpainter:
+    """Fill what the photo never saw in another way, one of `INPAINTERS`; the field is generated anew."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class TakeSettings:
     """Take over the settings a picture was saved with; they are made to fit the open scene."""
 
@@ -336,6 +343,7 @@ Action = (
     | ShowBefore
     | SetZoom
     | SetDepthStrength
+    | SetInpainter
     | FactsRead
     | TakeSettings
     | RestoreSession

@@ -129,6 +129,30 @@ def test_literal_takes_disparity_as_it_is():
     assert 0 < plan.edge_fraction < 0.5
 
 
+@pytest.mark.parametrize(
+    ("inpaint", "words", "paints"),
+    [
+        ("background", "inpainted by background: it measures best.", False),
+        ("patch", "inpainted by patch: as asked.", False),
+        ("diffusion:folder", "inpainted by diffusion: as asked.", True),
+    ],
+)
+def test_the_plan_names_what_fills_the_holes(inpaint, words, paints):
+    photo, disparity = square_before_wall(60, 200)
+    for plan in (
+        plan_for_viewing(photo, disparity, PlanOverrides(inpaint=inpaint)),
+        plan_literal(photo, disparity, GridShape(3, 3), inpaint=inpaint),
+    ):
+        assert any(reason.endswith(words) for reason in plan.reasons)
+        assert any("The model paints up to 8 views" in reason for reason in plan.reasons) == paints
+
+
+def test_nothing_fills_holes_where_there_are_none():
+    photo, disparity = square_before_wall()
+    flat = plan_literal(photo, disparity_of(np.zeros_like(disparity.values)), GridShape(3, 3), inpaint="diffusion:f")
+    assert not any("diffusion" in reason or "paints" in reason for reason in flat.reasons)
+
+
 def test_less_memory_gives_fewer_views():
     photo, disparity = square_before_wall(300, 800)
     roomy = plan_for_viewing(photo, disparity)

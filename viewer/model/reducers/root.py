@@ -33,6 +33,7 @@ from viewer.model.actions import (
     SetFontScale,
     SetFullscreen,
     SetHover,
+    SetInpainter,
     SetLoop,
     SetSpeed,
     SetTheme,
@@ -120,6 +121,8 @@ def reduce(state: AppState, action: Action) -> AppState:
     match action:
         case SetDepthStrength():
             return record_edit(state, _set_depth_strength(state, action), "SetDepthStrength")
+        case SetInpainter(name):
+            return _set_inpainter(state, name)
         case TakeSettings(settings):
             return record_edit(state, _take_settings(state, settings), "TakeSettings")
         case RestoreSession(settings):
@@ -276,6 +279,19 @@ def _set_depth_strength(state: AppState, action: SetDepthStrength) -> AppState:
     restarts = action.is_finished and state.source is not None
     generation = state.next_generation if restarts else state.generation
     return replace(state, depth_strength=strength, generation=generation)
+
+
+def _set_inpainter(state: AppState, name: str) -> AppState:
+    """Of the scene that is open; while another is being read, nothing changes."""
+    source, scene = state.source, state.scene
+    if source is None or scene is None or scene.source is not source or scene.plan is None:
+        return state
+    if name == source.inpaint:
+        return state
+    source = replace(source, inpaint=name)
+    return replace(
+        state, source=source, scene=replace(scene, source=source), generation=state.next_generation, stopped=None
+    )
 
 
 def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
