@@ -155,7 +155,7 @@ class Disparity:
 
     values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
     ("scene.pfm", "none"). inverse_metres: (slope, offset) of 1 / distance in metres over the values, None where only
-    their order is known.
+    their order is known. unknown: (H, W) bool, where the source knew nothing and values were filled in; None: nowhere.
     Raises InputError for values that are not finite, so that no later step has to check.
     """
 
@@ -163,6 +163,7 @@ class Disparity:
     source: str
     notes: tuple[str, ...] = ()
     inverse_metres: tuple[float, float] | None = None
+    unknown: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.values).all():

@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import ceil, floor, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.depth.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
 from iibr_core.depth.edge_profiles import gradient, height_at, walk
@@ -49,12 +50,17 @@ FINE_STRENGTH = 1e-3
 
 
 def refine(
-    photo: FloatImage, disparity: FloatImage, strength: float = 1.0, should_stop: ShouldStop = never
+    photo: FloatImage,
+    disparity: FloatImage,
+    strength: float = 1.0,
+    unknown: NDArray[np.bool_] | None = None,
+    should_stop: ShouldStop = never,
 ) -> FloatImage:
     """The disparity with its soft edges snapped to the photo's edges; no values between foreground and background.
 
     photo: (H, W, 3), sRGB-encoded. disparity: (H, W), any unit in which larger is closer; what is not finite is filled
     by what looks like it beside it. strength: 0 changes nothing, 1 makes steps, between them the slopes are shortened.
+    unknown: (H, W), what was filled like that before; None: nothing.
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
     gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
     in the rims of depth edges (`settle_rims`).
@@ -73,7 +79,8 @@ def refine(
     values = _sharpen(colors, values, least_edge, softness, should_stop)
     if not least_edge > 0:
         return values
-    settled = settle_rims(colors, values, least_edge, should_stop)
+    filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
+    settled = settle_rims(colors, values, least_edge, filled, should_stop)
     # Rims, too, go so far only.
     return settled if strength == 1 else values + np.float32(strength) * (settled - values)
 

@@ -6,33 +6,17 @@ both fly about as crumbs. Where colours do not tell the sides apart nothing chan
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
+from numpy.typing import NDArray
 
-from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color, vote_weight
+from iibr_core.depth.rim_sides import choose_sides
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
 RIM_PX = 2
 """Pixels so close to a depth edge may belong to its other side."""
-SIDES_PX = 3
-"""What lies within so many pixels of a rim is one of its two sides."""
-REACH_PX = 4
-"""Pixels within so many, each way, say to which."""
-SPREAD_PX = 2.0
-"""Standard deviation of their weights by distance."""
-ALIKE = 0.05
-"""Standard deviation of their weights by colour (sRGB-encoded, all channels together)."""
-UNLIKE_WEIGHT = 1e-3
-RIM_WEIGHT = 0.1
-"""Of pixels that are of a rim themselves."""
-MAJORITY = 5.0
-"""A pixel changes sides where the other side has so many times the votes of its own ..."""
-LEAST_TOUCHED = 3
-"""... and so many of its eight neighbours are there, too: lone pixels would fly about as crumbs."""
-TOUCH_ROUNDS = 3
 PLATEAU_SHARE = 0.15
 """A pixel clearly lies between two surfaces if each changes by at most this share of their distance ..."""
 PLATEAU_PX = 2
@@ -41,8 +25,8 @@ MIXED = (0.1, 0.8)
 """How far up from the lower to the higher of both it lies; above that, a round thing turns away from the view."""
 MIXED_EDGES = 5.0
 """Times the least edge: what lies between nearer surfaces may be a slope."""
-LEAST_MIXED = 0.025
-"""A map of whose rims a smaller share is clearly between two surfaces is exact: nothing is changed."""
+LEAST_MEASURED = 0.025
+"""A map of whose rims a smaller share is clearly between two surfaces, or unknown, is exact: nothing is changed."""
 MOST_CLEAR_FELLOWS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_FELLOWS = (2, 4)
@@ -53,27 +37,29 @@ CROWDED = 0.3
 
 
 def settle_rims(
-    photo: FloatImage, values: FloatImage, least_edge: float, should_stop: ShouldStop = never
+    photo: FloatImage,
+    values: FloatImage,
+    least_edge: float,
+    unknown: NDArray[np.bool_],
+    should_stop: ShouldStop = never,
 ) -> FloatImage:
     """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
 
-    least_edge: the step that counts as a depth edge, more than 0. Lone disparities between two surfaces, which maps
-    have that were measured or resampled, are taken for unknown and filled anew; then pixels of rims change sides where
-    the colours say so. An exact map comes back as it is. Raises Cancelled once should_stop is true.
+    least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
+    Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
+    unknown and filled anew; then pixels of rims change sides where the colours say so. An exact map, which has neither
+    such disparities nor unknown ones in its rims, comes back as it is. Raises Cancelled once should_stop is true.
     """
     colors, size = np.ascontiguousarray(photo, np.float32), image_size(values)
     between, rim = np.zeros(values.shape, np.bool_), np.zeros(values.shape, np.bool_)
     clear = in_bands(lambda first, last: _find_between(values, least_edge, first, last, between), size, should_stop)
     in_bands(lambda first, last: _find_rims(values, least_edge, first, last, rim), size, should_stop)
-    if sum(clear) <= LEAST_MIXED * np.count_nonzero(rim):
+    least = LEAST_MEASURED * np.count_nonzero(rim)
+    if sum(clear) > least:
+        values = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
+    elif np.count_nonzero(unknown & rim) <= least:
         return values
-    whole = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
-    settled = whole.copy()
-    in_bands(lambda first, last: _choose_sides(colors, whole, rim, least_edge, first, last, settled), size, should_stop)
-    for _ in range(TOUCH_ROUNDS):
-        chosen, settled = settled, whole.copy()
-        in_bands(partial(_keep_touching, whole, chosen, least_edge, settled), size, should_stop)
-    return settled
+    return choose_sides(colors, values, between | unknown, least_edge, should_stop)
 
 
 @kernel
@@ -160,54 +146,3 @@ def _find_rims(values, least_edge, first, last, rim):
             for v, u in ((y, right), (below, x)):
                 if abs(values[v, u] - values[y, x]) > least_edge:
                     rim[max(y - RIM_PX + 1, first) : min(v + RIM_PX, last), max(x - RIM_PX + 1, 0) : u + RIM_PX] = True
-
-
-@kernel
-def _choose_sides(colors, values, rim, least_edge, first, last, settled):
-    """Rows [first, last): pixels of rims that look like the other side get its disparity."""
-    height, width = values.shape
-    for y in range(first, last):
-        for x in range(width):
-            if not rim[y, x]:
-                continue
-            low, high = np.inf, -np.inf
-            for v in range(max(y - SIDES_PX, 0), min(y + SIDES_PX + 1, height)):
-                for u in range(max(x - SIDES_PX, 0), min(x + SIDES_PX + 1, width)):
-                    low, high = min(low, np.float64(values[v, u])), max(high, np.float64(values[v, u]))
-            if not high - low > least_edge:
-                continue
-            # Two sides, told apart at the middle; each gets the votes of those of its pixels that look like this one.
-            middle = low + 0.5 * (high - low)
-            front = front_sum = back = back_sum = 0.0
-            for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)):
-                for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
-                    if v == y and u == x:
-                        continue
-                    w = vote_weight(colors, y, x, v, u, ALIKE, SPREAD_PX, UNLIKE_WEIGHT)
-                    w *= RIM_WEIGHT if rim[v, u] else 1.0
-                    d = np.float64(values[v, u])
-                    if d > middle:
-                        front, front_sum = front + w, front_sum + w * (d - low)
-                    else:
-                        back, back_sum = back + w, back_sum + w * (d - low)
-            if values[y, x] > middle:
-                if back > MAJORITY * front:
-                    settled[y, x] = low + back_sum / back
-            elif front > MAJORITY * back:
-                settled[y, x] = low + front_sum / front
-
-
-@kernel
-def _keep_touching(values, chosen, least_edge, settled, first, last):
-    """Rows [first, last): pixels that changed sides, from values to chosen, and touch what is there are settled so."""
-    height, width = values.shape
-    for y in range(first, last):
-        for x in range(width):
-            if chosen[y, x] == values[y, x]:
-                continue
-            touched = -1
-            for v in range(max(y - 1, 0), min(y + 2, height)):
-                for u in range(max(x - 1, 0), min(x + 2, width)):
-                    touched += abs(chosen[v, u] - chosen[y, x]) <= least_edge
-            if touched >= LEAST_TOUCHED:
-                settled[y, x] = chosen[y, x]

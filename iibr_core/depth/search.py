@@ -221,20 +221,20 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, sho
     photo, origin, inverse_metres = found.photo, found.origin, None
     notes = origin.failures + ((f"{origin.line} {origin.advice}",) if origin.advice else ())
     if isinstance(found.depth, Disparity):
-        values, notes = found.depth.values, found.depth.notes + notes
+        values, notes, holes = found.depth.values, found.depth.notes + notes, found.depth.unknown
     else:
         estimate = resize_estimate(found.depth, photo.size)
         values = disparity_from(estimate, grid or USUAL_GRID)
         inverse_metres = inverse_metres_over(estimate, values)
-        unknown = np.isnan(values).mean()
-        if unknown == 1:
+        holes = np.isnan(values)
+        if holes.all():
             raise InputError("it knows no depth anywhere")
-        if unknown > 0:
-            notes += (say_filled("its depth", float(unknown)),)
+        if holes.any():
+            notes += (say_filled("its depth", float(holes.mean())),)
         values = fill_disparity_by_color(photo.pixels, values, should_stop)
     if choice.refine > 0:
-        values = refine(photo.pixels, values, choice.refine, should_stop)
-    return PhotoWithDepth(photo, Disparity(values, origin.words, notes, inverse_metres), origin)
+        values = refine(photo.pixels, values, choice.refine, holes, should_stop)
+    return PhotoWithDepth(photo, Disparity(values, origin.words, notes, inverse_metres, holes), origin)
 
 
 def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:

@@ -171,7 +171,7 @@ class _Evaluator:
         self.lpips, self.report_progress, self.should_stop = lpips, report_progress, should_stop
         self.refined = disparity.values
         if options.choice.refine > 0:
-            self.refined = refine(given.photo, disparity.values, options.choice.refine)
+            self.refined = refine(given.photo, disparity.values, options.choice.refine, disparity.unknown)
         self.figures: dict[str, dict[str, Figures]] = {}
         self.hole_shares: list[float] = []
         self.lines: list[LineView] = []

@@ -16,7 +16,7 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import edge_blur, pictorial_cues, refine, rims, scaling, search
+from iibr_core.depth import edge_blur, pictorial_cues, refine, rim_sides, rims, scaling, search
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
@@ -48,6 +48,7 @@ from iibr_core.rendering import (
 )
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.runtime.tiling import never
 from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
@@ -286,8 +287,12 @@ FINITE = {
     "depth.edge_blur.extent": lambda v, _: edge_blur.extent(np.nan_to_num(depths(v))),
     "depth.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(image(0.5), np.nan_to_num(depths(v))),
     "depth.rims.settle_rims": lambda v, _: [
-        rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5),
-        rims.settle_rims(image(v), mixed_between_surfaces(), 0.5),
+        rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),
+        rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
+    ],
+    "depth.rim_sides.choose_sides": lambda v, _: [
+        rim_sides.choose_sides(scene()[0].pixels, np.nan_to_num(known(v)), np.isnan(known(v)), 0.5, never),
+        rim_sides.choose_sides(image(v), mixed_between_surfaces(), np.ones(SIZE, np.bool_), 0.5, never),
     ],
     "depth.refine.refine": lambda v, _: [
         refine.refine(image(0.5), depths(v)),

@@ -70,12 +70,13 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
         return loaded.disparity.values
     file = _larger_map(loaded)
     if file is not None:
-        values = read_disparity(file, photo.size, source.depth.file_scale, photo.pixels).values
+        given = read_disparity(file, photo.size, source.depth.file_scale, photo.pixels)
+        values, unknown = given.values, given.unknown
     else:
-        values = resample_surfaces(loaded.disparity.values, photo.size) * enlarged
+        values, unknown = resample_surfaces(loaded.disparity.values, photo.size) * enlarged, None
     raise_if_stopped(should_stop)
     if settings.refine > 0:
-        values = refine(photo.pixels, values, settings.refine, should_stop)
+        values = refine(photo.pixels, values, settings.refine, unknown, should_stop)
     if file is None or settings.edits == UNEDITED:
         return values
     return apply_edits(photo.pixels, values / enlarged, settings.edits) * enlarged

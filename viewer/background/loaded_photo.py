@@ -261,7 +261,7 @@ def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> Lo
 
     values = loaded.found.values
     if strength > 0:
-        values = refine(loaded.photo.pixels, values, strength, should_stop)
+        values = refine(loaded.photo.pixels, values, strength, loaded.found.unknown, should_stop)
     canvas = DepthCanvas(loaded.photo.pixels, values)
     return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)
 

@@ -61,7 +61,9 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: Float
         unknown = max(unknown, np.isnan(values).mean())
     if unknown > 0:
         notes += (say_filled(path.name, float(unknown)),)
-    return Disparity(_fill_unknown(path, values, photo), path.name, notes + limit_notes)
+    holes = np.isnan(values)
+    filled = _fill_unknown(path, values, photo)
+    return Disparity(filled, path.name, notes + limit_notes, unknown=holes if holes.any() else None)
 
 
 def _require_aspect(path: Path, map_size: ImageSize, size: ImageSize) -> None:

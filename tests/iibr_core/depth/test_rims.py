@@ -20,6 +20,11 @@ def disc(size=64):
     return photo.astype(np.float32), np.where(inside, NEAR, FAR).astype(np.float32)
 
 
+def settle(photo, values, unknown=None, should_stop=tiling.never):
+    unknown = np.zeros(values.shape, np.bool_) if unknown is None else unknown
+    return settle_rims(photo, values, EDGE, unknown, should_stop)
+
+
 def resampled(truth):
     """The map, half a pixel beside the photo: in between at its edges, as resampled maps are."""
     return 0.5 * (truth + np.roll(truth, 1, axis=1))
@@ -28,7 +33,7 @@ def resampled(truth):
 def test_what_lies_between_two_surfaces_goes_to_the_one_it_looks_like():
     photo, truth = disc()
     given = resampled(truth)
-    settled = settle_rims(photo, given, EDGE)
+    settled = settle(photo, given)
     assert (np.abs(given - truth) > 1).sum() > 50
     assert (np.abs(settled - truth) > 1).sum() == 0
 
@@ -36,55 +41,65 @@ def test_what_lies_between_two_surfaces_goes_to_the_one_it_looks_like():
 def test_rims_that_look_like_the_other_side_change_it():
     photo, truth = disc()
     given = resampled(np.roll(truth, 1, axis=0))
-    wrong, left = (np.abs(values - truth) > 1 for values in (given, settle_rims(photo, given, EDGE)))
+    wrong, left = (np.abs(values - truth) > 1 for values in (given, settle(photo, given)))
     assert left.sum() < 0.1 * wrong.sum()
 
 
 def test_where_colours_do_not_tell_the_sides_apart_nothing_changes_sides():
     _, truth = disc()
     given = resampled(truth)
-    settled = settle_rims(np.full((*truth.shape, 3), 0.5, np.float32), given, EDGE)
+    settled = settle(np.full((*truth.shape, 3), 0.5, np.float32), given)
     is_surface = np.isin(given, [NEAR, FAR])
     np.testing.assert_array_equal(settled[is_surface], given[is_surface])
+
+
+def test_a_measured_map_beside_the_photo_is_moved_to_it():
+    photo, truth = disc()
+    given, unknown = np.roll(truth, 1, axis=1), np.zeros(truth.shape, np.bool_)
+    unknown[14:18, 28:36] = True
+    given[unknown] = FAR
+    assert (given != truth).sum() > 50
+    assert (np.abs(settle(photo, given, unknown) - truth) > 1).sum() == 0
+    np.testing.assert_array_equal(settle(photo, given), given)
 
 
 def test_no_pixel_changes_sides_alone():
     photo, truth = disc()
     given = resampled(truth)
     photo[32, 10] = RED
-    assert settle_rims(photo, given, EDGE)[32, 10] == FAR
+    assert settle(photo, given)[32, 10] == FAR
 
 
 def test_exact_maps_stay_as_they_are():
     photo, truth = disc()
     moved = np.roll(truth, 1, axis=1)
-    np.testing.assert_array_equal(settle_rims(photo, moved, EDGE), moved)
+    np.testing.assert_array_equal(settle(photo, moved), moved)
     scene, disparity = square_before_wall()
-    np.testing.assert_array_equal(settle_rims(scene.pixels, disparity.values, EDGE), disparity.values)
+    np.testing.assert_array_equal(settle(scene.pixels, disparity.values), disparity.values)
 
 
 def test_a_turned_scene_is_settled_alike():
     photo, truth = disc()
     given = resampled(truth)
-    upright = settle_rims(photo, given, EDGE)
-    turned = settle_rims(photo.swapaxes(0, 1), np.ascontiguousarray(given.T), EDGE).T
+    upright = settle(photo, given)
+    turned = settle(photo.swapaxes(0, 1), np.ascontiguousarray(given.T)).T
     np.testing.assert_allclose(turned, upright, atol=1e-4)
 
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
     photo, truth = disc()
-    expected = settle_rims(photo, resampled(truth), EDGE)
+    expected = settle(photo, resampled(truth))
     monkeypatch.setattr(tiling, "THREADS", 7)
-    np.testing.assert_array_equal(settle_rims(photo, resampled(truth), EDGE), expected)
+    np.testing.assert_array_equal(settle(photo, resampled(truth)), expected)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (3, 2), (8, 8)])
 def test_tiny_maps(size):
     values = np.arange(size[0] * size[1], dtype=np.float32).reshape(size)
-    assert np.isfinite(settle_rims(smooth_texture(*size), values, EDGE)).all()
+    assert np.isfinite(settle(smooth_texture(*size), values)).all()
 
 
 def test_a_stop_is_heard():
     photo, truth = disc()
     with pytest.raises(Cancelled):
-        settle_rims(photo, resampled(truth), EDGE, lambda: True)
+        settle(photo, resampled(truth), should_stop=lambda: True)

@@ -1,0 +1,127 @@
+"""Sides of rims against a slow, obvious twin of the random field, and what it must leave alone."""
+
+import numpy as np
+import pytest
+
+from iibr_core.depth import rim_sides
+from iibr_core.depth.rim_sides import choose_sides
+from iibr_core.runtime.tiling import Cancelled, never
+from tests.iibr_core.scenes import smooth_texture
+
+EDGE, NEAR, FAR = 0.3, 5.0, 1.0
+
+
+def shifted_square(size=26):
+    """A square before a wall, textures of different brightness; its map, one pixel beside it, with a few unknown."""
+    rng = np.random.default_rng(3)
+    truth = np.full((size, size), FAR, np.float32)
+    truth[8:18, 8:18] = NEAR
+    photo = 0.25 * smooth_texture(size, size) + np.where(truth == NEAR, 0.55, 0.1)[..., None].astype(np.float32)
+    given = np.roll(truth, 1, axis=1)
+    unknown = rng.random(truth.shape) < 0.03
+    return photo + rng.normal(0, 0.01, photo.shape).astype(np.float32), given, unknown, truth
+
+
+def around(values, y, x, reach):
+    height, width = values.shape
+    for v in range(max(y - reach, 0), min(y + reach + 1, height)):
+        for u in range(max(x - reach, 0), min(x + reach + 1, width)):
+            if (v, u) != (y, x):
+                yield v, u
+
+
+def slow_distance(values):
+    height, width = values.shape
+    steps = [((y, x), (y, x + 1)) for y in range(height) for x in range(width - 1)]
+    steps += [((y, x), (y + 1, x)) for y in range(height - 1) for x in range(width)]
+    beside = [p for pair in steps if abs(values[pair[0]] - values[pair[1]]) > EDGE for p in pair]
+    away = [[min(max(abs(y - v), abs(x - u)) for v, u in beside) for x in range(width)] for y in range(height)]
+    return np.minimum(away, rim_sides.RIM_PX + 1)
+
+
+def slow_weigh(colors, values, unknown, distance, y, x, alike):
+    own = float(values[y, x])
+    others = [p for p in around(values, y, x, rim_sides.RIM_PX + 1) if abs(values[p] - own) > EDGE]
+    if not others:
+        return own, 0.0
+    other = float(values[min(others, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)])
+    weights, likes, disparity = [0.0, 0.0], [0.0, 0.0], 0.0
+    for p in around(values, y, x, rim_sides.REACH_PX):
+        apart = abs(values[p] - own), abs(values[p] - other)
+        if min(apart) > 0.5 * abs(other - own):
+            continue
+        side = 0 if apart[0] <= apart[1] else 1
+        w = np.exp(-((p[0] - y) ** 2 + (p[1] - x) ** 2) / (2 * rim_sides.SPREAD_PX**2))
+        w *= rim_sides.TRUST[distance[p]] * (rim_sides.FILLED_TRUST if unknown[p] else 1)
+        weights[side] += w
+        likes[side] += w * np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2))
+        disparity += side * w * values[p]
+    if weights[1] <= rim_sides.LEAST_WEIGHT:
+        return own, 0.0
+    unseen, unlike = rim_sides.UNSEEN_WEIGHT, rim_sides.UNLIKE
+    on = [(like + unseen * unlike) / (weight + unseen) + unlike for like, weight in zip(likes, weights, strict=True)]
+    return disparity / weights[1], np.log(on[0] / on[1])
+
+
+def slow_pass(colors, values, other, drive, alike, believed):
+    belief = np.ones(values.shape)
+    for y, x in np.argwhere(other != values):
+        half = 0.5 * abs(other[y, x] - values[y, x])
+
+        def says(d, y=y, x=x, half=half):
+            return 1 if abs(d - values[y, x]) <= half else -1 if abs(d - other[y, x]) <= half else 0
+
+        total = drive[y, x]
+        for p in around(values, y, x, 1):
+            like = np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2)) + rim_sides.UNLIKE_NEIGHBOUR
+            straight = 1 if p[0] == y or p[1] == x else rim_sides.DIAGONAL
+            votes = believed[p] * says(values[p]) + (1 - believed[p]) * says(other[p])
+            total += rim_sides.COHESION * straight * like * votes
+        belief[y, x] = 1 / (1 + np.exp(-np.clip(total, -30, 30)))
+    return belief
+
+
+def slow_sides(colors, values, unknown):
+    reluctance = None
+    for _ in range(rim_sides.ROUNDS):
+        distance = slow_distance(values)
+        rim = distance <= rim_sides.RIM_PX
+        contrast = rim_sides._mean_color_step(colors, np.flatnonzero(rim))
+        other, drive = values.astype(np.float64), np.zeros(values.shape)
+        for y, x in np.argwhere(rim):
+            weighed = slow_weigh(colors, values, unknown, distance, y, x, rim_sides.ALIKE * contrast)
+            other[y, x], drive[y, x] = weighed
+        if reluctance is None:
+            reluctance = rim_sides._reluctance(drive[rim], distance[rim], ~unknown[rim])
+        drive[rim] += np.where(unknown[rim], 0, reluctance[distance[rim]])
+        belief = np.ones(values.shape)
+        for _ in range(rim_sides.PASSES):
+            belief = slow_pass(colors, values, other, drive, rim_sides.LIKE_NEIGHBOUR * contrast, belief)
+        values = np.where(belief < 0.5, other, values).astype(np.float32)
+    return values
+
+
+def test_sides_are_those_of_the_slow_field_and_of_the_truth():
+    photo, given, unknown, truth = shifted_square()
+    chosen = choose_sides(photo, given, unknown, EDGE, never)
+    np.testing.assert_allclose(chosen, slow_sides(photo, given, unknown), atol=1e-4)
+    assert (np.abs(given - truth) > 1).sum() == 20
+    assert (np.abs(chosen - truth) > 1).sum() <= 2
+
+
+def test_colours_that_contradict_the_map_inside_surfaces_change_nothing():
+    photo, _, unknown, truth = shifted_square()
+    shaded = np.roll(np.roll(photo, 3, axis=1), 3, axis=0)
+    np.testing.assert_array_equal(choose_sides(shaded, truth, unknown, EDGE, never), truth)
+
+
+def test_a_map_without_steps_stays_as_it_is():
+    photo, given, unknown, _ = shifted_square()
+    flat = np.ones_like(given)
+    assert choose_sides(photo, flat, unknown, EDGE, never) is flat
+
+
+def test_a_stop_is_heard():
+    photo, given, unknown, _ = shifted_square()
+    with pytest.raises(Cancelled):
+        choose_sides(photo, given, unknown, EDGE, lambda: True)
