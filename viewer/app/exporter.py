@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import Cancelled, raise_if_stopped
-from iibr_core.types import InputError
+from iibr_core.types import SRGB, ColorSpace, InputError
 from viewer.app.exports.registry import export_path, require_export_place, writer_of
 from viewer.app.exports.source import ExportSource
 from viewer.app.save_places import require_size
@@ -49,6 +49,7 @@ class _Wanted:
     size_px: ScreenSize
     part: TargetWindow
     is_linear: bool
+    color_space: ColorSpace
     is_drawn: threading.Event = field(default_factory=threading.Event)
     image: NDArray[Any] | None = None
     error: Exception | None = None
@@ -150,10 +151,11 @@ class Exporter:
         size_px: ScreenSize,
         part: TargetWindow = WHOLE_PICTURE,
         is_linear: bool = False,
+        color_space: ColorSpace = SRGB,
     ) -> NDArray[Any]:
         """In the thread: have it drawn, and wait."""
         require_size(size_px)
-        wanted = _Wanted(optics, size_px, part, is_linear)
+        wanted = _Wanted(optics, size_px, part, is_linear, color_space)
         self._asked.put(wanted)
         self._wake()
         while not wanted.is_drawn.wait(LOOK_S):
@@ -180,7 +182,7 @@ class Exporter:
         try:
             if self._drawing is None or self._drawing.is_stopped:  # a picture was saved meanwhile
                 self._drawing = self._scene_view.start_picture(
-                    wanted.optics, wanted.size_px, wanted.is_linear, wanted.part
+                    wanted.optics, wanted.size_px, wanted.is_linear, wanted.part, wanted.color_space
                 )
             self._drawing.advance(budget_s)
         except (InputError, MemoryError) as error:

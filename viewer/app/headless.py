@@ -198,12 +198,17 @@ class HeadlessViewer:
         return needs_smaller(optics) or not is_full(scene, optics, size or scene.size)
 
     def draw(
-        self, optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE, is_linear: bool = False
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        part: TargetWindow = WHOLE_PICTURE,
+        is_linear: bool = False,
+        color_space: ColorSpace = SRGB,
     ) -> NDArray[Any]:
         """A picture for an export, see `viewer.app.exports.source.Draw`."""
         require_size(size_px)
         self._prepare_gloss(optics)
-        return self._scene_view.picture(optics, size_px, is_linear, part)
+        return self._scene_view.picture(optics, size_px, is_linear, part, color_space)
 
     @property
     def centre(self) -> ViewUpdate | None:

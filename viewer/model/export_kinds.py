@@ -17,7 +17,7 @@ MAP = (".pfm", ".exr", ".npy", ".png")
 PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
 DATA = (".png",)
 MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
-STACK_FILES = r"(focus|aperture)_\d+\.png|all_in_focus\.png|disparity\.pfm"
+STACK_FILES = r"((focus|aperture)_\d+|all_in_focus)\.(png|tif)|disparity\.pfm"
 CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
 STACK = ("view", "focus", "aperture", "size", "frames")
 EYES = ("focus", "aperture", "size", "eyes")
@@ -80,9 +80,15 @@ EXPORTS = {
     "focal-stack": ExportKind(
         "Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES, frames=16
     ),
+    "focal-stack-tiff": ExportKind(
+        "Focal stack, 16-bit TIFFs", (), "stack:write_focal_tiffs", STACK, own_files=STACK_FILES, frames=16
+    ),
     "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK, frames=16),
     "aperture-sweep": ExportKind(
         "Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES, frames=9
+    ),
+    "aperture-sweep-tiff": ExportKind(
+        "Aperture sweep, 16-bit TIFFs", (), "stack:write_aperture_tiffs", STACK, own_files=STACK_FILES, frames=9
     ),
     "aperture-sweep-exr": ExportKind(
         "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK, frames=9

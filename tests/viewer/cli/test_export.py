@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image
 
+from iibr_core.formats.images.icc_profile import icc_profile
 from iibr_core.formats.maps.pfm import read_pfm
+from iibr_core.types import DISPLAY_P3, SRGB
 from tests.viewer.cli.test_cli import run
 
 
@@ -79,3 +82,25 @@ def test_disparity_is_found_where_a_light_field_brings_none(
     assert np.median(np.abs(read_pfm(tmp_path / "a.pfm") - given)) < 0.3
     assert run(monkeypatch, "export", field, "--to", "hci", "-o", tmp_path / "hci") == 0
     assert sorted(path.suffix for path in (tmp_path / "hci").iterdir()) == [".cfg"] + 9 * [".png"]
+
+
+@pytest.mark.parametrize("kind", ["cross-eyed", "focal-stack-tiff", "quilt", "rgbd"])
+def test_pictures_have_the_photos_colours_and_words(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str) -> None:
+    """As saved ones: of a Display P3 photo, in Display P3 where what shows them knows profiles; never where it was."""
+    photo, out = tmp_path / "photo.jpg", tmp_path / ("out" if kind.startswith("focal") else "out.png")
+    exif = Image.Exif()
+    exif[0x010F] = "Maker"
+    exif.get_ifd(0x8825).update({1: "N", 2: (1.0, 2.0, 3.0)})
+    plain = Image.new("RGB", (48, 32), (200, 80, 60))
+    plain.save(photo, exif=exif, icc_profile=icc_profile(DISPLAY_P3), quality=100, subsampling=0)
+    assert run(monkeypatch, "export", photo, "--to", kind, "-o", out, "--grid", 3, "--depth", "flat") == 0
+    picture = out / "all_in_focus.tif" if kind.startswith("focal") else next(tmp_path.glob("out*.png"))
+    with Image.open(picture) as image:
+        said = image.getexif()
+        profile = image.info["icc_profile"]
+    assert said[0x010F] == "Maker"
+    assert not said.get_ifd(0x8825)
+    is_wide = kind in ("cross-eyed", "focal-stack-tiff")
+    assert profile == icc_profile(DISPLAY_P3 if is_wide else SRGB)
+    pixels = tifffile.imread(picture) / 257 if picture.suffix == ".tif" else np.asarray(Image.open(picture))
+    np.testing.assert_allclose(pixels[16, 4], (200, 80, 60) if is_wide else (216, 69, 50), atol=2.5)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.types import SRGB, ColorSpace
 from viewer.app.exports.source import ExportSource
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.model.layout import ScreenSize
@@ -23,13 +24,14 @@ def draw_framed(
     part: TargetWindow = WHOLE_PICTURE,
     is_linear: bool = False,
     frame_aspect: float | None = None,
+    color_space: ColorSpace = SRGB,
 ) -> NDArray[Any]:
     """As `Draw` draws it, whole and undistorted in a frame. frame_aspect: width / height that the frame is shown with,
     where that is another than its pixels'.
     """
     aspect = part.width * source.scene.width / (part.height * source.scene.height)
     size = fitted(aspect, frame, frame_aspect or frame.width / frame.height)
-    pixels = source.draw(optics, size, part, is_linear)
+    pixels = source.draw(optics, size, part, is_linear, color_space)
     if size == frame:
         return pixels
     whole: NDArray[Any] = np.zeros((frame.height, frame.width, 3), pixels.dtype)

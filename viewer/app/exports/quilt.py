@@ -9,6 +9,7 @@ from iibr_core.types import ImageSize
 from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.looking_glass import Bridge
 from viewer.app.exports.parallax import side_pictures
+from viewer.app.exports.pictures import write_with_metadata
 from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
@@ -26,8 +27,6 @@ def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> s
 
     Raises InputError where it cannot be written or shown, Cancelled once the export should stop.
     """
-    from iibr_core.formats.images.picture_writers import write_picture
-
     bridge = Bridge() if settings.show else None  # before anything is drawn, for there may be none
     quilt = _quilt_of(source.scene, settings.device)
     frame = ScreenSize(quilt.tile.width, quilt.tile.height)
@@ -35,7 +34,7 @@ def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> s
         draw_framed(source, picture.optics, frame, picture.part, frame_aspect=quilt.aspect)
         for picture in side_pictures(source.scene, source.optics, quilt.views, settings.eyes)
     )
-    write_picture(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")))
+    write_with_metadata(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")), source)
     return bridge.show_quilt(path, quilt) if bridge is not None else None
 
 

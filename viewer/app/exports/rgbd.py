@@ -9,6 +9,7 @@ import numpy as np
 from iibr_core.color import bytes_from_encoded
 from iibr_core.types import InputError
 from viewer.app.exports.cameras import colors_of
+from viewer.app.exports.pictures import write_with_metadata
 from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
 
@@ -29,12 +30,10 @@ def write_below(path: Path, source: ExportSource, settings: ExportSettings) -> N
 
 
 def _write(path: Path, source: ExportSource, axis: int, is_first: bool) -> None:
-    from iibr_core.formats.images.picture_writers import write_picture
-
     view = source.centre_view()
     if view.disparity is None:
         raise InputError(f"{source.scene.name}: has no depth")
     far, near = float(view.disparity.min()), float(view.disparity.max())
     nearness = (view.disparity - far) / ((near - far) or 1.0)
     pictures = [colors_of(view), np.repeat(bytes_from_encoded(nearness)[..., None], 3, axis=2)]
-    write_picture(path, np.concatenate(pictures[::-1] if is_first else pictures, axis=axis))
+    write_with_metadata(path, np.concatenate(pictures[::-1] if is_first else pictures, axis=axis), source)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
-from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ViewUpdate
 from viewer.background.gloss import add_gloss
 from viewer.background.loaded_photo import LoadedPhoto, inpainting_aids
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
@@ -29,16 +29,25 @@ class Draw(Protocol):
     """Draws the converged picture."""
 
     def __call__(
-        self, optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE, is_linear: bool = False
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        part: TargetWindow = WHOLE_PICTURE,
+        is_linear: bool = False,
+        color_space: ColorSpace = SRGB,
     ) -> NDArray[Any]:
-        """(height, width, 3): uint8, sRGB-encoded, or float32 linear light. part: what of it is drawn.
+        """(height, width, 3) of color_space: uint8, encoded, or float32 linear light. part: what of it is drawn.
 
         Raises Cancelled once the export should stop, InputError where there is no room.
         """
 
 
 def undrawn(
-    optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE, is_linear: bool = False
+    optics: Optics,
+    size_px: ScreenSize,
+    part: TargetWindow = WHOLE_PICTURE,
+    is_linear: bool = False,
+    color_space: ColorSpace = SRGB,
 ) -> NDArray[Any]:
     """For kinds that draw nothing."""
     raise AssertionError("this kind of export is said to draw nothing")

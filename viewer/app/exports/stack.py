@@ -4,16 +4,18 @@ them what is sharp everywhere, and the disparity.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from iibr_core.formats.images.picture_kinds import is_float
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import UnfinishedFolder
 from iibr_core.types import FloatImage, ImageSize
 from viewer.app.exports.framing import draw_framed
+from viewer.app.exports.pictures import saved_space, write_with_metadata
 from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
@@ -50,33 +52,53 @@ def aperture_sweep(scene: Scene, optics: Optics, count: int) -> Stack:
 
 
 def write_focal_stack(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """A folder of PNGs, or an OpenEXR file; so do the others."""
-    _write(path, source, settings.size, focal_stack(source.scene, source.optics, settings.frames))
+    """A folder of PNGs, or an OpenEXR file; so do the others, with TIFFs where their names say so.
+
+    They raise InputError where it cannot be written, Cancelled once the export should stop.
+    """
+    _write(path, source, settings, focal_stack, ".png")
+
+
+def write_focal_tiffs(path: Path, source: ExportSource, settings: ExportSettings) -> None:
+    """16 bits a channel."""
+    _write(path, source, settings, focal_stack, ".tif")
 
 
 def write_aperture_sweep(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """See `aperture_sweep`. Raises InputError where it cannot be written, Cancelled once the export should stop."""
-    _write(path, source, settings.size, aperture_sweep(source.scene, source.optics, settings.frames))
+    """See `aperture_sweep`."""
+    _write(path, source, settings, aperture_sweep, ".png")
 
 
-def _write(path: Path, source: ExportSource, size: ScreenSize, stack: Stack) -> None:
+def write_aperture_tiffs(path: Path, source: ExportSource, settings: ExportSettings) -> None:
+    """16 bits a channel."""
+    _write(path, source, settings, aperture_sweep, ".tif")
+
+
+def _write(
+    path: Path,
+    source: ExportSource,
+    settings: ExportSettings,
+    stack_of: Callable[[Scene, Optics, int], Stack],
+    ending: str,
+) -> None:
+    stack = stack_of(source.scene, source.optics, settings.frames)
     stack = [*stack, (ALL_IN_FOCUS, replace(source.optics, aperture_diameter=0.0))]
     disparity = source.disparity_seen()
     if path.suffix.lower() == ".exr":
-        _write_parts(path, source, size, stack, disparity)
+        _write_parts(path, source, settings.size, stack, disparity)
     else:
-        _write_folder(path, source, size, stack, disparity)
+        _write_folder(path, source, settings.size, stack, disparity, ending)
 
 
 def _write_folder(
-    path: Path, source: ExportSource, size: ScreenSize, stack: Stack, disparity: FloatImage | None
+    path: Path, source: ExportSource, size: ScreenSize, stack: Stack, disparity: FloatImage | None, ending: str
 ) -> None:
-    from iibr_core.formats.images.photo import write_image
-
-    unfinished = UnfinishedFolder(path)
+    unfinished, space = UnfinishedFolder(path), saved_space(source)
     try:
         for name, optics in source.watched(stack, len(stack), "drawing"):
-            write_image(unfinished.path / f"{name}.png", draw_framed(source, optics, size))
+            place = unfinished.path / f"{name}{ending}"
+            pixels = draw_framed(source, optics, size, is_linear=is_float(place), color_space=space)
+            write_with_metadata(place, pixels, source, color_space=space)
         if disparity is not None:
             write_pfm(unfinished.path / "disparity.pfm", disparity)
         unfinished.put_in_place()

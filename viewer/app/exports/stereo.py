@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.formats.images.picture_kinds import BEST_QUALITY, PictureFormat
 from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG
 from iibr_core.formats.quilts import tagged
+from iibr_core.types import SRGB, ColorSpace
 from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.parallax import side_pictures
+from viewer.app.exports.pictures import saved_space, write_with_metadata
 from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
@@ -36,7 +40,7 @@ def over_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     return tagged(path, OVER_TAG)
 
 
-def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1) -> Eyes:
+def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1, color_space: ColorSpace = SRGB) -> Eyes:
     """The left eye's picture and the right one's, (H, W, 3) uint8. squeeze: the width is divided by it.
 
     Raises InputError where what is in focus cannot be held still, Cancelled once the export should stop.
@@ -44,7 +48,7 @@ def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1) 
     width, height = settings.size
     frame = ScreenSize(max(width // squeeze, 1), height)
     drawn = (
-        draw_framed(source, eye.optics, frame, eye.part, frame_aspect=width / height)
+        draw_framed(source, eye.optics, frame, eye.part, frame_aspect=width / height, color_space=color_space)
         for eye in side_pictures(source.scene, source.optics, 2, settings.eyes)
     )
     left, right = source.watched(drawn, 2, "drawing")
@@ -53,32 +57,39 @@ def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1) 
 
 def write_side_by_side(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The left eye's at the left."""
-    _write(path, np.hstack(draw_eyes(source, settings)))
+    _write(path, source, settings, np.hstack)
 
 
 def write_half_side_by_side(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The same, together as wide as one."""
-    _write(path, np.hstack(draw_eyes(source, settings, squeeze=2)))
+    _write(path, source, settings, np.hstack, squeeze=2)
 
 
 def write_over_under(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The left eye's on top."""
-    _write(path, np.vstack(draw_eyes(source, settings)))
+    _write(path, source, settings, np.vstack)
 
 
 def write_cross_eyed(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """The left eye's at the right, to be seen with crossed eyes."""
-    _write(path, np.hstack(draw_eyes(source, settings)[::-1]))
+    _write(path, source, settings, lambda eyes: np.hstack(eyes[::-1]))
 
 
 def write_anaglyph(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """For red-cyan glasses, the left eye's red."""
+    """For red-cyan glasses, the left eye's red; at the best quality, for coarser colour would mix the eyes."""
     from iibr_core.formats.stereo import anaglyph
 
-    _write(path, anaglyph(*draw_eyes(source, settings)))
+    pixels = anaglyph(*draw_eyes(source, settings))
+    write_with_metadata(path, pixels, source, PictureFormat(quality=BEST_QUALITY))
 
 
-def _write(path: Path, pixels: NDArray[Any]) -> None:
-    from iibr_core.formats.images.picture_writers import write_picture
-
-    write_picture(path, pixels)
+def _write(
+    path: Path,
+    source: ExportSource,
+    settings: ExportSettings,
+    join: Callable[[Eyes], NDArray[Any]],
+    squeeze: int = 1,
+) -> None:
+    space = saved_space(source)
+    pixels = join(draw_eyes(source, settings, squeeze, space))
+    write_with_metadata(path, pixels, source, color_space=space)

@@ -106,6 +106,14 @@ def test_stereo_pictures(source: ExportSource, tmp_path: Path) -> None:
     assert np.abs(pixels(half)[:, :48] - source.draw(Optics(eye=ViewOffset(0.0, -1.0)), ScreenSize(48, 64))).max() <= 1
 
 
+def test_colour_of_an_anaglyph_is_not_coarser_than_its_light(source: ExportSource, tmp_path: Path) -> None:
+    """Or the eyes would mix: WebP has it so without loss only."""
+    png, webp, jpeg = (exported(source, "anaglyph", tmp_path / f"a{ending}") for ending in (".png", ".webp", ".jpg"))
+    assert np.array_equal(pixels(webp), pixels(png))
+    with Image.open(jpeg) as image:
+        assert [layer[1:3] for layer in image.layer] == 3 * [(1, 1)]  # type: ignore[attr-defined]
+
+
 @pytest.mark.parametrize("ending", [".jpg", ".webp", ".tif"])
 def test_pictures_are_of_the_kind_that_their_name_says(source: ExportSource, tmp_path: Path, ending: str) -> None:
     png, other = (exported(source, "anaglyph", tmp_path / f"a{name}") for name in (".png", ending))

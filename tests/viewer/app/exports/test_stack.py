@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+import tifffile
 from PIL import Image
 
+from iibr_core.color import srgb_from_linear
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.runtime.tiling import Cancelled
 from tests.viewer.app.exports.conftest import exported
@@ -33,6 +35,18 @@ def test_folder(source: ExportSource, tmp_path: Path, kind: str) -> None:
     disparity = read_pfm(folder / "disparity.pfm")
     low, high = source.scene.disparity_range_px
     assert (disparity.min(), disparity.max()) == (pytest.approx(low), pytest.approx(high))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_tiffs_have_16_bits(source: ExportSource, tmp_path: Path, kind: str) -> None:
+    folder = exported(source, f"{kind}-tiff", tmp_path / "stack", frames=2)
+    stack = [*KINDS[kind](source.scene, Optics(), 2), ("all_in_focus", Optics())]
+    assert {path.name for path in folder.iterdir()} == {"disparity.pfm", *(f"{name}.tif" for name, _ in stack)}
+    for name, optics in stack:
+        pixels = tifffile.imread(folder / f"{name}.tif")
+        expected = srgb_from_linear(source.draw(optics, SIZE, is_linear=True)) * 65535
+        assert pixels.dtype == np.uint16
+        np.testing.assert_allclose(pixels, expected, atol=1)
 
 
 @pytest.mark.parametrize("kind", KINDS)
