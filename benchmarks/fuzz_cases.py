@@ -66,6 +66,16 @@ def _read_field(path: Path) -> None:
     assert len(list(read_views(scene)[1])) == 4
 
 
+def _read_view_file(path: Path) -> None:
+    from iibr_core.formats.light_fields.registry import find_light_field
+    from iibr_core.formats.light_fields.views import read_views
+
+    scene = find_light_field(path)
+    if scene is not None:
+        size, views = read_views(scene)
+        assert all(view.colors.shape == (*size, 3) for view in views)
+
+
 def _four_views(folder: Path) -> None:
     for k in range(4):
         (folder / f"input_Cam{k:03d}.png").write_bytes(seeds.by_pillow("PNG"))
@@ -150,6 +160,7 @@ READERS: dict[str, Reader] = {
     "npy": Reader(seeds.npys, _read_map),
     "map-png": Reader(lambda: [Seed("a_depth.png", seeds.by_pillow("PNG", "L"), repair_png)], _read_map),
     "cfg": Reader(seeds.cfgs, _read_field, _four_views),
+    "view-files": Reader(seeds.view_files, _read_view_file),
     "poses": Reader(seeds.poses, _read_poses, _four_views),
     "lens": Reader(seeds.lens_pictures, _read_lens_picture, _view_and_lens),
     "preferences": Reader(seeds.preferences, _read_preferences),

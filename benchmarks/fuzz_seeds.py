@@ -13,6 +13,7 @@ import OpenImageIO as oiio
 from PIL import Image, PngImagePlugin
 
 from benchmarks.fuzz_damage import Seed, repair_png
+from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.types import ImageSize
 from tests.iibr_core import embedded_files as embedded
 
@@ -139,6 +140,24 @@ def photos_with_depth() -> list[Seed]:
 def heics() -> list[Seed]:
     pixels, depth = np.repeat(sample(), 4, axis=1).repeat(4, axis=0)[:64, :64], np.full((64, 64), 90, np.uint8)
     return [Seed("a.heic", embedded.heic(pixels)), Seed("a.heic", embedded.heic(pixels, depth))]
+
+
+def view_files() -> list[Seed]:
+    """Files that hold several views."""
+    with tempfile.TemporaryDirectory() as folder:
+        spatial = Path(folder) / "a.heic"
+        write_spatial_photo(spatial, sample(), sample(), 20.0)
+        pair = spatial.read_bytes()
+    second = Image.fromarray(sample())
+    multiple = by_pillow("MPO", save_all=True, append_images=[second])
+    said = json.dumps({"views": [{"image": {"blob_id": number}, "position": [number]} for number in (-1, 10)]}).encode()
+    fields = [(8, said), (10, by_pillow("JPEG"))]
+    region = struct.pack(">I", len(fields))
+    region += b"".join(struct.pack(">II", number, len(data)) + data for number, data in fields)
+    leia = by_pillow("JPEG") + region + struct.pack(">I", len(region) + 6) + b"\x1e\x1a"
+    png = by_pillow("PNG")
+    tiled = [Seed(name, png, repair_png) for name in ("a_qs2x2a1.png", "a_SBS.png", "a_eslf.png")]
+    return [Seed("a.heic", pair), Seed("a.mpo", multiple), Seed("a.lif", leia), *tiled]
 
 
 def pfms() -> list[Seed]:

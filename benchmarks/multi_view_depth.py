@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.refocus import read_views
-from iibr_core.color import encoded_from_stored
+from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.oiio_writer import write_image_file
@@ -74,7 +74,7 @@ def _judge_views(grid: GridShape, views: NDArray[np.uint8]) -> None:
                 eye = ViewOffset((row - 2 * (kept.shape[0] // 2)) / 2, (column - 2 * (kept.shape[1] // 2)) / 2)
                 viewer.state = replace(viewer.state, optics=replace(viewer.state.optics, eye=eye))
                 truth = encoded_from_stored(flat[row, column])
-                drawn.append(bounded_psnr(viewer.picture(as_float=True), truth))
+                drawn.append(bounded_psnr(srgb_from_linear(viewer.picture(is_linear=True)), truth))
                 blended.append(bounded_psnr(_blend(kept, row / 2, column / 2), truth))
     print(f"  views held back: drawn {np.mean(drawn):.2f} dB, plain blend {np.mean(blended):.2f} dB")
 

@@ -25,7 +25,7 @@ EXIF_NUMBERS = {
     0xA210: "Exif:FocalPlaneResolutionUnit",
     0xA002: "Exif:PixelXDimension",
 }
-DECODE_ERRORS = (ValueError, OSError, RuntimeError, EOFError, SyntaxError, MemoryError, IndexError)
+DECODE_ERRORS = (ValueError, OSError, RuntimeError, EOFError, SyntaxError, MemoryError, IndexError, struct.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,10 @@ def heic_pair(path: Path) -> tuple[int, int] | None:
     has its place then. Raises InputError as `read_heic` does, and for a group of other pictures than two.
     """
     file = _open_file(path)
-    groups = [group for group in file.info.get("entity_groups") or () if group.get("type") == "ster"]
+    try:
+        groups = [group for group in file.info.get("entity_groups") or () if group.get("type") == "ster"]
+    except DECODE_ERRORS as error:
+        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
     if not groups:
         return None
     places = [place for place in groups[0].get("images") or () if isinstance(place, int)]
@@ -142,7 +145,7 @@ def describe(spec: Any, info: Mapping[Any, Any]) -> None:
         for tag, name in EXIF_NUMBERS.items():
             if tag in tags:
                 spec.attribute(name, float(tags[tag]))
-    except (*DECODE_ERRORS, struct.error, TypeError, ZeroDivisionError, KeyError):
+    except (*DECODE_ERRORS, TypeError, ZeroDivisionError, KeyError):
         pass  # a photo is one without its Exif too
     if info.get("icc_profile"):
         profile = np.frombuffer(info["icc_profile"], np.uint8)

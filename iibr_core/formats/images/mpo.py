@@ -10,7 +10,7 @@ from iibr_core.formats.images.pillow_reader import open_with_pillow, raster_of
 from iibr_core.types import ImageSize, InputError
 
 JPEG_START = b"\xff\xd8\xff"
-MPO = ("JPEG", "MPO"), "a multi-picture JPEG"
+MPO = ("JPEG",), "a multi-picture JPEG"  # by which Pillow opens both
 ENTRIES_TAG = 0xB002
 DISPARITY_TYPE = "Disparity"
 """In Pillow's words for a picture's type."""

@@ -13,6 +13,8 @@ import OpenImageIO as oiio
 import pytest
 from PIL import Image
 
+from iibr_core.depth.embedded.reader import read_embedded
+from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.formats.images.lif import open_lif
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, read_source, source_size
@@ -278,3 +280,18 @@ def test_files_that_hold_no_light_field(tmp_path: Path) -> None:
         open_light_field(tmp_path / "photo.png")
     with pytest.raises(InputError, match="no such file"):
         open_light_field(tmp_path / "missing_qs2x2a1.png")
+
+
+def test_a_leia_image_brings_its_own_inverse_depth(tmp_path: Path) -> None:
+    """White is near; a single view is a photo with depth."""
+    grey = np.tile(np.arange(64, dtype=np.uint8) * 3, (48, 1))
+    inner = {"inv_z_map": {"blob_id": 11, "min": 0.4, "max": 0.01}}
+    path = tmp_path / "a.jpg"
+    path.write_bytes(leia_image(smooth(), smooth(shift=4), (11, jpeg(grey)), **inner))
+    found = read_embedded(path)
+    assert found is not None
+    assert found.format == "Leia"
+    assert isinstance(found.estimate, RelativeInverseDepth)
+    np.testing.assert_allclose(found.estimate.values, grey / 255, atol=0.02)
+    path.write_bytes(leia_image(smooth(), smooth(shift=4)))
+    assert read_embedded(path) is None
