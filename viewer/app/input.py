@@ -27,7 +27,15 @@ from viewer.model.lens.limits import focus_limits
 from viewer.model.state.app_state import AppState, Hover, ReadTruthTask, Scene, Source, source_beside, source_with_map
 from viewer.model.state.depth_editing import DepthSample, DropStroke, Paint, PickDepth, SetBrush
 from viewer.model.state.inspection import MoveDivider, ShowGrid
-from viewer.model.state.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, SetFocus
+from viewer.model.state.optics import (
+    CENTRE,
+    FocusOn,
+    MoveEye,
+    MoveTiltHandle,
+    PaintGloss,
+    SetFocus,
+    SetGlossBrush,
+)
 from viewer.model.zoom import SetZoom
 
 DRAG_THRESHOLD = 4.0
@@ -107,6 +115,8 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
         return _on_sheet(pointer, layout, scene, frame)
     if pointer.pulls or _zooms(pointer, layout, frame):
         return _zoom_actions(pointer, layout, frame)
+    if is_marking_gloss(state):
+        return _gloss_actions(pointer, layout, state, scene, picture, pick)
     if is_brushing(state):
         return _paint_actions(pointer, layout, state, scene, picture, pick)
     if pointer.wheel and frame.contains(pointer.x, pointer.y):
@@ -140,12 +150,12 @@ def gesture_end(pointer: Pointer) -> list[Action]:
 def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
     """Tell where the pointer is in the picture, if that is news. While it drags it points at nothing."""
     scene, picture = state.scene, layout.picture
-    hover = None
+    hover, paints = None, is_brushing(state) or is_marking_gloss(state)
     is_pointing = (
         not pointer.is_over_panel
         and not state.inspection.shows_grid
         and not (pointer.pulls or _is_on_minimap(layout, pointer.x, pointer.y))
-        and (is_brushing(state) or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
+        and (paints or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
     )
     frame = layout.frame
     if scene is not None and picture and frame and is_pointing and frame.contains(pointer.x, pointer.y):
@@ -175,6 +185,8 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [DropStroke()]
     if state.inspection.shows_grid:
         return [ShowGrid(False)]
+    if is_marking_gloss(state):
+        return [SetGlossBrush(replace(state.gloss_brush, is_on=False))]
     if state.shows_before:
         return [ShowBefore(False)]
     if state.is_fullscreen and not state.brush.is_on:
@@ -202,6 +214,11 @@ def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bo
 def is_brushing(state: AppState) -> bool:
     """Whether dragging over the picture paints."""
     return state.brush.is_on and state.scene is not None and state.scene.plan is not None
+
+
+def is_marking_gloss(state: AppState) -> bool:
+    """Whether dragging over the picture marks what is glossy."""
+    return state.gloss_brush.is_on and state.optics.gloss is not None and state.scene is not None
 
 
 def _zooms(pointer: Pointer, layout: Layout, frame: Rect) -> bool:
@@ -248,6 +265,22 @@ def _paint_actions(
     if state.stroke is None and pointer.holds_ctrl:
         return [PickDepth(DepthSample(place, disparity))]
     return [Paint(place)]
+
+
+def _gloss_actions(
+    pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
+) -> list[Action]:
+    """Mark the surface under the pointer, wherever it lies in the photo; the wheel makes the brush larger."""
+    frame, brush = layout.frame or picture, state.gloss_brush
+    if pointer.wheel and frame.contains(pointer.x, pointer.y):
+        return [SetGlossBrush(replace(brush, radius=brush.radius * BRUSH_NOTCH**pointer.wheel))]
+    if not pointer.is_down or not frame.contains(pointer.pressed_x, pointer.pressed_y):
+        return []
+    x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
+    disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
+    x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
+    place = (x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height
+    return [PaintGloss(place, brush, begins=pointer.is_pressed)]
 
 
 def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:

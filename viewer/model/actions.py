@@ -27,7 +27,7 @@ from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.model_download import DownloadingChanged
-from viewer.model.state.optics import LensAction
+from viewer.model.state.optics import LensAction, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
 from viewer.model.zoom import SetZoom
@@ -338,6 +338,7 @@ Action = (
     | DepthAction
     | FolderAction
     | ShowTiltHandles
+    | SetGlossBrush
     | SetFullscreen
     | HidePanel
     | ShowBefore

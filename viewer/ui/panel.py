@@ -16,6 +16,7 @@ from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source, source_beside
 from viewer.model.state.optics import ApplyPreset
 from viewer.ui.sections.depth import depth_line, depth_section
+from viewer.ui.sections.gloss import gloss_section
 from viewer.ui.sections.inspect import inspect_section
 from viewer.ui.sections.lens import aperture_section, focus_section, light_section
 from viewer.ui.sections.scene import scene_section
@@ -38,6 +39,7 @@ SECTION_WORDS: dict[Section, str] = {
     "focus": "Focus",
     "aperture": "Aperture",
     "light": "Light",
+    "gloss": "Gloss",
     "depth": "Depth",
     "inspect": "Inspect",
     "scene": "Scene",
@@ -230,6 +232,7 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout, pa
         "focus": lambda: focus_section(state, scene, layout),
         "aperture": lambda: aperture_section(state, scene, layout, palette),
         "light": lambda: light_section(state, layout),
+        "gloss": lambda: gloss_section(state, layout, palette),
         "depth": lambda: depth_section(state, scene, layout),
         "inspect": lambda: inspect_section(state, scene, layout),
         "scene": lambda: [*scene_section(scene, state.facts, layout), *_recent_elsewhere(state, layout)],

@@ -34,11 +34,16 @@ def fit_normals(disparity: FloatImage, geometry: SceneGeometry, should_stop: Sho
     near = geometry.nearness(disparity)
     spacing = max(round(REACH * max(disparity.shape) / TAPS), 1)
     step = STEP_SHARE * np.float32(near.max() - near.min())
-    normals = np.empty((*disparity.shape, 3), np.float32)
+    focal, size = np.float32(geometry.focal_px), image_size(disparity)
+    fitted = np.empty((*disparity.shape, 3), np.float32)
+    in_bands(lambda first, last: _fit_rows(near, focal, spacing, step, first, last, fitted), size, should_stop)
+    if spacing == 1:
+        return fitted
+    # taps that lie apart leave out the pixels between: those of the neighbours make up for it
+    normals = np.empty_like(fitted)
     in_bands(
-        lambda first, last: _fit_rows(near, np.float32(geometry.focal_px), spacing, step, first, last, normals),
-        image_size(disparity), should_stop,
-    )  # fmt: skip
+        lambda first, last: _mean_rows(fitted, near, focal, spacing, step, first, last, normals), size, should_stop
+    )
     return normals
 
 
@@ -83,6 +88,23 @@ def _touched(stroke: GlossStroke, mask: FloatImage) -> NDArray[np.bool_]:
         apart = np.hypot(x - start[0] - share * along[0], y - start[1] - share * along[1])
         touched[top:bottom, left:right] |= apart <= radius
     return touched
+
+
+@kernel
+def _mean_rows(fitted, near, focal, spacing, step, first, last, normals):
+    """Rows [first, last): each normal becomes the mean over so many pixels across and down, of the same surface."""
+    height, width = near.shape
+    before, after = spacing // 2, (spacing - 1) // 2
+    for y in range(first, last):
+        for x in range(width):
+            limit = step + STEEPEST * near[y, x] / focal * spacing
+            a, b, c = np.float32(0), np.float32(0), np.float32(0)
+            for v in range(max(y - before, 0), min(y + after, height - 1) + 1):
+                for u in range(max(x - before, 0), min(x + after, width - 1) + 1):
+                    if abs(near[v, u] - near[y, x]) <= limit:
+                        a, b, c = a + fitted[v, u, 0], b + fitted[v, u, 1], c + fitted[v, u, 2]
+            length = np.sqrt(a * a + b * b + c * c)
+            normals[y, x, 0], normals[y, x, 1], normals[y, x, 2] = a / length, b / length, c / length
 
 
 @kernel

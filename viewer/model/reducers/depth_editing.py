@@ -53,7 +53,8 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
             edits = replace(_clamp_tone(tone, state.depth.edits), strokes=state.depth.edits.strokes)
             return _with_settings(state, replace(state.depth, edits=edits), "SetTone", is_finished)
         case SetBrush(brush) if isfinite(brush.radius) and isfinite(brush.strength):
-            return replace(state, brush=_clamp_brush(brush))
+            gloss_brush = replace(state.gloss_brush, is_on=state.gloss_brush.is_on and not brush.is_on)
+            return replace(state, brush=_clamp_brush(brush), gloss_brush=gloss_brush)
         case Paint(place) if all(map(isfinite, place)):
             return _paint(state, place)
         case PickDepth(sample) if all(map(isfinite, (*sample.place, sample.disparity))):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import hypot
 
+from iibr_core.rendering.gloss.settings import MOST_POINTS, Gloss, GlossStroke
 from iibr_core.types import ViewOffset
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
 from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, has_sound_gloss, is_finite
@@ -13,10 +15,12 @@ from viewer.model.state.app_state import AppState, Notice, Scene, TiltHandles
 from viewer.model.state.optics import (
     ApplyPreset,
     FocusOn,
+    GlossBrush,
     LensAction,
     MoveEye,
     MoveTiltHandle,
     Optics,
+    PaintGloss,
     ResetOptics,
     SetAperture,
     SetApertureShape,
@@ -29,6 +33,8 @@ from viewer.model.state.optics import (
     SetTilt,
 )
 
+POINT_SPACING = 1 / 6
+"""Of the radius: a stroke of the gloss brush is remembered by places this far apart."""
 APERTURE_OPENED = "Focusing opened the aperture a little: what is nearer or farther blurs. Its slider sets how much."
 
 
@@ -94,11 +100,26 @@ def _edit_optics(state: AppState, scene: Scene, action: LensAction) -> Optics:
             return replace(optics, exposure_stops=stops)
         case SetGloss(gloss):
             return replace(optics, gloss=gloss)
+        case PaintGloss(place, brush, begins) if optics.gloss is not None:
+            return replace(optics, gloss=_painted(optics.gloss, place, brush, begins, scene))
         case ApplyPreset(name):
             return preset_optics(name, optics, scene, state.has_chosen_focus)
         case ResetOptics():
-            return Optics()
+            return Optics(gloss=optics.gloss)
     return optics
+
+
+def _painted(gloss: Gloss, place: tuple[float, float], brush: GlossBrush, begins: bool, scene: Scene) -> Gloss:
+    """With one more stroke, or with one more point of the last."""
+    strokes = gloss.surface.strokes
+    stroke = GlossStroke((place,), brush.radius, brush.erases)
+    if strokes and not begins:
+        last = strokes[-1]
+        step = hypot(place[0] - last.points[-1][0], (place[1] - last.points[-1][1]) * scene.height / scene.width)
+        if step < POINT_SPACING * last.radius or len(last.points) >= MOST_POINTS:
+            return gloss
+        strokes, stroke = strokes[:-1], replace(last, points=(*last.points, place))
+    return replace(gloss, surface=replace(gloss.surface, strokes=(*strokes, stroke)))
 
 
 def _move_handle(state: AppState, scene: Scene, action: MoveTiltHandle) -> AppState:

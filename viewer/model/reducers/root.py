@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import PurePath
 
+from iibr_core.rendering.gloss.settings import STROKE_RADIUS_LIMITS
 from viewer.model.actions import (
     Action,
     AskForPath,
@@ -87,7 +88,7 @@ from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.model_download import DownloadingChanged
-from viewer.model.state.optics import FocusOn, LensAction, MoveEye, ResetOptics, SetDolly
+from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetDolly, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.saving import SavingChanged
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
@@ -203,6 +204,8 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, notices=tuple(other for other in state.notices if other != notice))
         case DismissNotices():
             return replace(state, notices=())
+        case SetGlossBrush(brush):
+            return _take_gloss_brush(state, brush)
         case SetFullscreen(is_full):
             return replace(state, is_fullscreen=is_full)
         case HidePanel(is_hidden):
@@ -214,6 +217,15 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state
+
+
+def _take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:
+    """There is one brush in hand at most."""
+    if not math.isfinite(brush.radius):
+        return state
+    depth_brush = replace(state.brush, is_on=state.brush.is_on and not brush.is_on)
+    taken = replace(brush, radius=clamp(brush.radius, *STROKE_RADIUS_LIMITS))
+    return replace(state, gloss_brush=taken, brush=depth_brush)
 
 
 def _checked_zoom(zoom: Zoom | None) -> Zoom | None:

@@ -21,7 +21,7 @@ from viewer.model.state.exporting import CancelExportTask, Exporting, ExportProm
 from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.model_download import CancelGetTask, Downloading, GetModelTask, ListModelsTask, ModelsPrompt
-from viewer.model.state.optics import CENTRE, Optics
+from viewer.model.state.optics import CENTRE, GlossBrush, Optics
 from viewer.model.state.photo_facts import NO_FACTS, FactsRead, ReadFactsTask
 from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, Saving, WriteSidecarTask
 from viewer.model.zoom import Zoom
@@ -346,8 +346,8 @@ Theme = Literal["dark", "light"]
 Units = Literal["photographic", "light field"]
 """near to far and f-numbers, or pixels per view step and view steps."""
 
-Section = Literal["view", "focus", "aperture", "light", "depth", "inspect", "scene"]
-SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "depth", "inspect", "scene")
+Section = Literal["view", "focus", "aperture", "light", "gloss", "depth", "inspect", "scene"]
+SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "gloss", "depth", "inspect", "scene")
 
 
 @dataclass(frozen=True)
@@ -432,6 +432,7 @@ class AppState:
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None
+    gloss_brush: GlossBrush = field(default_factory=GlossBrush)
     saved_edits: DepthEdits = UNEDITED
     saving: Saving | None = None
     exporting: Exporting | None = None

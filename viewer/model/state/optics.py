@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.settings import Gloss, GlossSurface
 from iibr_core.types import ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)
@@ -78,6 +78,26 @@ class Optics:
     highlight_recovery: float = within(0.0, 1.0, 0.0)
     exposure_stops: float = within(-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS, 0.0)
     gloss: Gloss | None = None
+
+
+FIRST_GLOSS = Gloss(GlossSurface(farthest=0.5))
+"""Of whoever tries what it is."""
+
+
+@dataclass(frozen=True)
+class GlossBrush:
+    """What dragging over the picture marks as glossy, or takes out, while it is on. radius: see `GlossStroke`."""
+
+    radius: float = 0.04
+    erases: bool = False
+    is_on: bool = False
+
+
+@dataclass(frozen=True)
+class SetGlossBrush:
+    """Take this brush, or put it away."""
+
+    brush: GlossBrush
 
 
 @dataclass(frozen=True)
@@ -168,6 +188,17 @@ class SetGloss:
 
 
 @dataclass(frozen=True)
+class PaintGloss:
+    """Begin a stroke that marks the glossy surface, or go on with the last one: (x, y) as shares of the photo's width
+    and height.
+    """
+
+    place: tuple[float, float]
+    brush: GlossBrush
+    begins: bool
+
+
+@dataclass(frozen=True)
 class ApplyPreset:
     """Set focus and aperture for a purpose."""
 
@@ -192,6 +223,7 @@ LensAction = (
     | SetHighlightRecovery
     | SetExposure
     | SetGloss
+    | PaintGloss
     | ApplyPreset
     | ResetOptics
 )

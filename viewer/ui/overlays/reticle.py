@@ -11,7 +11,7 @@ from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
 from viewer.model.state.app_state import AppState, Hover, Scene, TiltHandles, Units
-from viewer.model.state.optics import Optics
+from viewer.model.state.optics import GlossBrush, Optics
 from viewer.ui.style import DARK, pack_color
 
 RETICLE_RADIUS = 11.0
@@ -35,6 +35,8 @@ def overlays(state: AppState, layout: Layout) -> None:
         _draw_sample(state, layout, picture)
         if state.hover is not None:
             _draw_brush(state, scene, state.hover, layout, picture)
+    elif state.gloss_brush.is_on and state.optics.gloss is not None and state.hover is not None:
+        _draw_gloss_brush(state.gloss_brush, scene, state.hover, layout, picture)
     elif state.hover is not None and state.hover.disparity is not None:
         _draw_reticle(state, scene, state.hover, layout, picture)
     draw.pop_clip_rect()
@@ -103,6 +105,14 @@ def _draw_brush(state: AppState, scene: Scene, hover: Hover, layout: Layout, pic
         draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), pack_color(DARK.text), 1.5 * scale)
     if state.brush.tool == "nearer":
         draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), pack_color(DARK.text), 1.5 * scale)
+
+
+def _draw_gloss_brush(brush: GlossBrush, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
+    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
+    x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
+    y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
+    color = pack_color(DARK.warning if brush.erases else DARK.text)
+    _ring(draw, x, y, max(brush.radius * picture.width, 2 * scale), scale, color)
 
 
 def _draw_sample(state: AppState, layout: Layout, picture: Rect) -> None:

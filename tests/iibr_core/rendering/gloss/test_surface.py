@@ -89,3 +89,11 @@ def test_strokes_beyond_the_picture_mark_what_of_it_they_reach():
 def test_infinity_is_known_with_metres_and_else_a_guess(values, inverse_metres, infinity):
     given = Disparity(np.array([values], np.float32), "a map", inverse_metres=inverse_metres)
     assert infinity_of(given) == pytest.approx(infinity)
+
+
+def test_rounding_from_pixel_to_pixel_does_not_show_in_the_normals_of_a_large_map():
+    """Taps of large maps lie apart; a map that alternates must not have normals that do."""
+    y, x = np.mgrid[:300, :700]
+    rounded = (5 + 0.004 * x + 0.02 * ((x + y) % 2)).astype(np.float32)
+    normals = fit_normals(rounded, SceneGeometry(600.0, 0.0))[40:-40, 40:-40]
+    assert np.abs(np.diff(normals[..., 0], axis=1)).max() < 0.01

@@ -1,0 +1,93 @@
+"""Gloss in a real window: switched on, the light dragged, painted with the brush, and what each edit costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.types import GridShape
+from tests.viewer.conftest import Driver
+from viewer.model.state.optics import SetGloss
+
+
+@pytest.fixture
+def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    preferences = replace(driver.app.state.preferences, open_sections=("gloss",))
+    driver.app.state = replace(driver.app.state, preferences=preferences)
+    driver.until_idle()
+    return driver
+
+
+def shown_gloss(driver: Driver) -> Gloss:
+    gloss = driver.app.state.optics.gloss
+    assert gloss is not None
+    return gloss
+
+
+def make_glossy(driver: Driver) -> None:
+    """Switch gloss on, and wait until it is seen: what it means is found out beside the window."""
+    driver.press("Glossy surface")
+    driver.until(lambda app: app.state.optics.gloss is not None)
+    driver.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
+    driver.until_idle()
+
+
+def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer: Driver) -> None:
+    plain = viewer.image()
+    make_glossy(viewer)
+    shiny = viewer.image()
+    assert np.abs(shiny.astype(int) - plain).max() > 3
+    x, y = viewer.find("light ball")
+    viewer.send("mousemove", x, y, "mousedown", 1)
+    viewer.app.step()
+    viewer.send("mousemove", x + 300, y)
+    viewer.until(lambda app: app.state.optics.gloss.light.direction[0] > 0.9)  # type: ignore[union-attr]
+    viewer.send("mouseup", 1)
+    viewer.until_idle()
+    assert not np.array_equal(viewer.image(), shiny)
+    viewer.send("key", "ctrl+z")
+    viewer.send("key", "ctrl+z")
+    viewer.until(lambda app: app.state.optics.gloss is None)
+    viewer.until_idle()
+    assert np.array_equal(viewer.image(), plain)
+
+
+def test_dragging_the_light_finds_nothing_out_anew(viewer: Driver) -> None:
+    make_glossy(viewer)
+    asked, gloss = viewer.app._gloss_asked, shown_gloss(viewer)
+    viewer.app.do(SetGloss(replace(gloss, roughness=0.1, light=replace(gloss.light, direction=(0.5, 0.1, -1)))))
+    viewer.until_idle()
+    assert viewer.app._gloss_asked is asked
+
+
+def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer: Driver) -> None:
+    make_glossy(viewer)
+    viewer.press("Only what is painted")
+    viewer.press("Mark")
+    viewer.until_idle()
+    eye = viewer.app.state.optics.eye
+    viewer.send("mousemove", *viewer.position(0.3, 0.5), "mousedown", 1)
+    viewer.app.step()
+    viewer.send("mousemove", *viewer.position(0.6, 0.5))
+    viewer.until(lambda app: len(app.state.optics.gloss.surface.strokes[-1:]) == 1)  # type: ignore[union-attr]
+    viewer.send("mouseup", 1)
+    viewer.until_idle()
+    (stroke,) = shown_gloss(viewer).surface.strokes
+    assert stroke.points[0] == pytest.approx((0.3, 0.5), abs=0.02)
+    assert viewer.app.state.optics.eye == eye
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: not app.state.gloss_brush.is_on)
+
+
+def test_surroundings_that_are_not_there_are_told_and_nothing_is_lost(viewer: Driver) -> None:
+    viewer.app.do(SetGloss(Gloss(environment="/nowhere/room.exr")))
+    viewer.until(lambda app: any("room.exr" in notice.text for notice in app.state.notices))
+    viewer.app.do(SetGloss(None))
+    viewer.until_idle()

@@ -1,0 +1,62 @@
+"""Gloss in the state: what the panel and the brush ask for, undone and redone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from iibr_core.rendering.gloss.settings import Gloss, GlossLight
+from iibr_core.types import GridShape
+from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
+from viewer.model.actions import EndGesture, Undo
+from viewer.model.reducers.root import reduce
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_editing import Brush, SetBrush
+from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, PaintGloss, ResetOptics, SetGloss, SetGlossBrush
+
+BRUSH = GlossBrush(radius=0.1, is_on=True)
+
+
+def glossy() -> AppState:
+    return reduce(state_with(scene_of()), SetGloss(FIRST_GLOSS))
+
+
+def test_gloss_comes_and_goes_and_outlasts_a_reset_of_the_lens() -> None:
+    state = reduce(glossy(), ResetOptics())
+    assert state.optics.gloss == FIRST_GLOSS
+    assert reduce(state, SetGloss(None)).optics.gloss is None
+    assert reduce(glossy(), Undo()).optics.gloss is None
+
+
+def test_what_makes_no_sense_changes_nothing() -> None:
+    state = glossy()
+    for gloss in (Gloss(roughness=math.nan), Gloss(light=GlossLight((0, 0, 0))), Gloss(reflectance=7)):
+        assert reduce(state, SetGloss(gloss)) is state
+    assert reduce(state, PaintGloss((math.nan, 0.5), BRUSH, True)).optics == state.optics
+    assert reduce(state, SetGlossBrush(GlossBrush(radius=math.inf))) is state
+
+
+def test_a_stroke_is_one_edit_and_skips_places_that_are_close() -> None:
+    state = glossy()
+    for x, begins in ((0.2, True), (0.201, False), (0.3, False)):
+        state = reduce(state, PaintGloss((x, 0.5), BRUSH, begins))
+    state = reduce(state, EndGesture())
+    (stroke,) = state.optics.gloss.surface.strokes  # type: ignore[union-attr]
+    assert stroke.points == ((0.2, 0.5), (0.3, 0.5))
+    another = reduce(state, PaintGloss((0.7, 0.5), BRUSH, True))
+    assert len(another.optics.gloss.surface.strokes) == 2  # type: ignore[union-attr]
+    assert reduce(reduce(another, EndGesture()), Undo()).optics == state.optics
+    assert reduce(reduce(reduce(another, EndGesture()), Undo()), Undo()).optics.gloss == FIRST_GLOSS
+
+
+def test_painting_without_gloss_does_nothing() -> None:
+    state = state_with(scene_of())
+    assert reduce(state, PaintGloss((0.5, 0.5), BRUSH, True)).optics == state.optics
+
+
+def test_there_is_one_brush_in_hand() -> None:
+    state = replace(glossy(), scene=scene_of(plan=plan_of(GridShape(9, 9))))
+    state = reduce(reduce(state, SetBrush(Brush(is_on=True))), SetGlossBrush(BRUSH))
+    assert (state.brush.is_on, state.gloss_brush.is_on) == (False, True)
+    state = reduce(state, SetBrush(Brush(is_on=True)))
+    assert (state.brush.is_on, state.gloss_brush.is_on) == (True, False)
