@@ -42,6 +42,7 @@ def write_kernels(folder: Path) -> None:
         kernel_cache.PRECOMPILED = folder  # it is empty: nothing comes from an earlier run
         for source in _photos(Path(scratch)):
             _open(source)
+        _look_around(source)
         _collect(kept, folder)
 
 
@@ -52,6 +53,21 @@ def _open(source: Source) -> None:
 
     for _ in results_of(SceneRequest(0, source), lambda: False, lambda: CENTRE):
         pass
+
+
+def _look_around(source: Source) -> None:
+    """What a camera needs that leaves the plane of the views."""
+    import numpy as np
+
+    from iibr_core.generation.free_views import FreeViews, inverse_depth_of, steered
+    from iibr_core.types import Camera
+    from viewer.background.loaded_photo import load_photo
+
+    loaded = load_photo(source)
+    size = loaded.photo.size
+    camera = Camera(np.eye(3), np.zeros(3), size, (float(size.width),) * 2, (size.width / 2, size.height / 2), "")
+    turned = steered(camera, 0.2, 0.2, 0.2)
+    FreeViews(loaded.photo.pixels, inverse_depth_of(loaded.disparity.values, None), camera, [turned]).view(turned)
 
 
 def _photos(scratch: Path) -> Iterator[Source]:

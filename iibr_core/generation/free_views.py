@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil
+from math import atan, ceil, cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ MOST_BEYOND = 0.5
 LEAST_BEYOND_PX = 1e-3
 MOST_PARALLAX = 0.5
 """Of the photo's longer side: cameras that see the nearest move farther against the farthest see what is made up."""
+MOST_UNLIKE = 0.02
+"""So far the sides of a pose's picture and the photo's may differ in their ratio: smaller copies are rounded."""
 LOOKED_AT = 33
 """So many places each way of a camera's picture tell what it sees."""
 
@@ -116,15 +118,42 @@ class FreeViews:
         self._rays = rays_of_photo(colors, disparity, farthest_views(reach.outer), len(reach.outer), should_stop)
         complete_ray_set(self._rays, reach.outer, should_stop, inpainter)
 
-    def view(self, camera: Camera) -> RenderedView:
-        """What a camera sees; its disparity is proportional to 1 / its distance from that camera's plane."""
+    def view(self, camera: Camera, should_stop: ShouldStop | None = None) -> RenderedView:
+        """What a camera sees; its disparity is proportional to 1 / its distance from that camera's plane.
+
+        should_stop: None for that of the ray set.
+        """
         matrix = target_from_photo(self._camera, camera, self._scale_px)
-        return render_free_view(self._rays, matrix, camera.size, self._margins, self._should_stop)
+        return render_free_view(self._rays, matrix, camera.size, self._margins, should_stop or self._should_stop)
 
 
 def depths_of(inverse_depth: FloatImage) -> tuple[float, float]:
     """Of the nearest and the farthest."""
     return 1 / float(inverse_depth.max()), 1 / float(inverse_depth.min())
+
+
+def fitted_cameras(cameras: Sequence[Camera], given: int, size: ImageSize) -> list[Camera]:
+    """The cameras with pictures so much smaller or larger that those of the given one are of the photo's size.
+
+    Raises InputError where they have another shape.
+    """
+    scale = size.width / cameras[given].size.width
+    if abs(size.height / (cameras[given].size.height * scale) - 1) > MOST_UNLIKE:
+        raise InputError(f"{cameras[given].source}: is of pictures of {cameras[given].size}, the photo is {size}")
+    smaller = [ImageSize(*(max(round(side * scale), 1) for side in camera.size)) for camera in cameras]
+    return [camera.resized(each) for camera, each in zip(cameras, [*smaller[:given], size, *smaller[given + 1 :]])]
+
+
+def steered(camera: Camera, right: float, down: float, forward: float) -> Camera:
+    """The camera moved forward, in the world's units, and turned towards the place (right, down) of its picture, where
+    1 is the border.
+    """
+    (height, width), (focal_x, focal_y) = camera.size, camera.focal_px
+    across, along = atan(right * width / (2 * focal_x)), atan(down * height / (2 * focal_y))
+    about_y = np.array([[cos(across), 0, sin(across)], [0, 1, 0], [-sin(across), 0, cos(across)]])
+    about_x = np.array([[1, 0, 0], [0, cos(along), sin(along)], [0, -sin(along), cos(along)]])
+    position = camera.position + forward * camera.world_from_camera[:, 2]
+    return replace(camera, world_from_camera=camera.world_from_camera @ about_y @ about_x, position=position)
 
 
 def _looked_at(photo: Camera, target: Camera, depths: tuple[float, float]) -> tuple[Points, Points]:

@@ -150,6 +150,9 @@ _generate = [
 _generate += [
     Case("generate poses", (*_POSES, "--poses", "poses.json"), 0, makes=("new", "new/view_0001.png"),
          prepare=_write_poses),
+    Case("view a field with poses", ("view", "field", "--poses", "poses.json"), says="--poses", prepare=_write_poses),
+    Case("view with no poses", ("view", "photo.png", "--poses", "empty.json"), says="empty", prepare=_write_poses),
+    Case("view with a pose's number", ("view", "photo.png", "--photo-pose", "1"), says="--photo-pose"),
     Case("generate poses into a folder", (*_POSES[:-1], "field", "--poses", "poses.json", "--force"), says="field",
          prepare=_write_poses),
 ]  # fmt: skip

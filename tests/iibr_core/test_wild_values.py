@@ -424,6 +424,8 @@ FINITE_BY_CONTRACT = {
     "inpainting.background.fill_background": "of rendered views only",
     "inpainting.background.continue_farthest": "of rendered views only",
     "formats.poses.central_camera": "of Cameras, which refuse what is not finite",
+    "generation.free_views.fitted_cameras": "of Cameras, which refuse what is not finite",
+    "generation.free_views.steered": "of a Camera; the window keeps the rest within limits",
     "generation.free_views.depths_of": "of what `inverse_depth_of` gave",
     "rendering.free_view.disparity_space": "of a Camera",
     "rendering.free_view.render_free_view": "as `generation.free_views.FreeViews` calls it",

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
+from viewer.app.free_look import FreeLook, FreePicture
 from viewer.app.gamepad import Gamepad, actions_from_gamepad
 from viewer.app.input import (
     NO_POINTER,
@@ -54,6 +55,7 @@ from viewer.model.actions import (
     Tick,
     WorkerLost,
 )
+from viewer.model.free_camera import Poses
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
     InspectionTextures,
@@ -99,7 +101,7 @@ EMPTY = AppState()
 @dataclass(frozen=True)
 class Frame:
     """Everything the window shows: picture and what inspection adds, panels (as a digest), where they lie, their look,
-    repairs asked for. sharp: GL name of what stands in the picture's place, None without.
+    repairs asked for. sharp: GL name of what stands in the picture's place, None without; free: of which camera.
     """
 
     picture: Picture | None
@@ -109,6 +111,7 @@ class Frame:
     look: Look
     damages: int
     sharp: int | None = None
+    free: FreePicture | None = None
 
 
 class App:
@@ -136,6 +139,7 @@ class App:
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
+        self.free_look = FreeLook(self._gl, self.scene_view, wake)
         self._depth = DepthPreview(self.scene_view)
         self._gloss = GlossWorker(wake)
         self._gloss_asked: GlossRequest | None = None
@@ -186,15 +190,28 @@ class App:
         actions = gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
-        texture = sharp or (self.scene_view.texture if picture else None)
+        free = self.free_look.texture(self.state) if picture else None
+        texture = free or sharp or (self.scene_view.texture if picture else None)
         actions += build_screen(self.state, layout, texture, textures, thumbnails)
         actions += self._input(pointer, layout)
-        self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))
+        self._show(
+            Frame(
+                picture,
+                textures,
+                self._ui.end(),
+                layout,
+                look,
+                self.window.damages,
+                sharp,
+                self.free_look.shown if free else None,
+            )
+        )
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
         self.do(*self._side_effects.draw(SAVE_BUDGET_S))
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
+        self.do(*self.free_look.advance(picture, self.state))
         self._is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self._direct_worker()
         self._read_ahead()
@@ -255,6 +272,7 @@ class App:
         self._ui.release()
         self._filmstrip.release()
         self.sharpener.close()
+        self.free_look.close()
         self.inspection_view.release()
         self.scene_view.release()
         self._gl.release()
@@ -463,7 +481,9 @@ def run(state: AppState, kept_in: Path | None = None) -> None:
         app.close()
 
 
-def initial_state(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
-    """The state to start with: nothing open yet, this asked for, and this light field to compare with."""
-    state = reduce(AppState(depth_strength=depth_strength), action)
+def initial_state(
+    action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None, poses: Poses | None = None
+) -> AppState:
+    """The state to start with: nothing open yet, this asked for, this light field to compare with, and these poses."""
+    state = replace(reduce(AppState(depth_strength=depth_strength), action), poses=poses)
     return reduce(state, DoTask(ReadTruthTask(ground_truth))) if ground_truth else state

@@ -12,9 +12,10 @@ import numpy as np
 import typer
 
 from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place, require_own_folder
-from iibr_core.types import Camera, FloatImage, ImageSize, InputError
+from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.options import given_options, inputs_with_sidecar, require_existing, require_model
 from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.model.free_camera import Poses
 
 if TYPE_CHECKING:
     from viewer.background.loaded_photo import LoadedPhoto
@@ -24,8 +25,6 @@ OWN_FILES = r"view_\d{4,5}\.(png|exr)"
 NOT_WITH_POSES = {"format": "--format", "depth_strength": "--depth-strength", "with_disparity": "--with-disparity",
                   "quality": "--quality", "gloss": "--gloss"}  # fmt: skip
 """Parameters of light fields alone. Weights are the closed form's."""
-MOST_UNLIKE = 0.02
-"""So far the sides of a pose's picture and the photo's may differ in their ratio: smaller copies are rounded."""
 MOSTLY, MOST_NAMED = 0.5, 5
 """Poses that show more than this share of what was made up are named, so many at most."""
 
@@ -37,6 +36,25 @@ def require_heeded_with_poses(context: typer.Context) -> None:
         raise InputError(f"{' and '.join(given)}: for light fields only; leave it out with --poses")
 
 
+def require_poses_for(photo_pose: int | None, poses: Path | None) -> None:
+    """Raise InputError for the number of a pose where there are none."""
+    if photo_pose is not None and poses is None:
+        raise InputError("--photo-pose says which of --poses is the photo's: give those, too")
+
+
+def poses_of(path: Path, photo_pose: int | None) -> Poses:
+    """The cameras of a file. photo_pose: the number of the photo's, from 1, None for the middle one.
+
+    Raises InputError.
+    """
+    from iibr_core.formats.poses import central_camera, read_poses
+
+    cameras = read_poses(path)
+    if photo_pose is not None and photo_pose > len(cameras):
+        raise InputError(f"--photo-pose {photo_pose}: {path} holds {len(cameras)}")
+    return Poses(cameras, central_camera(cameras) if photo_pose is None else photo_pose - 1)
+
+
 def write_free_views(
     source: Source, poses: Path, photo_pose: int | None, is_literal: bool, out: Path, force: bool
 ) -> None:
@@ -45,22 +63,19 @@ def write_free_views(
 
     Raises InputError.
     """
-    from iibr_core.formats.poses import central_camera, read_poses
-
     require_existing(source)
     require_own_folder(out, OWN_FILES)
     require_folder_place(out, (*inputs_with_sidecar(source), poses), force, is_whole=True)
     require_model(source.depth)
-    cameras = read_poses(poses)
-    if photo_pose is not None and photo_pose > len(cameras):
-        raise InputError(f"--photo-pose {photo_pose}: {poses} holds {len(cameras)}")
-    given = central_camera(cameras) if photo_pose is None else photo_pose - 1
-
+    known = poses_of(poses, photo_pose)
     with show_progress("reading") as show:
         from viewer.background.loaded_photo import load_photo
 
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
-    pictures = _as_large_as(cameras, given, loaded.photo.size)
+    from iibr_core.generation.free_views import fitted_cameras
+
+    given = known.given
+    pictures = fitted_cameras(known.cameras, given, loaded.photo.size)
     start, unseen = time.perf_counter(), []
     with show_progress("making views") as show:
         for done, share in enumerate(_written(out, source, loaded, is_literal, pictures, given), 1):
@@ -104,18 +119,6 @@ def _written(
         unfinished.put_in_place()
     finally:
         unfinished.discard()
-
-
-def _as_large_as(cameras: Sequence[Camera], given: int, size: ImageSize) -> list[Camera]:
-    """The cameras with pictures so much smaller or larger that those of the given one are of the photo's size.
-
-    Raises InputError where they have another shape.
-    """
-    scale = size.width / cameras[given].size.width
-    if abs(size.height / (cameras[given].size.height * scale) - 1) > MOST_UNLIKE:
-        raise InputError(f"{cameras[given].source}: is of pictures of {cameras[given].size}, the photo is {size}")
-    smaller = [ImageSize(*(max(round(side * scale), 1) for side in camera.size)) for camera in cameras]
-    return [camera.resized(each) for camera, each in zip(cameras, [*smaller[:given], size, *smaller[given + 1 :]])]
 
 
 def _inverse_depth(loaded: LoadedPhoto, is_literal: bool, camera: Camera) -> FloatImage:

@@ -12,12 +12,14 @@ from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field import NOT_FOR_DENSE_FIELDS, write_dense_field
-from viewer.cli.free_views import require_heeded_with_poses, write_free_views
+from viewer.cli.free_views import require_heeded_with_poses, require_poses_for, write_free_views
 from viewer.cli.lens_options import GlossFile
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
     Force,
     LightFieldFormat,
+    PhotoPose,
+    PosesFile,
     ScenePath,
     grid_from_text,
     inputs_with_sidecar,
@@ -43,18 +45,8 @@ def generate(
         GridShape | None,
         typer.Option(parser=grid_from_text, metavar="N|RxC", help="Views to make: 9 is 9x9.", show_default=False),
     ] = None,
-    poses: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Instead of a grid, views of these cameras: poses_bounds.npy, transforms.json or COLMAP's folder.",
-            show_default=False,
-        ),
-    ] = None,
-    photo_pose: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Which of the poses is the photo's.", show_default="the middle one"),
-    ] = None,
+    poses: PosesFile = None,
+    photo_pose: PhotoPose = None,
     format: LightFieldFormat = "hci",
     gloss: GlossFile = None,
     literal: Annotated[
@@ -78,8 +70,7 @@ def generate(
 
     Example: iibr generate photo.png --poses transforms.json --out pictures
     """
-    if photo_pose is not None and poses is None:
-        raise InputError("--photo-pose says which of --poses is the photo's: give those, too")
+    require_poses_for(photo_pose, poses)
     require_memory(scene.memory, keeps_views=False)
     if poses is not None:
         if grid is not None:

@@ -249,6 +249,20 @@ Literal = Annotated[
 
 Force = Annotated[bool, typer.Option("--force", help="Replace what is there already; what is read, never.")]
 
+PosesFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--poses",
+        metavar="FILE",
+        help="Cameras that see the photo: poses_bounds.npy, transforms.json or COLMAP's folder.",
+        show_default=False,
+    ),
+]
+PhotoPose = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Which of the poses is the photo's.", show_default="the middle one"),
+]
+
 LightFieldFormat = Annotated[
     str, typer.Option("--format", parser=format_from_text, metavar="|".join(WRITERS), help="Layout of the folder.")
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from iibr_core.depth.editing.edits import DepthEdits
+from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import (
     ChoiceOf,
     DrawReport,
@@ -343,6 +344,7 @@ Action = (
     | HidePanel
     | ShowBefore
     | SetZoom
+    | FreeCameraAction
     | SetDepthStrength
     | SetInpainter
     | FactsRead

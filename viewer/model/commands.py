@@ -31,6 +31,7 @@ from viewer.model.actions import (
     StopWork,
     Undo,
 )
+from viewer.model.free_camera import MoveCamera, StepPose
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import (
     LOOPS,
@@ -66,6 +67,7 @@ from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.zoom import SetZoom, Zoom
 
 FONT_STEP = 1.1
+CAMERA_STEP = 0.05
 RECENT_SHOWN = 4
 KEY_WORDS = {
     "equal": "+",
@@ -186,6 +188,14 @@ COMMANDS: tuple[Command, ...] = (
     *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
     Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
+    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),)),
+    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),)),
+    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),)),
+    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),)),
+    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),)),
+    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),)),
+    Command("Next pose", _always(StepPose(1)), (Chord("n"),)),
+    Command("Previous pose", _always(StepPose(-1)), (Chord("n", shift=True),)),
     Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
     Command("Depth brush", _toggle_brush, (Chord("b"),)),
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),

@@ -52,6 +52,7 @@ from viewer.model.actions import (
     WorkerEvent,
     WorkerLost,
 )
+from viewer.model.free_camera import FreeCameraAction
 from viewer.model.lens.limits import (
     DEPTH_STRENGTH_LIMIT,
     FONT_SCALE_LIMITS,
@@ -64,6 +65,7 @@ from viewer.model.reducers.camera_motion import advance_motion, glide_home, star
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
 from viewer.model.reducers.exporting import ask_to_export
 from viewer.model.reducers.folder import list_folder, photo_after, scroll_filmstrip
+from viewer.model.reducers.free_camera import reduce_free_camera
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
 from viewer.model.reducers.lens import reduce_lens
@@ -102,6 +104,7 @@ def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
     if isinstance(action, LensAction):
         state = replace(state, shows_before=False) if state.shows_before else state
+        state = replace(state, free_camera=None) if state.free_camera is not None else state
         state = replace(state, prompt=None) if state.prompt == "welcome" else state  # who moves has understood
         moves = isinstance(action, MoveEye | SetDolly | ResetOptics)
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
@@ -111,6 +114,8 @@ def reduce(state: AppState, action: Action) -> AppState:
         return record_edit(state, edited, type(action).__name__, always=is_click)
     if isinstance(action, MotionAction):
         return _reduce_motion(state, action)
+    if isinstance(action, FreeCameraAction):
+        return reduce_free_camera(state, action)
     if isinstance(action, WorkerEvent):
         return reduce_worker_event(state, action)
     if isinstance(action, InspectionAction):
@@ -165,6 +170,7 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case OpenPath(source):
             progress = Progress(doing=f"reading {PurePath(source.path).name}")
             generation, left = state.next_generation, _leave_field(state)
+            state = replace(state, free_camera=None, poses=None)
             return replace(state, source=source, progress=progress, generation=generation, prompt=None, left_field=left)
         case StopWork():
             return stop_work(state)
@@ -259,7 +265,7 @@ def _reduce_motion(state: AppState, action: MotionAction) -> AppState:
         return state
     match action:
         case ReturnHome():
-            state = _without_click(state)
+            state = replace(_without_click(state), free_camera=None)
             gliding = replace(state, motion=glide_home(motion, state.optics))
             return record_edit(state, gliding, "ReturnHome", always=True)
         case SetLoop(kind):

@@ -15,6 +15,7 @@ from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ViewOffset
+from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.depth_editing import Brush, DepthSettings
 from viewer.model.state.exporting import CancelExportTask, Exporting, ExportPrompt, ExportTask
@@ -396,7 +397,7 @@ class AppState:
 
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
-    zoom: None where the whole picture is seen.
+    zoom: None where the whole picture is seen. free_camera: None on the plane of the views; poses: of a file, for it.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
     file has them. saving, exporting: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this
     scene what is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs:
@@ -429,6 +430,8 @@ class AppState:
     report: DrawReport | None = None
     inspection: Inspection = field(default_factory=Inspection)
     zoom: Zoom | None = None
+    free_camera: FreeCamera | None = None
+    poses: Poses | None = None
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None

@@ -1,0 +1,72 @@
+"""A camera that leaves the plane of the views, in a real window, by real key events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.types import Camera, GridShape, ImageSize
+from tests.viewer.conftest import HEIGHT, WIDTH, Driver
+from viewer.model.free_camera import FreeCamera, Poses
+
+Opener = Callable[..., Driver]
+
+
+@pytest.fixture
+def viewer(open_window: Opener, photo_path: Path) -> Driver:
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    return driver
+
+
+def seen(viewer: Driver) -> np.ndarray:
+    """What the free camera sees, once that is shown."""
+    viewer.until(lambda app: app.free_look.shown is not None and app.free_look.shown.camera == app.state.free_camera)
+    viewer.until_idle()
+    pixels = viewer.app.free_look.pixels
+    assert pixels is not None
+    return pixels.astype(int)
+
+
+def red_places(pixels: np.ndarray) -> np.ndarray:
+    """(N, 2): x and y of the near square, as shares of the picture."""
+    y, x = np.nonzero(pixels[..., 0] > pixels[..., 1] + 60)
+    return np.stack([x / pixels.shape[1], y / pixels.shape[0]], axis=-1)
+
+
+def test_a_step_forward_makes_what_is_near_larger_and_c_goes_back(viewer: Driver) -> None:
+    before = viewer.image()
+    viewer.send("key", "w", "key", "w")
+    viewer.until(lambda app: app.state.free_camera == FreeCamera(forward=0.1))
+    pixels = seen(viewer)
+    width = np.ptp(red_places(pixels)[:, 0])
+    assert width == pytest.approx(1 / 3 / 0.9, abs=0.02)
+    viewer.send("key", "c")
+    viewer.until(lambda app: app.state.free_camera is None and app.free_look.shown is None)
+    viewer.until_idle()
+    np.testing.assert_array_equal(viewer.image(), before)
+
+
+def test_looking_right_moves_everything_to_the_left(viewer: Driver) -> None:
+    viewer.send("key", "w", "key", "s", "key", "shift+d", "key", "shift+d")
+    viewer.until(lambda app: app.state.free_camera is not None and app.state.free_camera.right == pytest.approx(0.1))
+    assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.45, abs=0.02)
+
+
+def test_poses_are_stepped_through_and_what_sees_nothing_is_told(viewer: Driver) -> None:
+    straight = Camera(
+        np.eye(3), np.zeros(3), ImageSize(HEIGHT, WIDTH), (100.0, 100.0), ((WIDTH - 1) / 2, (HEIGHT - 1) / 2), "own"
+    )
+    aside = replace(straight, position=np.array([0.1, 0.0, 0.0]), source="aside")
+    viewer.app.state = replace(viewer.app.state, poses=Poses((straight, aside), 0))
+    viewer.send("key", "n")
+    viewer.until(lambda app: app.state.free_camera == FreeCamera(1))
+    moved_px = 100.0 * 0.1  # the nearest is 1 away
+    assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.5 - moved_px / WIDTH, abs=0.02)
+    away = replace(straight, world_from_camera=np.diag([-1.0, 1.0, -1.0]), source="pose away")
+    viewer.app.state = replace(viewer.app.state, poses=Poses((straight, away), 0))
+    viewer.until(lambda app: any("pose away: sees nothing" in notice.text for notice in app.state.notices))
