@@ -510,7 +510,7 @@ READS_OR_TELLS = {
     "formats.light_fields.middlebury": "read_middlebury",
     "formats.light_fields.parameters": "read_parameters write_parameters stated_grid stated_focal_px stated_range_px",
     "formats.light_fields.registry": "LightFieldWriter WriterFactory is_light_field find_light_field open_light_field "
-    "writer_for",
+    "is_view_file writer_for",
     "formats.light_fields.scene": "pictures_in common_size on_grid maps_in first_map numbers_in",
     "formats.light_fields.view_grid": "view_folder candidate_views set_view require_fitting missing_view grid_scene",
     "formats.light_fields.views": "grid_of read_stored_view disparity_range step_length",

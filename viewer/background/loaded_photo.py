@@ -156,10 +156,10 @@ def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, ImageSize, 
     """
     from iibr_core.formats.images.header import read_photo_header
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, size_within
-    from iibr_core.formats.light_fields.registry import VIEW_FILES
+    from iibr_core.formats.light_fields.registry import is_view_file
 
     path, wanted = Path(source.path), source.max_pixels or DEFAULT_MAX_PIXELS
-    if VIEW_FILES.search(path.stem):
+    if is_view_file(path):
         raise InputError(
             f"{path}: holds the views of a light field, not a photo; `iibr view`, export and depth read it"
         )

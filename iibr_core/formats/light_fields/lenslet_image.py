@@ -11,10 +11,9 @@ from iibr_core.formats.files import shown_name
 from iibr_core.formats.images.oiio_reader import PictureRows, text_attribute
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource
 from iibr_core.formats.light_fields.scene import KnownView, MultiView
-from iibr_core.formats.light_fields.whole_field import LENSLET_KEY
+from iibr_core.formats.light_fields.whole_field import LENSLET_KEY, LENSLET_TAG
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
-NAME = re.compile(r"_eslf$", re.IGNORECASE)
 LYTRO_LENSLET = GridShape(14, 14)
 USABLE = slice(3, 11)
 """Rows and columns of a Lytro's views: beyond them the lens's rim darkens the corners."""
@@ -25,7 +24,7 @@ def read_lenslet_image(path: Path) -> MultiView | None:
 
     Raises InputError where its sides are no multiples of a lens's.
     """
-    if not NAME.search(path.stem):
+    if not LENSLET_TAG.search(path.stem):
         return None
     header = PictureRows(path)
     own = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text_attribute(header.spec, LENSLET_KEY))
@@ -45,7 +44,7 @@ def read_lenslet_image(path: Path) -> MultiView | None:
     )
     grid = GridShape(len(rows), len(columns))
     layout = f"lenslet image, {grid.columns}x{grid.rows} of {lenslet.columns}x{lenslet.rows} views"
-    return MultiView(shown_name(NAME.sub("", path.stem)), layout, views, grid=grid)
+    return MultiView(shown_name(LENSLET_TAG.sub("", path.stem)), layout, views, grid=grid)
 
 
 def _view_size(path: Path, size: ImageSize, lenslet: GridShape) -> ImageSize:

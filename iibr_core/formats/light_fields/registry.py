@@ -6,7 +6,6 @@ loading what they need. A new layout is a file of its own and one line here.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from pkgutil import resolve_name
@@ -14,6 +13,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from iibr_core.formats.files import is_folder, require_file
+from iibr_core.formats.light_fields.whole_field import LENSLET_TAG
+from iibr_core.formats.quilts import TAG as QUILT_TAG
 from iibr_core.types import GridShape, InputError, ViewUpdate
 
 if TYPE_CHECKING:
@@ -31,9 +32,6 @@ READERS = (
 
 FILE_READERS = ("quilt:read_quilt", "lenslet_image:read_lenslet_image", "stereo_file:read_stereo_file")
 """Of files, in the order in which they are asked: `Reader`s. Two views are a photo, whose depth they tell."""
-
-VIEW_FILES = re.compile(r"_qs\d+x\d+a[\d.]+[a-z\d.]*$|_eslf$", re.IGNORECASE)
-"""How names of files end that hold many views."""
 
 WRITERS = {
     "hci": "hci:HciWriter",
@@ -85,7 +83,12 @@ class WriterFactory(Protocol):
 
 def is_light_field(path: Path) -> bool:
     """Whether a path is to be opened as many views rather than as a photo: a folder, or a file that is named so."""
-    return is_folder(path) or VIEW_FILES.search(path.stem) is not None
+    return is_folder(path) or is_view_file(path)
+
+
+def is_view_file(path: Path) -> bool:
+    """Whether a file's name says that it holds many views."""
+    return bool(QUILT_TAG.search(path.stem) or LENSLET_TAG.search(path.stem))
 
 
 def find_light_field(path: Path) -> MultiView | None:

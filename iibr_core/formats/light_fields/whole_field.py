@@ -5,6 +5,7 @@ Views come in any order, such files are written in one: meanwhile they lie in a 
 
 from __future__ import annotations
 
+import re
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
@@ -19,6 +20,8 @@ from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.formats.outputs import require_file_place
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
 
+LENSLET_TAG = re.compile(r"_eslf$", re.IGNORECASE)
+"""At the end of a lenslet image's name."""
 LENSLET_KEY = "iibr:Lenslet"
 """In a lenslet image's header: columns and rows of each lens's pixels, which only ours tell."""
 
