@@ -2,8 +2,9 @@
 
 python -m benchmarks.folder [--folder FOLDER] [--photos 200] [--megapixels 12] [--dwell 1]
 
-Without a folder the photos are made up: texture and noise, as JPEG. Counted from asking for the next photo to the frame that shows it,
-in seconds and in processor time of all threads; dwell: so long each is looked at. Memory: resident, after every step.
+Without a folder the photos are made up: texture and noise, as JPEG. Counted from asking for the next photo to the
+frame that shows it, in seconds and in processor time of all threads; dwell: so long each is looked at. Memory:
+resident, after every step.
 """
 
 from __future__ import annotations

@@ -103,6 +103,28 @@ def open_with_depth(
     return _flat(photo, failures)
 
 
+def sketch_depth(path: Path, photo: Photo, choice: DepthChoice, should_stop: ShouldStop = never) -> PhotoWithDepth:
+    """What `open_with_depth` will find, as far as that is quick: of a small picture of the photo, edges as they come,
+    and a guess where that will ask a model or compare two views.
+
+    Raises InputError, Cancelled as that does.
+    """
+    height, width = photo.size
+    search = _DepthSearch(path, photo, choice, height * width, should_stop, ignore_progress)
+    choice = replace(choice, refine=0.0)
+    if choice.file is not None:
+        return _finish(search.of_file(Path(choice.file)), choice, None, should_stop)
+    if choice.start == "flat":
+        return _flat(photo, ())
+    ways = (search.sidecar, search.embedded_map) if choice.start == "auto" else (search.embedded_map,)
+    for find in ways if choice.start in ("auto", "embedded") else ():
+        with suppress(InputError):  # it is told when all is read
+            found = find()
+            if found is not None:
+                return _finish(found, choice, None, should_stop)
+    return _finish(search.rough(), choice, None, should_stop)
+
+
 def read_shown_photo(path: Path, max_pixels: int, kind: DepthKind) -> Photo:
     """The photo that `open_with_depth` shows, max_pixels large at most; kind: where it found the depth.
 
@@ -178,9 +200,12 @@ class _DepthSearch:
         return self.of_file(path) if path is not None else None
 
     def embedded(self) -> _FoundDepth | None:
+        return self.embedded_map() or self.of_pair()
+
+    def embedded_map(self) -> _FoundDepth | None:
         embedded = read_embedded(self.path)
         if embedded is None:
-            return self.of_pair()
+            return None
         orientation = read_orientation(self.path)
         photo = self.photo
         if embedded.all_in_focus is not None:

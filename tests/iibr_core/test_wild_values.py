@@ -309,6 +309,9 @@ FINITE = {
         search.open_with_depth(photo_file(to, v)),
         search.open_with_depth(photo_file(to, 1.0), DepthChoice(file=str(map_file(to, v)))),
     ],
+    "depth.search.sketch_depth": lambda v, to: [
+        search.sketch_depth(to, photo.read_photo(photo_file(to, 1.0)), DepthChoice(file=str(map_file(to, v)))),
+    ],
     "depth.search.resize_estimate": lambda v, _: known_of(
         search.resize_estimate(DisparityMap(known(v)), ImageSize(7, 9))
     ),
@@ -527,7 +530,7 @@ READS_OR_TELLS = {
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
     "complaint_of full_scale",
     "formats.images.header": "PhotoHeader read_photo_header",
-    "formats.images.thumbnail": "read_thumbnail",
+    "formats.images.thumbnail": "read_thumbnail read_jpeg_thumbnail",
     "formats.light_fields.stanford": "read_stanford StanfordWriter",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
     "generation.light_field": "transformer_for",

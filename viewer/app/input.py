@@ -213,7 +213,8 @@ def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bo
 
 def is_brushing(state: AppState) -> bool:
     """Whether dragging over the picture paints."""
-    return state.brush.is_on and state.scene is not None and state.scene.plan is not None
+    scene = state.scene
+    return state.brush.is_on and scene is not None and scene.plan is not None and not scene.is_sketch
 
 
 def is_marking_gloss(state: AppState) -> bool:

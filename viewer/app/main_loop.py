@@ -66,7 +66,7 @@ from viewer.model.layout import Layout, layout_of
 from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.folder import photos_ahead
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask, source_beside
+from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask, Source, source_beside
 from viewer.model.state.depth_editing import DepthSettings, DropStroke
 from viewer.model.state.folder import ShowFilmstrip
 from viewer.model.state.inspection import Probed
@@ -152,7 +152,7 @@ class App:
         self._sessions = SessionStore(kept_in, wake)
         self._kept_in = kept_in
         self._kept_recent = self.state.recent
-        self._submitted = 0
+        self._submitted = self._sketched = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
         self._stepped_at = 0.0
@@ -397,7 +397,7 @@ class App:
             return  # it will be another one
         source, strength = self.state.source, self.state.depth_strength
         if loaded is None and self._ahead.is_reading(source):
-            self._worker.cancel()
+            self._sketch(source)
             return  # it is nearly there
         ahead = self._ahead.take(source, strength) if loaded is None else None
         if loaded is None:
@@ -407,6 +407,12 @@ class App:
         self._worker.submit(
             SceneRequest(self.state.generation, source, strength, loaded, self._depth_settings, plan=plan)
         )
+
+    def _sketch(self, source: Source) -> None:
+        """Have the photo shown in small while it is being read anyway."""
+        if self._sketched != self.state.generation:
+            self._sketched = self.state.generation
+            self._worker.submit(SceneRequest(self._sketched, source, self.state.depth_strength, is_sketch=True))
 
     def _keep_left(self) -> None:
         """The photo that is left may be gone back to."""
@@ -419,7 +425,7 @@ class App:
     def _read_ahead(self) -> None:
         """What is likely to be opened next, once there is something to look at."""
         scene = self.state.scene
-        if scene is not None and scene.source is self.state.source:
+        if scene is not None and scene.source is self.state.source and not scene.is_sketch:
             wanted = photos_ahead(self.state)[: photos_within_budget(scene)]
             self._ahead.want(wanted, self.state.depth_strength)
 

@@ -63,7 +63,7 @@ class SessionStore:
             return []
         actions = self._take_results(state)
         scene = state.scene
-        if actions or scene is None or scene.source is not state.source:
+        if actions or scene is None or scene.is_sketch or scene.source is not state.source:
             return actions
         if self._scene is None or self._scene.source is not scene.source:
             self._leave()

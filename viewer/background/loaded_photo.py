@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     from iibr_core.depth.search import PhotoWithDepth
 
 TELL_EVERY_S = 0.1
+SKETCH = ImageSize(height=480, width=480)
+"""A sketch fits within this."""
+SKETCH_WORTH_PIXELS = 1_500_000
+"""Smaller photos are read in no time."""
 NOT_YET = 0.0
 """Disparity is read as it is, and refined afterwards: so often as the user wants to."""
 
@@ -116,6 +120,32 @@ def load_photo(
     settings_wanted = depth_settings or DepthSettings(source.depth.refine)
     own_size = _turned_like(stored_size, found.photo.size)
     return _prepare(found, settings, _models_here(), settings_wanted, (own_size, stamp), should_stop)
+
+
+def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto | None:
+    """A large JPEG in small, with depth that is found quickly: something to look at while the photo is read. None for
+    all others.
+
+    Raises InputError, and Cancelled once should_stop is true.
+    """
+    from iibr_core.depth.search import sketch_depth
+    from iibr_core.formats.images.header import read_photo_header
+    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov
+    from iibr_core.formats.images.thumbnail import read_jpeg_thumbnail
+
+    path = Path(source.path)
+    stored, stamp = read_photo_header(path).size, stamp_of(path)
+    to_read = min(stored.height * stored.width, source.max_pixels or DEFAULT_MAX_PIXELS)
+    if source.is_literal or to_read < SKETCH_WORTH_PIXELS:
+        return None
+    pixels = read_jpeg_thumbnail(path, SKETCH)
+    if pixels is None:
+        return None
+    encoded = pixels.astype(np.float32) / np.float32(255)
+    photo = Photo(encoded, focal_px_from_fov(encoded.shape[1]), path.stem, is_hdr=False)
+    found = sketch_depth(path, photo, source.depth, should_stop)
+    own_size = _turned_like(stored, photo.size)
+    return _prepare(found, "", (), DepthSettings(NOT_YET), (own_size, stamp), should_stop)
 
 
 def inpainting_aids(

@@ -8,7 +8,8 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from iibr_core.color import stored_from_encoded
@@ -17,7 +18,7 @@ from iibr_core.formats.files import is_folder
 from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
-from iibr_core.types import Photo, ViewOffset, ViewUpdate
+from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.light_field_job import median_of_middle, showings_of_light_field
 from viewer.background.loaded_photo import (
@@ -27,6 +28,7 @@ from viewer.background.loaded_photo import (
     load_photo,
     make_plan,
     prepare_brush,
+    sketch_photo,
 )
 from viewer.background.photo_folder import first_photo
 from viewer.model.layout import ScreenSize
@@ -39,8 +41,8 @@ from viewer.model.state.optics import CENTRE
 class SceneRequest:
     """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says.
 
-    plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something to
-    look at soon; else each comes once, final.
+    plan: of what is loaded, where it is made already. takes_drafts: the photo may come as a sketch first, and views
+    twice, so that there is something to look at soon; else each comes once, final. is_sketch: no more than the sketch.
     """
 
     generation: int
@@ -50,6 +52,7 @@ class SceneRequest:
     depth_settings: DepthSettings | None = None
     takes_drafts: bool = True
     plan: ScenePlan | None = None
+    is_sketch: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +178,10 @@ def _results_of_photo(
     report_progress: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
+    if request.loaded is None and request.takes_drafts:
+        yield from _sketch(request, should_stop)
+    if request.is_sketch:
+        return
     depth_settings = request.depth_settings or DepthSettings(source.depth.refine)
     loaded = (
         load_photo(source, should_stop, report_progress, depth_settings)
@@ -183,9 +190,7 @@ def _results_of_photo(
     )
     plan = request.plan or make_plan(source, loaded, request.depth_strength)
     disparity = plan.field_disparity(loaded.disparity)
-    colors = stored_from_encoded(loaded.photo.pixels, loaded.photo.is_hdr)
-    centre = ViewUpdate(*plan.grid.centre, colors, disparity.values)
-    yield SceneReady(request.generation, scene_of_photo(source, loaded, plan), loaded, centre)
+    yield SceneReady(request.generation, scene_of_photo(source, loaded, plan), loaded, _centre_view(loaded, plan))
 
     from iibr_core.generation.light_field import generate
 
@@ -201,6 +206,23 @@ def _results_of_photo(
     yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
     if not should_stop():
         prepare_brush()
+
+
+def _sketch(request: SceneRequest, should_stop: Callable[[], bool]) -> Iterator[SceneReady]:
+    """A large photo in small; nothing where it cannot be read so: reading all of it will tell why."""
+    with suppress(InputError):
+        loaded = sketch_photo(request.source, should_stop)
+        if loaded is None:
+            return
+        plan = make_plan(request.source, loaded, request.depth_strength)
+        scene = scene_of_photo(request.source, loaded, plan)
+        scene = replace(scene, notes=(), depth_origin=None, depth_source="being looked for", is_sketch=True)
+        yield SceneReady(request.generation, scene, None, _centre_view(loaded, plan))
+
+
+def _centre_view(loaded: LoadedPhoto, plan: ScenePlan) -> ViewUpdate:
+    colors = stored_from_encoded(loaded.photo.pixels, loaded.photo.is_hdr)
+    return ViewUpdate(*plan.grid.centre, colors, plan.field_disparity(loaded.disparity).values)
 
 
 def _results_of_light_field(

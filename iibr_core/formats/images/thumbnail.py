@@ -21,18 +21,22 @@ def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
 
     Raises InputError where it is no photo, or claims more pixels than any file may.
     """
-    require_file(path)
-    with path.open("rb") as file:
-        is_jpeg = file.read(2) == JPEG_START
-    pixels = _jpeg_thumbnail(path, within) if is_jpeg else None
+    pixels = read_jpeg_thumbnail(path, within)
     return _any_thumbnail(path, within) if pixels is None else pixels
 
 
-def _jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
-    """By the decoder's own reduction to an eighth or so; None where Pillow does not take the file."""
+def read_jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
+    """The same by the decoder's own reduction to an eighth or so; None where this is no JPEG that Pillow takes.
+
+    Raises InputError where there is no file.
+    """
     from PIL import Image, ImageOps
 
+    require_file(path)
     try:
+        with path.open("rb") as file:
+            if file.read(2) != JPEG_START:
+                return None
         with warnings.catch_warnings(), Image.open(path) as image:
             warnings.simplefilter("ignore")
             if image.width * image.height > MAX_FILE_PIXELS:

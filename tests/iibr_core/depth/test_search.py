@@ -11,7 +11,8 @@ from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import USUAL_MODEL, known_model
-from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resize_estimate
+from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resize_estimate, sketch_depth
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
@@ -72,6 +73,24 @@ def test_the_order_file_embedded_rough(tmp_path: Path) -> None:
     found = open_with_depth(path, start_from("flat"))
     assert found.origin.kind == "flat"
     assert not found.disparity.values.any()
+
+
+def test_a_sketch_finds_what_is_quick_in_the_same_order(tmp_path: Path) -> None:
+    path = photo_file(tmp_path)
+    photo = read_photo(path)
+    assert sketch_depth(path, photo, start_from("auto")).origin.kind == "embedded"
+    assert is_nearer_inside(sketch_depth(path, photo, start_from("embedded")))
+    assert sketch_depth(path, photo, start_from("rough")).origin.kind == "rough"
+    assert sketch_depth(path, photo, start_from("model")).origin.kind == "rough"
+    assert sketch_depth(path, photo, start_from("flat")).origin.kind == "flat"
+    sidecar = tmp_path / "scene_disparity.npy"
+    np.save(sidecar, np.zeros(SIZE, np.float32))
+    assert sketch_depth(path, photo, start_from("auto")).origin.kind == "file"
+    assert sketch_depth(path, photo, start_from("auto", file=str(sidecar))).origin.kind == "file"
+    sidecar.write_bytes(b"no map")
+    assert sketch_depth(path, photo, start_from("auto")).origin.kind == "embedded"
+    with pytest.raises(InputError):
+        sketch_depth(path, photo, start_from("auto", file=str(sidecar)))
 
 
 def test_every_photo_moves(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.types import GridShape
+from tests.viewer.background.test_scene_worker import write_large_jpeg
 from tests.viewer.conftest import Driver, write_scene
 
 Opener = Callable[..., Driver]
@@ -49,6 +50,16 @@ def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Drive
     viewer.send("key", "Page_Up")
     viewer.until_idle()
     assert viewer.app.state.scene.name == "photo0"  # type: ignore[union-attr]
+
+
+def test_a_large_photo_is_there_in_small_before_it_is_read(open_window: Opener, tmp_path: Path) -> None:
+    driver = open_window(write_large_jpeg(tmp_path), grid=GridShape(3, 3))
+    driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
+    driver.until(lambda app: app.scene_view.picture_drawn is not None)
+    driver.until(lambda app: not app.state.scene.is_sketch)
+    driver.until_idle()
+    assert driver.app.scene_view.loaded is not None
+    assert driver.app.state.progress.is_complete
 
 
 def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewUpdate
@@ -16,6 +17,7 @@ from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanf
 from tests.viewer.background.test_light_field_job import showings
 from viewer.background.jobs import QUEUED_RESULTS, Failed
 from viewer.background.light_field_job import UNKNOWN_DISPARITY_RANGE_PX
+from viewer.background.loaded_photo import sketch_photo
 from viewer.background.scene_worker import (
     SceneReady,
     SceneRequest,
@@ -85,6 +87,44 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
     indices = {(v.view.row, v.view.column) for v in views if isinstance(v, ViewReady)}
     assert indices == {(row, column) for row in range(3) for column in range(3)}
     assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
+
+
+def write_large_jpeg(folder: Path) -> Path:
+    """A photo that takes a while to read."""
+    rows, columns = np.mgrid[:1200, :1600]
+    pixels = np.stack([rows % 256, columns % 256, (rows // 100 + columns // 100) % 2 * 200], axis=2)
+    Image.fromarray(pixels.astype(np.uint8)).save(folder / "large.jpg")
+    return folder / "large.jpg"
+
+
+def test_a_large_jpeg_comes_as_a_sketch_first(tmp_path: Path) -> None:
+    source = Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3))
+    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)
+    sketch, whole = next(results), next(results)
+    assert isinstance(sketch, SceneReady)
+    assert isinstance(whole, SceneReady)
+    assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
+    assert sketch.scene.is_sketch
+    assert sketch.loaded is None
+    assert sketch.centre.colors.shape == (360, 480, 3)
+    assert sketch.scene.name == whole.scene.name
+    assert (whole.scene.size, whole.scene.is_sketch) == ((1600, 1200), False)
+    assert whole.loaded is not None
+    only = results_of(SceneRequest(1, source, is_sketch=True), lambda: False, lambda: CENTRE)
+    assert [result.scene.is_sketch for result in only if isinstance(result, SceneReady)] == [True]
+
+
+@pytest.mark.parametrize("changes", [{"max_pixels": 10_000}, {"is_literal": True}], ids=str)
+def test_what_is_read_in_no_time_or_taken_literally_has_no_sketch(tmp_path: Path, changes: dict[str, object]) -> None:
+    source = replace(Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3)), **changes)  # type: ignore[arg-type]
+    assert sketch_photo(source) is None
+
+
+def test_a_cut_jpeg_fails_as_it_did_without_a_sketch(tmp_path: Path) -> None:
+    path = write_large_jpeg(tmp_path)
+    path.write_bytes(path.read_bytes()[:20_000])
+    with pytest.raises(InputError, match=r"large\.jpg"):
+        list(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
 
 
 @pytest.mark.parametrize("takes_drafts", [True, False])

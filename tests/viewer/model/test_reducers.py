@@ -289,6 +289,20 @@ def test_views_that_came_are_known_until_another_field_is_made() -> None:
     assert state.views_there == {(2, 2)}
 
 
+def test_a_sketch_opens_the_photo_and_the_whole_photo_goes_on_with_it() -> None:
+    sketch = scene_of(source=SOURCE, is_sketch=True)
+    state = reduce(state_with(None), SceneOpened(1, sketch))
+    assert state.progress.doing.startswith("reading")
+    state = reduce(replace(state, source=SOURCE), FocusOn((0.0, 0.0), 1.0))
+    whole = reduce(state, SceneOpened(1, scene_of(source=SOURCE, notes=("Made smaller.",))))
+    assert whole.notices == (*state.notices, Notice("Made smaller."))
+    assert whole.history.past == state.history.past != ()
+    assert whole.has_chosen_focus
+    stopped = reduce(state, StopWork())
+    assert stopped.stopped == 1
+    assert stopped.scene is sketch
+
+
 def test_recent_files_are_listed_once_the_latest_first() -> None:
     state = state_with(None)
     for name in ("a.png", "b.png", "a.png"):

@@ -45,6 +45,8 @@ def stop_work(state: AppState) -> AppState:
         left = _leave_job(state)
         is_back = left.scene is not None and left.scene.source is left.source
         return left if is_back else replace(left, stopped=state.generation, source=None)
+    if state.scene is not None and state.scene.is_sketch:
+        return replace(state, stopped=state.generation, progress=Progress(doing="stopped: this is a small picture"))
     if not progress.total or progress.is_complete:
         return state
     doing = f"stopped at {progress.done} of {progress.total} views"
@@ -58,7 +60,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     opened = replace(
         state,
         scene=scene,
-        progress=Progress(doing="making views"),
+        progress=Progress(doing=f"reading {scene.name}" if scene.is_sketch else "making views"),
         views_there=frozenset({scene.grid.centre}),
         left_field=None,
         shown_generation=state.generation,
@@ -66,10 +68,11 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         history=map_optics(state.history, lambda optics: carry_optics(optics, old, scene)),
         inspection=replace(state.inspection, pair=None, probe=None),
     )
-    if old is not None and old.source is scene.source:
-        return opened
-    # the same file, opened again, is new
     notices = (*map(notice_in_window, scene.notes), *_offers(scene))[-NOTICES_KEPT:]
+    if old is not None and old.source is scene.source:
+        is_whole_now = old.is_sketch and not scene.is_sketch
+        return replace(opened, notices=(*state.notices, *notices)[-NOTICES_KEPT:]) if is_whole_now else opened
+    # the same file, opened again, is new
     motion = Motion(speed=state.motion.speed)
     recent = state.recent
     if old is not None and is_stepped_to(state.folder, scene.source):

@@ -81,7 +81,8 @@ class Scene:
     view step as given. depth_models: names of those on this machine. inverse_metres: (slope, offset) of 1 / distance
     over the disparity as given, None where distances are not known in metres. color_space: of its views. own_size: of
     the photo in its file, which a view may be smaller than; None for light fields. infinity_px: field disparity of what
-    is infinitely far, as far as it is known.
+    is infinitely far, as far as it is known. is_sketch: it is
+    shown in small while it is read.
     """
 
     source: Source
@@ -104,6 +105,7 @@ class Scene:
     inverse_metres: tuple[float, float] | None = None
     color_space: ColorSpace = SRGB
     own_size: ScreenSize | None = None
+    is_sketch: bool = False
     infinity_px: float = 0.0
 
     @property
