@@ -15,11 +15,12 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from math import cos, nan, radians, sin
+from math import cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.provenance import made_by
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import _fill_holes, reference_warp_to
 from iibr_core.generation.free_views import FreeViews
@@ -42,6 +43,11 @@ POSES = {
 """Place in distances of the nearest (right, down, forward), turns about x, y and z in degrees, focal length in the
 photo's.
 """
+
+Row = tuple[float, float, float, float]
+"""PSNR of the frame, of what is seen, of what is not; milliseconds of processor time."""
+Table = dict[tuple[str, str], list[Row]]
+"""Rows of all scenes, by pose and way."""
 
 
 def rotation(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -120,28 +126,28 @@ def main() -> None:
     options = parser.parse_args()
     width, height = map(int, options.size.split("x"))
     rng = np.random.default_rng(options.seed)
-    table: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
+    table: Table = {}
+    size, ray_set_ms = ImageSize(height, width), []
     for _ in range(options.scenes):
-        judge(random_scene(rng, ImageSize(height, width), float(rng.uniform(1, 3))), ImageSize(height, width), table)
+        ray_set_ms.append(judge(random_scene(rng, size, float(rng.uniform(1, 3))), size, table))
+    print(f"{made_by('benchmarks.free_views')}.\n")
     print("| pose | way | frame dB | seen dB | unseen dB | ms of processor time |")
     print("| --- | --- | --- | --- | --- | --- |")
-    every: dict[str, list[tuple[float, float, float, float]]] = {}
+    print(f"| all, once | ray set | | | | {np.median(ray_set_ms):.0f} |")
     for (pose, way), rows in table.items():
-        every.setdefault(way, []).extend(rows)
         print(line(pose, way, rows))
-    for way, rows in every.items():
-        print(line("all", way, rows))
+    for way in ("warp", "resampled", "ours"):
+        print(line("all", way, [row for (_, other), rows in table.items() if other == way for row in rows]))
 
 
-def line(pose: str, way: str, rows: list[tuple[float, float, float, float]]) -> str:
+def line(pose: str, way: str, rows: list[Row]) -> str:
+    """Of the table."""
     frame, seen, unseen, ms = np.nanmedian(np.array(rows), axis=0)
     return f"| {pose} | {way} | {frame:.2f} | {seen:.2f} | {unseen:.2f} | {ms:.0f} |"
 
 
-def judge(
-    scene: RaycastScene, size: ImageSize, table: dict[tuple[str, str], list[tuple[float, float, float, float]]]
-) -> None:
-    """Add the figures of one scene."""
+def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
+    """Add the figures of one scene; the milliseconds of processor time that its ray set took."""
     taken = photo_camera(scene, size)
     photo, inverse_depth = truth(scene, taken)
     cameras = cameras_of(scene, size, 1 / float(inverse_depth.max()))
@@ -150,7 +156,7 @@ def judge(
     disparity = inverse_depth * np.float32(scale_px)
     start = time.process_time()
     ours = FreeViews(photo, inverse_depth, taken, list(cameras.values()))
-    table.setdefault(("all", "ray set"), []).append((nan, nan, nan, 1e3 * (time.process_time() - start)))
+    ray_set_ms = 1e3 * (time.process_time() - start)
     for name, camera in cameras.items():
         true, _ = truth(scene, camera)
         matrix = target_from_photo(taken, camera, scale_px)
@@ -166,6 +172,7 @@ def judge(
             ms = 1e3 * (time.process_time() - start)
             figures = (bounded_psnr(made, true, mask) for mask in (None, judged.visible, judged.hole))
             table.setdefault((name, way), []).append((*figures, ms))
+    return ray_set_ms
 
 
 if __name__ == "__main__":
