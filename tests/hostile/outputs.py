@@ -28,6 +28,20 @@ def _locked(folder: Path) -> None:
     (folder / "folder").chmod(0)
 
 
+def _put_in_the_way(name: str) -> Callable[[Path], None]:
+    """A file of the user's under the name that is written to: in it, where that is a folder."""
+
+    def prepare(folder: Path) -> None:
+        there = folder / "folder" / name
+        if "." in name:
+            there.write_text("mine")
+        else:
+            there.mkdir()
+            (there / "mine.txt").write_text("mine")
+
+    return prepare
+
+
 def _link_hard(folder: Path) -> None:
     (folder / "hard.png").hardlink_to(folder / "photo.png")
 
@@ -184,4 +198,44 @@ _full = [
     for room in (200, 500)
 ]
 
-OUTPUT_CASES = (*_places, *_missing_folders, *_screenshot, *_generate, *_others, *_full)
+_EXPORTS = {
+    "mp4": "new.mp4", "gif": "new.gif", "apng": "new.png", "spatial-photo": "new.heic", "exr": "new.exr",
+    "focal-stack-exr": "new.exr", "focal-stack-tiff": "new", "splats": "new.ply", "disparity": "new.pfm",
+    "eslf": "new_eslf.png", "hci": "new", "nerfstudio": "new",
+}  # fmt: skip
+"""Kinds of export whose files are written in different ways, and what each is to write."""
+
+
+def _exporting(kind: str, place: str) -> tuple[str, ...]:
+    moving = ("--frames", "3") if kind in ("mp4", "gif", "apng", "focal-stack-exr", "focal-stack-tiff") else ()
+    return ("export", "photo.png", "--disparity", "map.pfm", "--grid", "2", "--to", kind, *moving, "-o", place)
+
+
+_exports = [
+    case
+    for kind, name in _EXPORTS.items()
+    for case in (
+        Case(
+            f"export {kind} onto a disk with room for 200 bytes",
+            _exporting(kind, name),
+            limits=("--fsize=200",),
+            environment={"PYTHONDONTWRITEBYTECODE": "1"},
+            says=name.partition(".")[0],
+        ),
+        Case(
+            f"export {kind} in a read-only folder",
+            _exporting(kind, f"folder/{name}"),
+            prepare=_read_only,
+            is_bound=True,
+            says="folder",
+        ),
+        Case(
+            f"export {kind} onto what is there",
+            _exporting(kind, f"folder/{name}"),
+            prepare=_put_in_the_way(name),
+            says="folder",
+        ),
+    )
+]
+
+OUTPUT_CASES = (*_places, *_missing_folders, *_screenshot, *_generate, *_others, *_full, *_exports)

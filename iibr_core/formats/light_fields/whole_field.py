@@ -9,6 +9,7 @@ import re
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
+from contextlib import closing, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
@@ -67,21 +68,23 @@ class _FileWriter(ABC):
             if self.with_disparity and update.disparity is not None:
                 self._views.write(np.ascontiguousarray(update.disparity, np.float32).tobytes())
                 self._has_disparity.add(at)
+            self._views.flush()
         except OSError as error:
+            with suppress(OSError):  # what found no room is tried once more
+                self._views.close()
             raise InputError(f"{self.path}: no room for its views ({error.strerror or error}); free some") from error
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._views is not None
-        with self._views:
+        with closing(self._views):
             total = self.grid.rows * self.grid.columns
             if kind is None and len(self._added) != total:
                 raise InputError(
                     f"{self.path}: only {len(self._added)} of {total} views were made; nothing was written"
                 )
             if kind is None:
-                self._views.flush()
                 self.write_file()
 
     @abstractmethod

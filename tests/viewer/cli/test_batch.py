@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 from iibr_core.formats.images.photo import write_image
@@ -65,25 +66,29 @@ def test_an_archive_is_exported_once(archive: Path, tmp_path: Path) -> None:
     assert before == {name: (out / name).stat().st_mtime_ns for name in written}
 
 
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_an_interruption_is_one_line_and_the_next_run_goes_on(archive: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def long_archive(archive: Path) -> Path:
+    """So many photos that a batch can be ended in their midst."""
     photo = (archive / "a.png").read_bytes()
     shutil.rmtree(archive)
     archive.mkdir()
     for number in range(60):
         (archive / f"{number}.png").write_bytes(photo)
-    out = tmp_path / "out"
-    words = (archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
-    manifest = out / "manifest.jsonl"
-    command = [sys.executable, "-P", "-m", "viewer", "batch", *map(str, words)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as run:
-        while run.poll() is None and not (manifest.is_file() and manifest.stat().st_size):
-            time.sleep(0.01)
-        os.killpg(run.pid, signal.SIGINT)  # as a terminal does, to the workers too
-        _, said = run.communicate(timeout=120)
-    assert (run.returncode, said) == (130, "iibr: interrupted\n")
+    return archive
 
-    finished = {json.loads(line)["name"] for line in manifest.read_text().splitlines()}
+
+def started_batch(*words: object, until: Path) -> subprocess.Popen[str]:
+    """One that runs, in a process group of its own, and has finished something."""
+    command = [sys.executable, "-P", "-m", "viewer", "batch", *map(str, words)]
+    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while run.poll() is None and not (until.is_file() and until.stat().st_size):
+        time.sleep(0.01)
+    return run
+
+
+def goes_on(archive: Path, out: Path, *words: object) -> None:
+    """What was finished is not made again, and of the rest one photo is."""
+    finished = {json.loads(line)["name"] for line in (out / "manifest.jsonl").read_text().splitlines()}
     left = [path for path in sorted(archive.iterdir()) if path.stem not in finished]
     assert finished
     assert left
@@ -91,6 +96,65 @@ def test_an_interruption_is_one_line_and_the_next_run_goes_on(archive: Path, tmp
         path.unlink()
     again = run_batch(*words)
     assert again.stdout == f"{out}: 1 written, {len(finished)} there before, 0 failed\n", again.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_an_interruption_is_one_line_and_the_next_run_goes_on(long_archive: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
+    with started_batch(*words, until=out / "manifest.jsonl") as run:
+        os.killpg(run.pid, signal.SIGINT)  # as a terminal does, to the workers too
+        _, said = run.communicate(timeout=120)
+    assert (run.returncode, said) == (130, "iibr: interrupted\n")
+    goes_on(long_archive, out, *words)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_when_all_is_killed_nothing_finished_is_lost(long_archive: Path, tmp_path: Path) -> None:
+    """As by a power cut, to what the disk holds of it."""
+    out = tmp_path / "out"
+    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
+    with started_batch(*words, until=out / "manifest.jsonl") as run:
+        for process in (*psutil.Process(run.pid).children(recursive=True), psutil.Process(run.pid)):
+            process.kill()
+        run.communicate(timeout=120)
+    whole = [json.loads(line)["output"] for line in (out / "manifest.jsonl").read_text().splitlines()]
+    assert all(len(list((out / name).glob("input_Cam*.png"))) == 9 for name in whole)
+    goes_on(long_archive, out, *words)
+
+
+@pytest.fixture
+def cluster_elsewhere(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """A scheduler with a worker, as users start them: its process and address."""
+    told = tmp_path / "scheduler.json"
+    dask = [sys.executable, "-P", "-m", "dask"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    where = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)]
+    scheduler = subprocess.Popen([*dask, "scheduler", *where], **quiet)  # type: ignore[call-overload]
+    while scheduler.poll() is None and not (told.is_file() and told.stat().st_size):
+        time.sleep(0.01)
+    address = json.loads(told.read_text())["address"]
+    worker = subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard"], **quiet)  # type: ignore[call-overload]
+    yield scheduler, address
+    for process in (*psutil.Process(worker.pid).children(recursive=True), worker, scheduler):
+        process.kill()
+    worker.wait()
+    scheduler.wait()
+
+
+def test_when_the_scheduler_is_killed_it_is_one_line_and_nothing_finished_is_lost(
+    long_archive: Path, tmp_path: Path, cluster_elsewhere: tuple[subprocess.Popen[bytes], str]
+) -> None:
+    scheduler, address = cluster_elsewhere
+    out = tmp_path / "out"
+    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
+    with started_batch(*words, "--scheduler", address, until=out / "manifest.jsonl") as run:
+        scheduler.kill()
+        _, said = run.communicate(timeout=120)
+    (line,) = said.splitlines()
+    assert run.returncode == 2
+    assert line.startswith("iibr: the workers were lost"), said
+    goes_on(long_archive, out, *words, "--workers", 1)
 
 
 def deadly_or_not(task: PhotoTask) -> Outcome:
