@@ -27,22 +27,23 @@ def estimate_from_pair(
     report_progress: ReportProgress = ignore_progress,
 ) -> tuple[DisparityMap, str] | None:
     """Of the picture that a stereo photo's file shows, px from eye to eye, and what kind of file it is; None where a
-    file is no stereo photo.
+    file is no stereo photo, or shows another picture than these two.
 
     Raises InputError where it is damaged, its views differ in size, are too small, or memory does not do; Cancelled
     once should_stop is true.
     """
     scene = read_stereo_file(path)
-    if scene is None:
+    held = [view.picture for view in scene.views] if scene is not None else []
+    if scene is None or own_picture(path) not in held:
         return None
     report_progress(0, 0, "finding disparity")
-    pictures = [read_picture(view.picture, MATCHED_PIXELS).pixels for view in scene.views]
+    pictures = [read_picture(picture, MATCHED_PIXELS).pixels for picture in held]
     if pictures[0].shape != pictures[1].shape:
         sizes = " and ".join(str(image_size(pixels)) for pixels in pictures)
         raise InputError(f"{path}: its two views differ in shape ({sizes} after reading)")
     views = [stored_from_encoded(pixels, is_hdr=False) for pixels in pictures]
     offsets = [view.offset for view in scene.views]
-    reference = next(k for k, view in enumerate(scene.views) if view.picture == own_picture(path))
+    reference = held.index(own_picture(path))
     coarse = estimate_coarse(views, offsets, reference, should_stop)
     allowed = memory_bytes or usual_budget_bytes()
     if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > allowed:

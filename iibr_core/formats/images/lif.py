@@ -128,7 +128,7 @@ def _views(text: bytes, fields: Mapping[int, Any]) -> tuple[LifView, ...]:
     try:
         said = json.loads(text)
         views = [_view({NAMES.get(key, key): value for key, value in view.items()}) for view in said["views"]]
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
         raise InputError(
             f"its Leia fields cannot be read ({type(error).__name__}); get the whole file again"
         ) from error

@@ -235,7 +235,9 @@ def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
     [
         (lambda data: data.replace(b'"blob_id": 10', b'"blob_id": 11'), "lack a picture"),
         (lambda data: data.replace(b'{"views"', b'["views"'), "cannot be read"),
-        (lambda data: data.replace(b'"views"', b'"sights"'), "cannot be read|beyond"),
+        (lambda data: data.replace(b'"views"', b'"sight"'), "cannot be read|beyond"),
+        (lambda data: data.replace(b'"blob_id": 10', b'"blob_id":1e9'), "lack a picture|cannot be read"),
+        (lambda data: leia_image(smooth(), smooth(), image={"blob_id": float("inf")}), "cannot be read"),
         (lambda data: data.replace(struct.pack(">I", 8) + b"\0", struct.pack(">I", 9) + b"\0"), "nothing of views"),
         (lambda data: data[:-6] + struct.pack(">I", 20) + data[-2:], "fields|beyond"),
     ],
