@@ -59,8 +59,7 @@ def choose_sides(
     """
     reluctance = None
     for _ in range(ROUNDS):
-        distance = np.full(values.shape, RIM_PX + 1, np.uint8)
-        _step_distance(values, least_edge, distance)
+        distance = step_distance(values, least_edge)
         pixels = np.flatnonzero(distance <= RIM_PX)
         if not len(pixels):
             return values
@@ -80,6 +79,13 @@ def choose_sides(
         values = values.copy()
         values.reshape(-1)[pixels] = np.where(belief < 0.5, other, values.reshape(-1)[pixels])
     return values
+
+
+def step_distance(values: FloatImage, least_edge: float) -> NDArray[np.uint8]:
+    """(H, W): how many pixels lie between each and the nearest step larger than least_edge; at most RIM_PX + 1."""
+    distance = np.full(values.shape, RIM_PX + 1, np.uint8)
+    _measure_distance(values, least_edge, distance)
+    return distance
 
 
 def _mean_color_step(colors: FloatImage, pixels: NDArray[np.int64]) -> float:
@@ -122,8 +128,8 @@ def _mean_field(
 
 
 @kernel
-def _step_distance(values, least_edge, distance):
-    """How many pixels lie between each and the nearest step, where that is less than distance (H, W) has."""
+def _measure_distance(values, least_edge, distance):
+    """What `step_distance` returns, where that is less than distance (H, W) has."""
     height, width = values.shape
     for y in range(height):
         for x in range(width):

@@ -9,14 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.rim_sides import choose_sides
+from iibr_core.depth.rim_sides import RIM_PX, choose_sides, step_distance
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
-RIM_PX = 2
-"""Pixels so close to a depth edge may belong to its other side."""
 PLATEAU_SHARE = 0.15
 """A pixel clearly lies between two surfaces if each changes by at most this share of their distance ..."""
 PLATEAU_PX = 2
@@ -51,9 +49,8 @@ def settle_rims(
     such disparities nor unknown ones in its rims, comes back as it is. Raises Cancelled once should_stop is true.
     """
     colors, size = np.ascontiguousarray(photo, np.float32), image_size(values)
-    between, rim = np.zeros(values.shape, np.bool_), np.zeros(values.shape, np.bool_)
+    between, rim = np.zeros(values.shape, np.bool_), step_distance(values, least_edge) < RIM_PX
     clear = in_bands(lambda first, last: _find_between(values, least_edge, first, last, between), size, should_stop)
-    in_bands(lambda first, last: _find_rims(values, least_edge, first, last, rim), size, should_stop)
     least = LEAST_MEASURED * np.count_nonzero(rim)
     if sum(clear) > least:
         values = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
@@ -134,15 +131,3 @@ def _is_crowded(values, y, x, least_edge):
             steps += right > least_edge or down > least_edge
             places += 1
     return steps >= CROWDED * places
-
-
-@kernel
-def _find_rims(values, least_edge, first, last, rim):
-    """Rows [first, last): pixels within RIM_PX of either side of a step."""
-    height, width = values.shape
-    for y in range(max(first - RIM_PX, 0), min(last + RIM_PX, height)):
-        for x in range(width):
-            right, below = min(x + 1, width - 1), min(y + 1, height - 1)
-            for v, u in ((y, right), (below, x)):
-                if abs(values[v, u] - values[y, x]) > least_edge:
-                    rim[max(y - RIM_PX + 1, first) : min(v + RIM_PX, last), max(x - RIM_PX + 1, 0) : u + RIM_PX] = True
