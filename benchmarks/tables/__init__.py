@@ -1,0 +1,1 @@
+"""Tables like the paper's, one command each: python -m benchmarks.tables.NAME writes docs/tables/NAME.md."""

@@ -1,0 +1,24 @@
+"""What every report of a table begins with, and its place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from benchmarks.provenance import made_by
+
+FOLDER = Path(__file__).parents[2] / "docs" / "tables"
+MACHINE = "2 cores of an x86-64 server, no GPU; times are processor time"
+
+
+def write_report(name: str, title: str, parts: Iterable[str]) -> None:
+    """docs/tables/NAME.md: title, command, commit and machine, then the parts."""
+    head = f"# {title}\n\n{made_by(f'benchmarks.tables.{name}')}. {MACHINE}.\n"
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    (FOLDER / f"{name}.md").write_text("\n".join([head, *(f"{part}\n" for part in parts)]), "utf-8")
+
+
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of words."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
