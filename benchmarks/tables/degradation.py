@@ -87,7 +87,7 @@ def main() -> None:
         f" {FIRST_SEED}; {SIZE} px; largest disparity {DISPARITIES_PX[0]} to {DISPARITIES_PX[1]} px per view step."
         " *refined*: the map drawn to the photo's edges first, as the program does it with maps that it is not told to"
         " take literally.",
-        "![curves](degradation.svg)",
+        "![curves](degradation.png)",
     ]
     for fault in FAULTS:
         rows = [
@@ -147,7 +147,7 @@ def _plot(curves: dict[str, dict[str, dict[str, list[float]]]]) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context({"svg.hashsalt": "iibr", "svg.fonttype": "path", "font.size": 8}):
+    with matplotlib.rc_context({"font.size": 8}):
         figure = Figure(figsize=(9, 5), layout="constrained")
         for axis, fault in zip(np.ravel(figure.subplots(2, 3, sharey=True)), FAULTS):
             for name, style in zip(curves, ("-", "--", ":")):
@@ -160,7 +160,7 @@ def _plot(curves: dict[str, dict[str, dict[str, list[float]]]]) -> None:
             axis.grid(alpha=0.3)
         figure.supylabel("PSNR, dB")
         figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-        figure.savefig(FOLDER / "degradation.svg", metadata={"Date": None})
+        figure.savefig(FOLDER / "degradation.png", dpi=110)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from pathlib import Path
 from benchmarks.provenance import made_by
 
 FOLDER = Path(__file__).parents[2] / "docs" / "tables"
-MACHINE = "2 cores of an x86-64 server, no GPU; times are processor time"
+MACHINE = "2 cores of an x86-64 server, no GPU"
 
 
 def write_report(name: str, title: str, parts: Iterable[str]) -> None:
