@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.rendering.gloss.settings import Gloss, of_maps
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
-from iibr_core.types import FloatImage, ViewUpdate
+from iibr_core.types import Disparity, FloatImage, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.model.state.app_state import Scene
 
@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 MOST_ENVIRONMENT_PIXELS = 2_000_000
 
 
-def geometry_of(scene: Scene) -> SceneGeometry:
-    """Where the points of a scene lie; a usual field of view stands in where none is known."""
+def geometry_of(scene: Scene, disparity: FloatImage) -> SceneGeometry:
+    """Where the points of a scene lie; a usual field of view stands in where none is known. disparity: (H, W), of its
+    centre view: that of a light field from disk says what may be infinitely far.
+    """
     from iibr_core.formats.images.photo import focal_px_from_fov
-    from iibr_core.rendering.gloss.geometry import SceneGeometry
+    from iibr_core.rendering.gloss.geometry import SceneGeometry, infinity_of
 
-    return SceneGeometry(scene.focal_px or focal_px_from_fov(scene.width), scene.infinity_px)
+    infinity = infinity_of(Disparity(disparity, scene.name)) if scene.plan is None else scene.infinity_px
+    return SceneGeometry(scene.focal_px or focal_px_from_fov(scene.width), infinity)
 
 
 def read_environment(gloss: Gloss) -> FloatImage | None:
@@ -103,7 +106,9 @@ def maps_of_scene(
 
     photo = encoded_from_stored(centre.colors)
     around = read_environment(gloss)
-    return make_gloss_maps(gloss, photo, centre.disparity, geometry_of(scene), around, normals, should_stop)
+    return make_gloss_maps(
+        gloss, photo, centre.disparity, geometry_of(scene, centre.disparity), around, normals, should_stop
+    )
 
 
 def add_gloss(

@@ -65,6 +65,8 @@ def generate(
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
 
+    Example: iibr generate photo.png --grid 9 --gloss gloss.toml --out shiny
+
     With --poses: the pictures of any cameras; the photo's depth is fitted to the depths of its pose, else the nearest
     is 1 away (--literal: disparity counts as it is, in px per unit of length).
 

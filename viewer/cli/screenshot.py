@@ -183,6 +183,10 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
             viewer.do(*shot.actions, *shot.lens.actions())
             size = shot.size
             if shot.is_full:
+                if viewer.state.optics.gloss is not None:
+                    raise InputError(
+                        "--full: gloss is drawn from the views, which may be smaller; leave one of both out"
+                    )
                 size = viewer.own_size
                 require_full(viewer.scene, viewer.state.optics)
             if ui or viewer.needs_views(size):

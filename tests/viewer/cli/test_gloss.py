@@ -67,6 +67,28 @@ def test_an_environment_that_is_not_there_is_one_line(
     assert not (photo_path.parent / "new").exists()
 
 
+def test_the_photos_own_size_is_not_drawn_with_gloss(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, gloss_path: Path
+) -> None:
+    out = photo_path.parent / "new.png"
+    assert run(monkeypatch, "screenshot", photo_path, "--full", "--gloss", gloss_path, "-o", out) == 2
+    assert "--full" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_views_from_disk_take_gloss_where_their_disparity_goes_below_zero(
+    monkeypatch: pytest.MonkeyPatch, photo_path: Path, gloss_path: Path, tmp_path: Path
+) -> None:
+    field, plain, shiny = tmp_path / "field", tmp_path / "plain.png", tmp_path / "shiny.png"
+    words = ("generate", photo_path, "--grid", 3, "--out", field, "--with-disparity")
+    assert run(monkeypatch, *words) == 0
+    assert run(monkeypatch, "screenshot", field, "-o", plain) == 0
+    assert run(monkeypatch, "screenshot", field, "--gloss", gloss_path, "-o", shiny) == 0
+    gained = np.asarray(Image.open(shiny)).astype(int) - np.asarray(Image.open(plain))
+    assert gained.min() >= -2
+    assert gained.mean() > 5
+
+
 def test_maps_take_no_gloss(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, gloss_path: Path
 ) -> None:
