@@ -296,7 +296,7 @@ def _edge_reasons(statistics: ParallaxStatistics, inpaint: str, outer_views: int
     if not statistics.has_disocclusion:
         return [near_edges + "nothing is disoccluded, so nothing is inpainted."]
     name = inpaint.partition(":")[0]
-    why = "it measures best" if inpaint == DEFAULT_INPAINTER else "as asked"
+    why = "nearest to true views, though smooth" if inpaint == DEFAULT_INPAINTER else "as asked"
     reasons = [f"{near_edges}holes behind them are inpainted by {name}: {why}."]
     if inpaint not in INPAINTERS:
         reasons.append(

@@ -132,7 +132,7 @@ def test_literal_takes_disparity_as_it_is():
 @pytest.mark.parametrize(
     ("inpaint", "words", "paints"),
     [
-        ("background", "inpainted by background: it measures best.", False),
+        ("background", "inpainted by background: nearest to true views, though smooth.", False),
         ("patch", "inpainted by patch: as asked.", False),
         ("diffusion:folder", "inpainted by diffusion: as asked.", True),
     ],
