@@ -157,7 +157,7 @@ class SideEffects:
         """The disparity map of the scene on the screen, edits included, in px per view step as given."""
         if state.scene is None:
             return []
-        if self._scene_view.generation != state.generation:
+        if self._scene_view.generation != state.generation or state.scene.is_sketch:
             return [Notify(Notice("The map is still being made; save it again in a moment."))]
         try:
             path = map_path(task, self._inputs(state))
