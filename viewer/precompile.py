@@ -83,8 +83,9 @@ def _photos(scratch: Path) -> Iterator[Source]:
     from viewer.model.state.app_state import Source
 
     demo = open_with_depth(demo_photo(), DepthChoice(refine=0.0))
-    colors, disparity = demo.photo.pixels[PART], demo.disparity.values[PART].copy()
-    disparity[:4, :4] = np.nan  # a hole
+    # A pixel beside the photo, and with a hole: rims of measured maps are moved to it.
+    colors, disparity = demo.photo.pixels[PART], np.roll(demo.disparity.values[PART], 1, axis=1)
+    disparity[:4, :4] = np.nan
     photo, unmapped, hdr = (scratch / name for name in ("photo.png", "unmapped.png", "hdr.exr"))
     write_image(photo, np.round(255 * colors).astype(np.uint8))
     write_image(unmapped, np.round(255 * colors).astype(np.uint8))
