@@ -13,7 +13,9 @@ from iibr_core.types import FloatImage, ImageSize, image_size
 
 TEXELS_A_WIDTH = 2.0
 LEAST_HEIGHT, MOST_HEIGHT = 16, 512
-REACH_WIDTHS = 5.0
+MOST_SMOOTHED = 256
+"""Rows of a picture that is smoothed: its cost grows with their fourth power."""
+REACH_WIDTHS = 3.0
 """Farther than so many widths from its middle a lobe counts as empty."""
 
 
@@ -26,8 +28,10 @@ def prefilter_environment(light: FloatImage, roughness: float, should_stop: Shou
     wanted = round(pi * TEXELS_A_WIDTH / max(alpha, 1e-3))
     height = max(min(wanted, MOST_HEIGHT, max(light.shape[0], LEAST_HEIGHT)), LEAST_HEIGHT)
     finite = np.where(np.isfinite(light), np.maximum(light, 0), 0).astype(np.float32)
+    is_sharp = alpha * height < 0.5 * pi
+    height = height if is_sharp else min(height, MOST_SMOOTHED)
     small = mean_of_areas(finite, ImageSize(height, 2 * height), should_stop)
-    if alpha * height < 0.5 * pi:
+    if is_sharp:
         return small
     smooth = np.empty_like(small)
     in_bands(lambda first, last: _smooth_rows(small, alpha, first, last, smooth), image_size(small), should_stop)
@@ -39,19 +43,20 @@ def _smooth_rows(light, alpha, first, last, smooth):
     """Rows [first, last) of the mean of `light` (h, 2h, 3) under GGX's lobe about each direction."""
     height, width = light.shape[:2]
     width2 = alpha * alpha
+    polars = np.pi * (np.arange(height) + 0.5) / height
+    sines, cosines = np.sin(polars), np.cos(polars)
+    turns = np.cos(2 * np.pi * np.arange(width) / width)
     reach = REACH_WIDTHS * alpha * 2
     for y in range(first, last):
-        polar = np.pi * (y + 0.5) / height
         rows = int(reach / np.pi * height) + 1
         for x in range(width):
             red, green, blue, total = 0.0, 0.0, 0.0, 0.0
             for v in range(max(y - rows, 0), min(y + rows + 1, height)):
-                other = np.pi * (v + 0.5) / height
-                sine = np.sin(other)
-                widest = reach / max(min(sine, np.sin(polar)), 1e-3)
+                sine = sines[v]
+                widest = reach / max(min(sine, sines[y]), 1e-3)
                 columns = min(int(widest / (2 * np.pi) * width) + 1, width // 2)
                 for k in range(-columns, columns + (columns < width // 2)):
-                    cosine = np.cos(polar) * np.cos(other) + np.sin(polar) * sine * np.cos(2 * np.pi * k / width)
+                    cosine = cosines[y] * cosines[v] + sines[y] * sine * turns[abs(k)]
                     if cosine <= 0:
                         continue
                     # the half vector lies half as far away; 1 - cos^2 of half an angle
