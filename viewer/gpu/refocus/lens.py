@@ -19,7 +19,7 @@ HIGHLIGHT_GAIN = 15.0
 """Full highlight recovery lets clipped pixels count for four stops more."""
 
 FADE_FROM_PX, FADE_TO_PX = 4.0, 6.0
-"""Over these widths of the whole blur, light moves from the sharp layer to those of half the size."""
+"""Over these widths of the whole blur, light moves from the sharp layer to those that are smoothed."""
 
 LEAST_ACROSS = 2.0
 """Samples across the aperture, at least, however low the quality."""

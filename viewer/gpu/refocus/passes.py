@@ -42,7 +42,7 @@ SPANS = "intervals_of_0_and_1", "intervals_of_2_and_3"
 
 
 class Passes:
-    """Draws parts of a picture. adaptive: whether tiles skip what they have no content for."""
+    """Draws parts of a picture. adaptive: whether tiles leave out what they have no use for."""
 
     def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
         self._ctx = ctx

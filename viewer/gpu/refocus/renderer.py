@@ -50,8 +50,8 @@ KEPT_SIZES = 2
 class Renderer:
     """Draws one light field at a time. Call it only from the thread its context belongs to.
 
-    prefilter: smooth what lies between sparse samples; off, it shows them as separate copies. adaptive: tiles skip the
-    layers they have no content for, and searches that find nothing. report: what is known of the picture drawn last.
+    prefilter: smooth what lies between sparse samples; off, it shows them as separate copies. adaptive: tiles take few
+    samples where all is sharp, and skip searches that find nothing. report: what is known of the picture drawn last.
     note: what had to be left out, a sentence for people.
     """
 
@@ -76,7 +76,7 @@ class Renderer:
 
     @property
     def adaptive(self) -> bool:
-        """Whether tiles skip what they have no content for."""
+        """Whether tiles leave out samples and searches that they have no use for."""
         return self._accumulator.passes.adaptive
 
     @adaptive.setter
