@@ -7,6 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+WITH_CHANGES = " (with changes)"
+"""After a commit's name: the files were not what that commit has."""
+
 
 def made_by(module: str) -> str:
     """The run in words: `python -m module ...` with its options, and the commit where it is known; no full stop."""
@@ -17,7 +20,7 @@ def made_by(module: str) -> str:
 
 def current_commit() -> str:
     """The commit checked out, short; "" outside a checkout. Changes that are not committed are said."""
-    command = ["git", "describe", "--always", "--exclude=*", "--dirty= (with changes)"]
+    command = ["git", "describe", "--always", "--exclude=*", f"--dirty={WITH_CHANGES}"]
     try:
         run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):

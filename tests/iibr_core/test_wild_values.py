@@ -46,6 +46,8 @@ from iibr_core.rendering import (
     resampling,
     undecided_rays,
 )
+from iibr_core.rendering.gloss import environment, geometry, shading, surface
+from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface, of_maps
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime.tiling import never
@@ -226,7 +228,25 @@ def read_back(write, path, pixels):
     return photo.read_photo(path).pixels
 
 
+def glossy(value):
+    """A view of a glossy scene with wild disparity: under a light, and with what its photo reflects moving."""
+    given = Disparity(depths(value), "wild")
+    lies = geometry.SceneGeometry(20.0, geometry.infinity_of(given))
+    dark = GlossLight(color=(0.0, 0.0, 0.0))
+    for gloss in (Gloss(), Gloss(photo_shines=True), Gloss(light=dark, photo_shines=True)):
+        maps = shading.make_gloss_maps(gloss, image(0.5), given.values, lies, environment=image(value))
+        view = ViewUpdate(0, 1, (255 * image(0.5)).astype(np.uint8), given.values)
+        yield from shading.shade_views(iter([view]), maps, GRID)
+
+
 FINITE = {
+    "rendering.gloss.environment.prefilter_environment": lambda v, _: environment.prefilter_environment(image(v), 0.5),
+    "rendering.gloss.geometry.infinity_of": lambda v, _: geometry.infinity_of(Disparity(depths(v), "wild")),
+    "rendering.gloss.settings.of_maps": lambda v, _: of_maps(Gloss(roughness=v, reflectance=v)) and None,
+    "rendering.gloss.shading.shade_views": lambda v, _: list(glossy(v)),
+    "rendering.gloss.surface.surface_mask": lambda v, _: surface.surface_mask(
+        GlossSurface(color=(0.5, 0.5, 0.5)), image(0.5), Disparity(depths(v), "wild").values
+    ),
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
     "rendering.hypothesis_colors.blend_hypotheses": lambda v, _: decided(v),
     "rendering.hypothesis_colors.bound_weights": lambda v, _: hypothesis_colors.bound_weights(
@@ -416,7 +436,17 @@ ELEMENTWISE = {
 }
 """One wild element changes no other."""
 
+GLOSSY = "of a field's disparity and sound settings, as `shade_views` is given them"
 FINITE_BY_CONTRACT = {
+    "rendering.gloss.geometry.SceneGeometry": GLOSSY,
+    "rendering.gloss.microfacet.reflected_share": GLOSSY,
+    "rendering.gloss.reflection.reflected_light": GLOSSY,
+    "rendering.gloss.reflection.reflection_disparity": GLOSSY,
+    "rendering.gloss.reflection.separate_light": GLOSSY,
+    "rendering.gloss.settings.require_sound": "refuses what is not finite, tests/iibr_core/rendering/gloss",
+    "rendering.gloss.shading.make_gloss_maps": GLOSSY,
+    "rendering.gloss.shading.shade": GLOSSY,
+    "rendering.gloss.surface.fit_normals": GLOSSY,
     "color.convert": "of a Photo, see color.photo_in_srgb",
     "color.primaries_matrix": "of colour spaces that the reader of profiles checked",
     "color.bytes_from_encoded": "of photos and of views, as for `stored_from_encoded`",

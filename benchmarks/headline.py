@@ -1,0 +1,82 @@
+"""The README's figures measured anew: short programs one after another, each with its command, commit and words.
+
+    python -m benchmarks.headline --data DATA [--yardsticks BENCH] [--only NAME] [--out docs/figures.md]
+
+DATA holds the scenes that `iibr evaluate` takes; BENCH holds judge_views.py. --only measures one again and leaves the
+others in the report as they are, with the commits that they were made at.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+import sys
+from pathlib import Path
+
+from benchmarks.provenance import current_commit
+from benchmarks.speed.processes import JUDGED_SCENES, VIEW_JUDGE, output_lines
+from iibr_core.formats.outputs import atomic_write
+
+SOFT_MAPS = ("antinous-blur1", "antinous-blur2", "antinous-blur4", "antinous-half")
+TITLE = """# Figures of the README
+
+What the programs named here printed, on two cores of a shared machine, without a GPU.
+"""
+IIBR = str(Path(sys.executable).parent / "iibr")
+
+
+def measurements(data: str, yardsticks: str | None) -> dict[str, list[str]]:
+    """What to call Python with, by the heading of its section."""
+    programs = {
+        "against-warp": ["-m", "benchmarks.against_warp", "--data", data],
+        "first-picture": ["-m", "benchmarks.full_size", "12", "24", "48", "--save", "12"],
+        "window": ["-m", "benchmarks.window"],
+        "cancelled": ["-m", "benchmarks.cancel", "--times", "10"],
+        "field-disparity": ["-m", "benchmarks.multi_view_depth", "--data", data],
+        "refocus": ["-m", "benchmarks.refocus", "--data", f"{data}/blender_shop_9x9"],
+    }
+    if yardsticks:
+        judge = [f"{yardsticks}/{VIEW_JUDGE}", "--data", data, "--iibr", IIBR]
+        programs["views"] = [*judge, *JUDGED_SCENES]
+        programs["soft-maps"] = [*judge, *SOFT_MAPS]
+        programs["soft-maps-refine-off"] = [*judge, *SOFT_MAPS, "--extra=--refine off"]
+    return programs
+
+
+def section(name: str, program: list[str], places: dict[str, str]) -> str:
+    """Run a program and tell about it. places: what stands in the report for folders of this machine."""
+    command = shlex.join(["python", *program])
+    lines = "\n".join(output_lines(list(program)))
+    for folder, word in places.items():
+        command, lines = command.replace(folder, word), lines.replace(folder, word)
+    return f"## {name}\n\nMade by `{command}` at commit {current_commit()}.\n\n```\n{lines}\n```\n"
+
+
+def sections_in(report: str) -> dict[str, str]:
+    """The sections that a report holds, by their headings."""
+    parts = re.split(r"^(?=## )", report, flags=re.MULTILINE)[1:]
+    return {part.partition("\n")[0].removeprefix("## "): part.rstrip("\n") + "\n" for part in parts}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", required=True)
+    parser.add_argument("--yardsticks")
+    parser.add_argument("--only")
+    parser.add_argument("--out", type=Path, default=Path("docs/figures.md"))
+    options = parser.parse_args()
+    programs = measurements(options.data, options.yardsticks)
+    if options.only and options.only not in programs:
+        parser.error(f"--only {options.only}: there are {', '.join(programs)}")
+    places = {str(Path(sys.executable).parent) + "/": "", options.data: "DATA", options.yardsticks or "BENCH": "BENCH"}
+    sections = sections_in(options.out.read_text("utf-8")) if options.out.exists() else {}
+    for name in [options.only] if options.only else programs:
+        print(name, file=sys.stderr, flush=True)
+        sections[name] = section(name, programs[name], places)
+        with atomic_write(options.out) as unfinished:
+            unfinished.write_text("\n".join([TITLE, *sections.values()]), "utf-8")
+
+
+if __name__ == "__main__":
+    main()
