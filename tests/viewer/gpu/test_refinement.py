@@ -62,6 +62,14 @@ def test_small_steps_end_at_the_same_picture_as_one_large(renderer: Renderer) ->
     assert renderer.report.samples == samples[-1], "nothing is drawn once it has converged"
 
 
+def test_how_much_is_refined_at_once_goes_by_the_picture_on_show_not_by_the_one_before(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    renderer._refining_s = 1e-15  # as after a picture that took next to nothing
+    renderer.render_in_time(WIDE, SIZE, 1e-6)
+    renderer.refine(1e-6)
+    assert renderer.report.samples == 1
+
+
 def test_more_time_takes_more_samples(renderer: Renderer) -> None:
     SCENE.fill(renderer, GRID)
     drawn = []

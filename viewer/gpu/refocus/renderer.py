@@ -174,6 +174,7 @@ class Renderer:
         if len(self.programs) == programs_before and passes <= 1:
             self._frame_time.learn(self._work(optics, size_px, part, level), seconds)
         drawn = self._current().done
+        self._refining_s = seconds / max(drawn, 1) / math.prod(self._current().size_px)
         if level != BEST_QUALITY:
             self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
         self._learn(drawn, seconds)
