@@ -25,6 +25,7 @@ from viewer.app.input import (
     read_pointer,
 )
 from viewer.app.preferences_store import PREFERENCES_FILE, load_preferences, store_preferences
+from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
@@ -32,10 +33,6 @@ from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
 from viewer.background.comparison_worker import ComparisonWorker
 from viewer.background.gloss import GlossFound, GlossRequest, GlossWorker
-from viewer.background.jobs import Failed, ProgressReport
-from viewer.background.read_ahead import PhotoAhead, PhotosAhead, photos_within_budget
-from viewer.background.scene_worker import PhotosFound, SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
-from viewer.display.depth_preview import DepthPreview
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
@@ -45,13 +42,10 @@ from viewer.model.actions import (
     DismissNotice,
     DoTask,
     Notify,
-    OpenFailed,
     OpenPath,
     PictureDrawn,
     PlaceWindow,
-    ProgressMade,
     Quit,
-    SceneOpened,
     Tick,
     WorkerLost,
 )
@@ -63,12 +57,8 @@ from viewer.model.inspection_request import (
     make_inspection_request,
 )
 from viewer.model.layout import Layout, layout_of
-from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
-from viewer.model.reducers.folder import photos_ahead
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask, Source, source_beside
-from viewer.model.state.depth_editing import DepthSettings, DropStroke
-from viewer.model.state.folder import ShowFilmstrip
+from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask
 from viewer.model.state.inspection import Probed
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
@@ -140,21 +130,16 @@ class App:
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self.free_look = FreeLook(self._gl, self.scene_view, wake)
-        self._depth = DepthPreview(self.scene_view)
         self._gloss = GlossWorker(wake)
         self._gloss_asked: GlossRequest | None = None
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, wake)
-        self._ahead = PhotosAhead(wake)
-        self._worker = SceneWorker(wake)
+        self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, wake)
         self._side_effects = SideEffects(self.scene_view, wake, self.window.clipboard_text)
         self._sessions = SessionStore(kept_in, wake)
         self._kept_in = kept_in
         self._kept_recent = self.state.recent
-        self._submitted = self._sketched = 0
-        self._depth_settings = DepthSettings()
-        self._stopped: int | None = None
         self._stepped_at = 0.0
         self._noticed: Notice | None = None
         self._noticed_at = 0.0
@@ -175,10 +160,10 @@ class App:
         """One turn of the loop; sleeps first where nothing was going on in the last ones."""
         self.window.poll(self.wait_s)
         start = time.perf_counter()
-        news = self._drain() + self._take_dropped() + self._take_events()
+        news = self.scene_loader.take_results(self.state) + self._take_dropped() + self._take_events()
         self.do(*news)
         self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
-        self._preview_depth()
+        self.do(*self.scene_loader.preview_depth(self.state))
         self._show_gloss()
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
@@ -213,8 +198,7 @@ class App:
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_look.advance(picture, self.state))
         self._is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
-        self._direct_worker()
-        self._read_ahead()
+        self.scene_loader.advance(self.state)
         self._keep_recent()
         self._took_s.append(time.perf_counter() - start)
 
@@ -262,8 +246,7 @@ class App:
     def close(self) -> None:
         """Stop the worker, keep what is kept, and free everything. A file that is being written is finished first."""
         self.window.hide()
-        self._worker.close()
-        self._ahead.close()
+        self.scene_loader.close()
         self._comparisons.close()
         self._gloss.close()
         self._keep()
@@ -285,7 +268,7 @@ class App:
             self._same_frames = 0
         for action in actions:
             self.state = reduce(self.state, action)
-        self._worker.eye = self.state.optics.eye
+        self.scene_loader.look_from(self.state.optics.eye)
 
     def _take_events(self) -> list[Action]:
         """What neither user nor worker says: the clock, side effects done, the window moved, the worker lost."""
@@ -298,7 +281,7 @@ class App:
         if self.state.motion.is_running:
             actions.append(Tick(self._stepped_at))
         actions += self._place_window()
-        if self._worker.is_lost and self.state.stopped != self.state.generation == self._submitted:
+        if self.scene_loader.has_lost(self.state):
             actions.append(WorkerLost())
         return actions
 
@@ -326,37 +309,6 @@ class App:
             return []
         return [] if place == preferences.window and not preferences.is_maximized else [PlaceWindow(place)]
 
-    def _drain(self) -> list[Action]:
-        """The worker's results, as actions; the one place where they arrive."""
-        actions: list[Action] = []
-        while self.scene_view.has_room and (result := self._worker.next_result()) is not None:
-            actions += self._take(result)
-        return actions
-
-    def _take(self, result: SceneResult) -> list[Action]:
-        match result:
-            case ProgressReport():
-                return [ProgressMade(result.id, result.progress)]
-            case Failed():
-                return [OpenFailed(result.id, result.message)]
-            case PhotosFound():
-                return [OpenPath(source_beside(self.state.source, result.path)), ShowFilmstrip(True)]
-        try:
-            return self._take_views(result)
-        except InputError as error:  # no room on the graphics card: there is no use in more views
-            self._worker.cancel()
-            return [OpenFailed(result.generation, str(error))]
-
-    def _take_views(self, result: SceneReady | ViewReady) -> list[Action]:
-        if isinstance(result, SceneReady):
-            self.scene_view.open(result)
-            self.inspection_view.open()
-            self.window.set_title(f"{result.scene.name} - iibr")
-            return [SceneOpened(result.generation, result.scene)]
-        self.scene_view.add(result.view)
-        self.inspection_view.add(result.view)
-        return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column))]
-
     def _take_dropped(self) -> list[Action]:
         paths = self.window.take_dropped()
         is_inspecting = "inspect" in self.state.preferences.open_sections
@@ -380,64 +332,6 @@ class App:
         request = make_inspection_request(self.state, is_moving, before)
         if request != before:
             self._comparisons.want(request, self.inspection_view.inputs(request, self.state))
-
-    def _direct_worker(self) -> None:
-        """A new generation is a new job, a stopped one is cancelled. The photo is read again only if one was opened."""
-        if self.state.stopped == self.state.generation != self._stopped:
-            self._worker.cancel()
-            self._stopped = self.state.stopped
-        if self.scene_view.generation == self.state.generation < self._submitted:
-            self._worker.cancel()  # another file was being read, and will not be opened: what is here is whole
-            self._submitted, self._depth_settings = self.state.generation, depth_settings_for_worker(self.state)
-        if self.state.generation == self._submitted or self.state.source is None:
-            return
-        scene = self.state.scene
-        loaded = self.scene_view.loaded if scene and scene.source is self.state.source else None
-        if self.state.stroke is not None:
-            return  # it will be another one
-        source, strength = self.state.source, self.state.depth_strength
-        if loaded is None and self._ahead.is_reading(source):
-            self._sketch(source)
-            return  # it is nearly there
-        ahead = self._ahead.take(source, strength) if loaded is None else None
-        if loaded is None:
-            self._keep_left()
-        self._submitted, self._depth_settings = self.state.generation, depth_settings_for_worker(self.state)
-        loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (loaded, None)
-        self._worker.submit(
-            SceneRequest(self.state.generation, source, strength, loaded, self._depth_settings, plan=plan)
-        )
-
-    def _sketch(self, source: Source) -> None:
-        """Have the photo shown in small while it is being read anyway."""
-        if self._sketched != self.state.generation:
-            self._sketched = self.state.generation
-            self._worker.submit(SceneRequest(self._sketched, source, self.state.depth_strength, is_sketch=True))
-
-    def _keep_left(self) -> None:
-        """The photo that is left may be gone back to."""
-        scene, loaded = self.state.scene, self.scene_view.loaded
-        if scene is None or scene.plan is None or loaded is None:
-            return
-        if loaded.depth_settings == DepthSettings(scene.source.depth.refine):
-            self._ahead.keep(PhotoAhead(scene.source, self.state.depth_strength, loaded, scene.plan))
-
-    def _read_ahead(self) -> None:
-        """What is likely to be opened next, once there is something to look at."""
-        scene = self.state.scene
-        if scene is not None and scene.source is self.state.source and not scene.is_sketch:
-            wanted = photos_ahead(self.state)[: photos_within_budget(scene)]
-            self._ahead.want(wanted, self.state.depth_strength)
-
-    def _preview_depth(self) -> None:
-        """While depth is edited, show it; the views of what it was before need not be made."""
-        if not is_depth_ahead(self.state, self._depth_settings):
-            return
-        self._worker.cancel()
-        try:
-            self._depth.update(self.state)
-        except InputError as error:
-            self.do(Notify(Notice(str(error), is_error=True)), DropStroke())
 
     def _show_gloss(self) -> None:
         """What it means for the scene is found out beside the window; until then it looks as before."""

@@ -41,7 +41,7 @@ def test_a_folder_opens_at_its_first_photo_with_all_of_them_in_small(viewer: Dri
 
 
 def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Driver, tmp_path: Path) -> None:
-    viewer.until(lambda app: any(source.path.endswith("photo1.png") for source in app._ahead.ready))
+    viewer.until(lambda app: any(source.path.endswith("photo1.png") for source in app.scene_loader.ahead.ready))
     (tmp_path / "photo1.png").write_bytes(b"no photo any more")  # so that what is shown now was read before
     viewer.send("key", "Page_Down")
     shows(viewer, "photo1")
