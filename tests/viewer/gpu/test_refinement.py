@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
+from types import SimpleNamespace
 
 import moderngl
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.context import GLContext
+from viewer.gpu.refocus import accumulation
 from viewer.gpu.refocus.accumulation import EDGE_PASSES, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import QualityLevel
@@ -66,6 +68,26 @@ def test_how_much_is_refined_at_once_goes_by_the_picture_on_show_not_by_the_one_
     SCENE.fill(renderer, GRID)
     renderer._refining_s = 1e-15  # as after a picture that took next to nothing
     renderer.render_in_time(WIDE, SIZE, 1e-6)
+    renderer.refine(1e-6)
+    assert renderer.report.samples == 1
+
+
+def test_refining_waits_for_a_driver_that_queues_its_work(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time passes only while the driver is waited for: without that, all passes would be queued within any budget."""
+    SCENE.fill(renderer, GRID)
+    renderer.render_in_time(WIDE, SIZE, 1e-6)
+    now = [0]
+
+    class Queueing:
+        def __getattr__(self, name: str) -> object:
+            return getattr(renderer.ctx, name)
+
+        def finish(self) -> None:
+            renderer.ctx.finish()
+            now[0] += 1
+
+    monkeypatch.setattr(renderer._accumulator, "_ctx", Queueing())
+    monkeypatch.setattr(accumulation, "time", SimpleNamespace(perf_counter=lambda: now[0]))
     renderer.refine(1e-6)
     assert renderer.report.samples == 1
 

@@ -134,6 +134,8 @@ class Accumulator:
         at_once = int(min(max(budget_s / max(seconds_per_sample, 1e-9), 1), MAX_SAMPLES))
         while accumulation.pass_index < passes:
             self._draw_some(field, accumulation, targets, at_once)
+            if budget_s < math.inf:
+                self._ctx.finish()  # a driver that queues its work tells no time before that
             if time.perf_counter() >= end:
                 break
         self._ctx.disable(moderngl.BLEND)
