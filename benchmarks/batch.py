@@ -26,7 +26,7 @@ from viewer.app.batch.archive import photos_in
 from viewer.app.batch.cluster import local_workers, outcomes_of, warm_workers
 from viewer.app.batch.task import BatchSettings, PhotoTask, key_of, target_name
 from viewer.app.batch.work import export_photo, warm_up
-from viewer.model.state.app_state import Source
+from viewer.model.state.scene import Source
 
 
 def write_photos(folder: Path, count: int, megapixels: float) -> None:

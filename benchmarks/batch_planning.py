@@ -21,7 +21,7 @@ from viewer.app.batch.archive import ArchivePhoto, photos_in
 from viewer.app.batch.ledger import MANIFEST, Ledger
 from viewer.app.batch.run import run_batch
 from viewer.app.batch.task import BatchSettings, key_of, target_name
-from viewer.model.state.app_state import Source
+from viewer.model.state.scene import Source
 
 FOLDER_SIZE = 1000
 SETTINGS = BatchSettings("depth", Source(""))

@@ -20,8 +20,8 @@ from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import OpenPath
-from viewer.model.state.app_state import Source
 from viewer.model.state.optics import SetAperture
+from viewer.model.state.scene import Source
 
 MOVES = 150
 STEP_PX = 2

@@ -22,8 +22,8 @@ from PIL import Image
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import OpenPath
-from viewer.model.state.app_state import Source
 from viewer.model.state.folder import ShowFilmstrip, StepPhoto
+from viewer.model.state.scene import Source
 
 DIFFERENT = 8
 """Photos that are encoded; the others are links to them."""

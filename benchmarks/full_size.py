@@ -87,7 +87,7 @@ def measured(command: list[str]) -> tuple[float, float, float]:
 def first_picture(photo: Path) -> tuple[int, int]:
     """Open a photo as the window does, up to its first picture."""
     from viewer.app.headless import HeadlessViewer
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
     with HeadlessViewer() as viewer:
         viewer.open_scene(Source(str(photo)), 1.0, lambda progress: None)

@@ -188,8 +188,9 @@ def cfgs() -> list[Seed]:
 
 def saved_settings() -> list[Seed]:
     from viewer.model.saved_settings import settings_text
-    from viewer.model.state.app_state import SavedSettings, Source
     from viewer.model.state.optics import ApertureMask, ApertureShape, Optics
+    from viewer.model.state.saving import SavedSettings
+    from viewer.model.state.scene import Source
 
     mask = ApertureShape("mask", mask=ApertureMask("m", 2, 2, b"\x01\xff\x00\x10"))
     text = settings_text(SavedSettings(Optics(aperture_shape=mask), 1.0, Source(""), (64, 48))).encode()

@@ -107,7 +107,7 @@ def photos_in_turn(policy: str) -> None:
     from viewer.background.scene_worker import SceneRequest, SceneWorker
     from viewer.display.scene_view import SceneView
     from viewer.gpu.headless_context import create_headless
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
     _apply(policy)
     process, after = psutil.Process(), {}

@@ -26,7 +26,7 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.types import FloatImage, GridShape, ViewOffset
 from viewer.app.headless import HeadlessViewer
-from viewer.model.state.app_state import Source
+from viewer.model.state.scene import Source
 
 BORDER_PX = 15
 BAD_PX = 0.07

@@ -27,10 +27,11 @@ from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import Action, DismissNotices, DoTask, EndGesture, OpenPath, Undo
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import SaveTask, Source
 from viewer.model.state.depth_editing import Paint
 from viewer.model.state.folder import ShowFilmstrip, StepPhoto
 from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture
+from viewer.model.state.scene import Source
+from viewer.model.state.tasks import SaveTask
 
 PHOTOS, SIZE = 6, (360, 540)
 GRID = GridShape(5, 5)

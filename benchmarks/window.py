@@ -17,7 +17,7 @@ from viewer.app.main_loop import App, initial_state
 from viewer.background import scene_worker
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.actions import OpenPath
-from viewer.model.state.app_state import Source
+from viewer.model.state.scene import Source
 
 IDLE_S = 5.0
 

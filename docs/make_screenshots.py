@@ -17,9 +17,11 @@ from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import DismissNotices, SetHover
-from viewer.model.state.app_state import Hover, Section, Source
+from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetOverlay, ShowEpis, ShowValues
 from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetApertureShape, SetFocus
+from viewer.model.state.preferences import Section
+from viewer.model.state.scene import Source
 
 SIZE = 1200, 760
 MOST_BYTES = 700_000

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 if TYPE_CHECKING:
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
 PART = (slice(150, 310), slice(200, 400))
 """Of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
@@ -80,7 +80,7 @@ def _photos(scratch: Path) -> Iterator[Source]:
     from iibr_core.formats.maps.writer import write_map
     from iibr_core.types import Quality
     from viewer.cli.demo import demo_photo
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
     demo = open_with_depth(demo_photo(), DepthChoice(refine=0.0))
     # A pixel beside the photo, and with a hole: rims of measured maps are moved to it.

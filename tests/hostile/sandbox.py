@@ -18,8 +18,9 @@ from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import SRGB, GridShape, ViewUpdate
 from viewer.app.image_export import SavedShot, export_picture
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import SavedSettings, Source
 from viewer.model.state.optics import Optics
+from viewer.model.state.saving import SavedSettings
+from viewer.model.state.scene import Source
 
 HEIGHT, WIDTH = 24, 32
 

@@ -20,7 +20,7 @@ from tests.xvfb import private_display
 if TYPE_CHECKING:
     from viewer.app.headless import HeadlessViewer
     from viewer.app.main_loop import App
-    from viewer.model.state.app_state import Section
+    from viewer.model.state.preferences import Section
 
 WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
@@ -52,7 +52,7 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Headl
     """A scene opened without a window, its notices gone; open_sections: of the panel, the usual ones if none."""
     from viewer.app.headless import HeadlessViewer
     from viewer.model.actions import DismissNotice
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
     try:
         viewer = HeadlessViewer("egl")
@@ -192,7 +192,9 @@ def open_window(display: str, no_egl_context: None) -> Iterator[Callable[..., Dr
     """Opens the viewer on a photo; closes it after the test."""
     from viewer.app.main_loop import App, initial_state
     from viewer.model.actions import OpenPath
-    from viewer.model.state.app_state import AppState, Preferences, Source
+    from viewer.model.state.app_state import AppState
+    from viewer.model.state.preferences import Preferences
+    from viewer.model.state.scene import Source
 
     apps = []
 

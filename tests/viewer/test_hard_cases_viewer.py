@@ -31,8 +31,9 @@ from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.background.jobs import Failed
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.model.saved_settings import read_settings, settings_text_in
-from viewer.model.state.app_state import AppState, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import CENTRE, MoveEye, SetAperture
+from viewer.model.state.scene import Source
 
 GRID = GridShape(3, 3)
 

@@ -7,7 +7,7 @@ import shutil
 import sys
 from typing import Any
 
-from viewer.model.state.app_state import ChoiceOf, SavePrompt
+from viewer.model.state.prompts import ChoiceOf, SavePrompt
 
 UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first it finds."""

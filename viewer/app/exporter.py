@@ -33,8 +33,9 @@ from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.model.actions import Action, Notify, ShowPrompt
 from viewer.model.export_kinds import export_kind
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import Exporting, ExportingChanged, ExportPrompt, ExportTask
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import Optics
 
 LOOK_S = 0.05

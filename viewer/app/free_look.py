@@ -23,7 +23,8 @@ from viewer.gpu.inspection_passes import InspectionPasses
 from viewer.model.actions import Action, Notify
 from viewer.model.free_camera import FORWARD_LIMITS, MOST_ASIDE, FreeCamera, Poses
 from viewer.model.layout import Rect, ScreenSize
-from viewer.model.state.app_state import AppState, Notice, Picture
+from viewer.model.state.app_state import AppState, Picture
+from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:
     from iibr_core.generation.free_views import FreeViews

@@ -28,8 +28,8 @@ from iibr_core.types import (
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.layout import WHOLE, Rect, ScreenSize
-from viewer.model.state.app_state import Progress, Scene
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Progress, Scene
 
 if TYPE_CHECKING:
     # What draws is imported by the thread that draws: the window comes first.

@@ -33,10 +33,11 @@ from viewer.model.inspection_request import (
 )
 from viewer.model.layout import BACKGROUND, Layout, Rect, ScreenSize, layout_of, letterbox
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Progress, Scene, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import Probed
 from viewer.model.state.optics import CENTRE, Optics
+from viewer.model.state.scene import Progress, Scene, Source
 
 LAYOUT_FRAMES = 3
 """ImGui knows the size of a text only after it was built once."""

@@ -14,7 +14,8 @@ from iibr_core.types import SRGB, ColorSpace, FloatImage
 from viewer.app.save_places import require_size
 from viewer.display.scene_view import SceneView
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import AppState, SavedSettings
+from viewer.model.state.app_state import AppState
+from viewer.model.state.saving import SavedSettings
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,18 +24,12 @@ from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, Rect, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.lens.limits import focus_limits
-from viewer.model.state.app_state import AppState, Hover, ReadTruthTask, Scene, Source, source_beside, source_with_map
+from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import DepthSample, DropStroke, Paint, PickDepth, SetBrush
 from viewer.model.state.inspection import MoveDivider, ShowGrid
-from viewer.model.state.optics import (
-    CENTRE,
-    FocusOn,
-    MoveEye,
-    MoveTiltHandle,
-    PaintGloss,
-    SetFocus,
-    SetGlossBrush,
-)
+from viewer.model.state.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
+from viewer.model.state.scene import Scene, Source, source_beside, source_with_map
+from viewer.model.state.tasks import ReadTruthTask
 from viewer.model.zoom import SetZoom
 
 DRAG_THRESHOLD = 4.0

@@ -58,8 +58,10 @@ from viewer.model.inspection_request import (
 )
 from viewer.model.layout import Layout, layout_of
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Notice, Picture, ReadTruthTask
+from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.inspection import Probed
+from viewer.model.state.notices import Notice
+from viewer.model.state.tasks import ReadTruthTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.screen import build_screen

@@ -28,8 +28,12 @@ from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.picture_drawing import PictureDrawing, Pixels
 from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import AppState, Notice, Progress, SavePrompt, SaveTask
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
+from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.saving import Saving, SavingChanged
+from viewer.model.state.scene import Progress
+from viewer.model.state.tasks import SaveTask
 
 SHARE_OF_SMALLER = 0.2
 """Of the work on a picture at the photo's own size: the picture at the views' size."""

@@ -17,8 +17,10 @@ from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
 from viewer.model.reducers.worker_events import RECENT_KEPT
-from viewer.model.state.app_state import SECTIONS, AppState, Notice, Preferences, Section, Theme, Units
+from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import FolderOrder
+from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import SECTIONS, Preferences, Section, Theme, Units
 
 PREFERENCES_FILE = "preferences.json"
 RECENT_FILE = "recent.json"

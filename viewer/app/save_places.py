@@ -12,7 +12,9 @@ from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, requ
 from iibr_core.formats.outputs import require_file_place
 from iibr_core.types import ImageSize, InputError
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import AppState, SaveTask, Source
+from viewer.model.state.app_state import AppState
+from viewer.model.state.scene import Source
+from viewer.model.state.tasks import SaveTask
 
 MAX_PIXELS = 100_000_000
 """Of a picture: as float light it then takes 1.2 GB."""

@@ -14,9 +14,11 @@ from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify, OpenFailed, OpenPath, ProgressMade, SceneOpened
 from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.folder import photos_ahead
-from viewer.model.state.app_state import AppState, Notice, Source, source_beside
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DepthSettings, DropStroke
 from viewer.model.state.folder import ShowFilmstrip
+from viewer.model.state.notices import Notice
+from viewer.model.state.scene import Source, source_beside
 
 
 class SceneLoader:

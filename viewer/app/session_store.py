@@ -21,7 +21,10 @@ from viewer.app.image_export import settings_of
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed
 from viewer.model.actions import Action, Notify, RestoreSession, SessionsKept, TellSessions
-from viewer.model.state.app_state import AppState, Notice, SavedSettings, Scene, Source
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
+from viewer.model.state.saving import SavedSettings
+from viewer.model.state.scene import Scene, Source
 
 FOLDER = "sessions"
 SIDECAR_ENDING = ".iibr"

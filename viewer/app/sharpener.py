@@ -24,7 +24,8 @@ from viewer.gpu.inspection_passes import InspectionPasses
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.model.actions import Action, Notify
 from viewer.model.layout import WHOLE, ScreenSize
-from viewer.model.state.app_state import AppState, Notice, Picture
+from viewer.model.state.app_state import AppState, Picture
+from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:
     from iibr_core.rendering.large_views import LargePhoto

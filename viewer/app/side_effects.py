@@ -27,18 +27,7 @@ from viewer.background.photo_folder import list_photos
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, OpenPath, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
-from viewer.model.state.app_state import (
-    AppState,
-    ChoosePlaceTask,
-    ChooseTask,
-    Notice,
-    ReadMaskTask,
-    ReadTruthTask,
-    SavePrompt,
-    SaveTask,
-    Task,
-    source_beside,
-)
+from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import CancelExportTask, ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
@@ -50,9 +39,13 @@ from viewer.model.state.model_download import (
     ListModelsTask,
     ModelsPrompt,
 )
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import ApertureMask, SetApertureShape
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
+from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, WriteSidecarTask
+from viewer.model.state.scene import source_beside
+from viewer.model.state.tasks import ChoosePlaceTask, ChooseTask, ReadMaskTask, ReadTruthTask, SaveTask, Task
 
 
 class SideEffects:

@@ -14,7 +14,7 @@ from iibr_core.rendering.gloss.settings import Gloss, of_maps
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import Disparity, FloatImage, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread
-from viewer.model.state.app_state import Scene
+from viewer.model.state.scene import Scene
 
 if TYPE_CHECKING:
     from iibr_core.rendering.gloss.geometry import SceneGeometry

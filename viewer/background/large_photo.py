@@ -14,7 +14,7 @@ from iibr_core.rendering.ray_set import RaySet
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import Disparity, FloatImage, InputError, Photo
 from viewer.background.loaded_photo import LoadedPhoto, stamp_of
-from viewer.model.state.app_state import Source
+from viewer.model.state.scene import Source
 
 
 def load_large(

@@ -17,7 +17,7 @@ from iibr_core.generation.memory_model import Budget, budget_of, require_field, 
 from iibr_core.runtime.machine import memory_bytes
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewUpdate, image_size
-from viewer.model.state.app_state import Progress, Scene, Source
+from viewer.model.state.scene import Progress, Scene, Source
 
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.scene import MultiView

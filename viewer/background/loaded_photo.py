@@ -31,8 +31,8 @@ from iibr_core.inpainting.protocol import InpaintingAids
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress
-from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.depth_editing import DepthSettings
+from viewer.model.state.scene import Progress, Source
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas

@@ -11,7 +11,7 @@ from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto, load_photo, make_plan
-from viewer.model.state.app_state import Scene, Source
+from viewer.model.state.scene import Scene, Source
 
 
 @dataclass(frozen=True, eq=False)

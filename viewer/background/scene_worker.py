@@ -32,9 +32,9 @@ from viewer.background.loaded_photo import (
 )
 from viewer.background.photo_folder import first_photo
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Progress, Scene, Source
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.optics import CENTRE
+from viewer.model.state.scene import Progress, Scene, Source
 
 
 @dataclass(frozen=True, eq=False)

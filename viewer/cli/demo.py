@@ -11,7 +11,7 @@ from viewer.cli.options import SCREEN_SIZE, inputs_with_sidecar
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
 DEMO_FOLDER = Path("out")
 
@@ -31,7 +31,7 @@ def demo() -> None:
     from viewer.app.main_loop import App, initial_state
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
     source = Source(str(demo_photo()))
     try:

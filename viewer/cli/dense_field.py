@@ -13,7 +13,7 @@ from viewer.cli.terminal import print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
 NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
 """Options that say nothing about views between those of a light field."""

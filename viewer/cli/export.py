@@ -32,7 +32,7 @@ from viewer.model.export_kinds import require_ending
 
 if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
-    from viewer.model.state.app_state import Scene, Source
+    from viewer.model.state.scene import Scene, Source
 
 
 @with_option_records

@@ -19,7 +19,7 @@ from viewer.model.free_camera import Poses
 
 if TYPE_CHECKING:
     from viewer.background.loaded_photo import LoadedPhoto
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
 OWN_FILES = r"view_\d{4,5}\.(png|exr)"
 NOT_WITH_POSES = {"format": "--format", "depth_strength": "--depth-strength", "with_disparity": "--with-disparity",

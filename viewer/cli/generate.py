@@ -32,7 +32,7 @@ from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
 
 @with_option_records

@@ -14,8 +14,8 @@ from viewer.cli.options import not_negative_from_text, number_option, view_from_
 
 if TYPE_CHECKING:
     from viewer.model.actions import Action
-    from viewer.model.state.app_state import Scene
     from viewer.model.state.optics import Optics
+    from viewer.model.state.scene import Scene
 
 View = Annotated[
     ViewOffset | None,

@@ -17,7 +17,7 @@ from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffse
 from viewer.model.layout import ScreenSize
 
 if TYPE_CHECKING:
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
 MAX_GRID = 99
 MOST = 2**62

@@ -37,7 +37,7 @@ from viewer.model.layout import ScreenSize
 if TYPE_CHECKING:
     from iibr_core.depth.choice import DepthOrigin
     from viewer.model.actions import Action
-    from viewer.model.state.app_state import Source
+    from viewer.model.state.scene import Source
 
 
 class Backend(StrEnum):

@@ -13,7 +13,8 @@ from iibr_core.depth.editing.edits import DepthEdits
 from viewer.background.loaded_photo import LoadedPhoto, still_disparity
 from viewer.display.scene_view import SceneView
 from viewer.model.reducers.depth_editing import current_depth_settings
-from viewer.model.state.app_state import AppState, Scene
+from viewer.model.state.app_state import AppState
+from viewer.model.state.scene import Scene
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas

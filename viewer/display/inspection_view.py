@@ -37,8 +37,10 @@ from viewer.model.inspection_request import (
     view_near,
 )
 from viewer.model.layout import WHOLE, Layout, Rect, ScreenSize
-from viewer.model.state.app_state import AppState, Hover, Notice, Scene
+from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
+from viewer.model.state.notices import Notice
+from viewer.model.state.scene import Scene
 
 INPAINTED_RGB = (255, 184, 60)
 

@@ -10,8 +10,8 @@ from iibr_core.rendering.lens_light import LargeLens, LensSample
 from iibr_core.types import ViewOffset
 from viewer.gpu.refocus.aperture_moments import openness
 from viewer.gpu.refocus.lens import HIGHLIGHT_GAIN
-from viewer.model.state.app_state import Scene
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene
 
 SHARP_UP_TO_PX = (1.0, 2.0)
 """Pixels of the light field: what is blurred wider holds nothing that its own picture does not show."""

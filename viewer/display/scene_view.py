@@ -24,8 +24,9 @@ from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.layout import WHOLE, Rect, ScreenSize
-from viewer.model.state.app_state import AppState, DrawReport, Picture, Scene
+from viewer.model.state.app_state import AppState, DrawReport, Picture
 from viewer.model.state.optics import CENTRE, Optics
+from viewer.model.state.scene import Scene
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""

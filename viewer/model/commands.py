@@ -33,19 +33,7 @@ from viewer.model.actions import (
 )
 from viewer.model.free_camera import MoveCamera, StepPose
 from viewer.model.lens.presets import PRESETS
-from viewer.model.state.app_state import (
-    LOOPS,
-    AppState,
-    ChoiceOf,
-    ChooseTask,
-    LoopKind,
-    PalettePrompt,
-    ReadMaskTask,
-    ReadTruthTask,
-    source_beside,
-    source_with_depth,
-    source_with_map,
-)
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
 from viewer.model.state.exporting import AskToExport
 from viewer.model.state.folder import SetFolderOrder, ShowFilmstrip, StepPhoto
@@ -62,8 +50,12 @@ from viewer.model.state.inspection import (
     ShowValues,
 )
 from viewer.model.state.model_download import ListModelsTask
+from viewer.model.state.motion import LOOPS, LoopKind
 from viewer.model.state.optics import ApplyPreset, ResetOptics
+from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
+from viewer.model.state.scene import source_beside, source_with_depth, source_with_map
+from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask
 from viewer.model.zoom import SetZoom, Zoom
 
 FONT_STEP = 1.1

@@ -9,9 +9,9 @@ from iibr_core.formats.animations import even_size
 from iibr_core.types import ImageSize
 from viewer.model.export_kinds import ExportKind
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import ANIMATIONS, AnimationKind, ExportOptions
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene
 
 USUAL_SECONDS = 4.0
 """Of an animation."""

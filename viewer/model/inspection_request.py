@@ -7,8 +7,9 @@ from typing import Literal
 
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.layout import Beside, Rect
-from viewer.model.state.app_state import AppState, Scene
+from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Comparison, GroundTruth, ViewIndex
+from viewer.model.state.scene import Scene
 
 SHEET_GAP = 3.0
 DIFFERENCE_GAIN = 4

@@ -19,8 +19,9 @@ from iibr_core.rendering.gloss.settings import require_sound as require_sound_gl
 from iibr_core.types import GridShape, InputError, Quality
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import BLADES_LIMITS
-from viewer.model.state.app_state import SavedSettings, Source
 from viewer.model.state.optics import ApertureShape, Optics
+from viewer.model.state.saving import SavedSettings
+from viewer.model.state.scene import Source
 
 ATTRIBUTE = "iibr:settings"
 FORMAT = 1

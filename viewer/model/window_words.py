@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from iibr_core.depth.choice import BETTER_WAYS
-from viewer.model.state.app_state import Notice
+from viewer.model.state.notices import Notice
 
 DEPTH_COMMANDS = ("Open a depth map…", "Get a depth model…", "Open a depth model…")
 """What helps where depth is guessed or missing, by the names of commands."""

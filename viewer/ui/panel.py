@@ -13,8 +13,10 @@ from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import aperture_limit
 from viewer.model.lens.presets import PRESETS
-from viewer.model.state.app_state import SECTIONS, AppState, DrawReport, Progress, Scene, Section, Source, source_beside
+from viewer.model.state.app_state import AppState, DrawReport
 from viewer.model.state.optics import ApplyPreset
+from viewer.model.state.preferences import SECTIONS, Section
+from viewer.model.state.scene import Progress, Scene, Source, source_beside
 from viewer.ui.sections.depth import depth_line, depth_section
 from viewer.ui.sections.gloss import gloss_section
 from viewer.ui.sections.inspect import inspect_section

@@ -9,7 +9,7 @@ import imgui_bundle
 from imgui_bundle import imgui
 
 from viewer.model.layout import BACKGROUND
-from viewer.model.state.app_state import Theme
+from viewer.model.state.preferences import Theme
 
 FONT_SIZE = 16.0
 Color = tuple[float, float, float, float]

@@ -25,10 +25,11 @@ from viewer.model.actions import (
     ShowPrompt,
     ToggleSection,
 )
-from viewer.model.state.app_state import Notice, PalettePrompt, PathPrompt, SavePrompt
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetOpacity, SetOverlay, ShowEpis
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 Opener = Callable[..., Driver]
 GRID = GridShape(3, 3)

@@ -9,7 +9,7 @@ from imgui_bundle import portable_file_dialogs
 
 from viewer.app.dialogs import Dialog, SaveDialog
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import SavePrompt
+from viewer.model.state.prompts import SavePrompt
 
 
 @pytest.mark.parametrize(("what", "kind"), [("photo", "open_file"), ("folder", "select_folder")])

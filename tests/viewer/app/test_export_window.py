@@ -16,9 +16,9 @@ from viewer.app.image_export import render_pixels
 from viewer.app.main_loop import App
 from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, ShowPrompt
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Source
 from viewer.model.state.exporting import CancelExportTask, ExportOptions, ExportPrompt, ExportTask
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.scene import Source
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)
 LARGE = ExportOptions(size=ScreenSize(600, 400), frames=200)

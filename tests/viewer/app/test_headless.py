@@ -15,8 +15,8 @@ from viewer.app.contact_sheet import GAP, TILE_WIDTH, contact_sheet
 from viewer.app.headless import HeadlessViewer
 from viewer.app.side_effects import read_truth
 from viewer.model.layout import layout_of
-from viewer.model.state.app_state import Source
 from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture
+from viewer.model.state.scene import Source
 
 
 @pytest.fixture

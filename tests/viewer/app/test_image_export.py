@@ -19,9 +19,11 @@ from viewer.app.image_export import export_picture, render_pixels, shot_of
 from viewer.app.picture_saver import PictureSaver
 from viewer.model.actions import EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.app_state import Notice, SaveTask, Source
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 from viewer.model.state.saving import Saving, SavingChanged
+from viewer.model.state.scene import Source
+from viewer.model.state.tasks import SaveTask
 
 
 @pytest.fixture(scope="module")

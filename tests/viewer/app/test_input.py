@@ -25,8 +25,10 @@ from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
 from viewer.model.layout import Rect as R
 from viewer.model.lens.focal_plane import handle_points
-from viewer.model.state.app_state import AppState, History, Hover, Scene, Source, TiltHandles
+from viewer.model.state.app_state import AppState, Hover, TiltHandles
+from viewer.model.state.history import History
 from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, Optics, ResetOptics, SetFocus
+from viewer.model.state.scene import Scene, Source
 from viewer.model.zoom import SetZoom, Zoom
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")

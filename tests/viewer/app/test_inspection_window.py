@@ -21,9 +21,11 @@ from viewer.app.main_loop import App, initial_state
 from viewer.background.loaded_photo import load_photo
 from viewer.model.actions import OpenPath, SetLoop, ToggleSection
 from viewer.model.inspection_request import sheet_cells
-from viewer.model.state.app_state import AppState, ReadTruthTask, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Compare, SetOverlay, ShowEpis
 from viewer.model.state.optics import MoveEye, Optics
+from viewer.model.state.scene import Source
+from viewer.model.state.tasks import ReadTruthTask
 
 GRID = GridShape(5, 5)
 

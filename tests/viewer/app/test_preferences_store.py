@@ -12,7 +12,8 @@ from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, load_pre
 from viewer.model.actions import PlaceWindow, SetFontScale, SetTheme, ToggleSection
 from viewer.model.lens.limits import FONT_SCALE_LIMITS
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Preferences
+from viewer.model.state.app_state import AppState
+from viewer.model.state.preferences import Preferences
 
 
 def test_what_is_kept_comes_back(tmp_path: Path) -> None:

@@ -13,8 +13,10 @@ from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import write_scene
 from viewer.app.save_places import inputs_of, inputs_of_scene, map_path, picture_path, require_size
-from viewer.model.state.app_state import AppState, SaveTask, Scene, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import GroundTruth, Inspection
+from viewer.model.state.scene import Scene, Source
+from viewer.model.state.tasks import SaveTask
 
 
 @pytest.mark.parametrize("path_for", [picture_path, map_path])

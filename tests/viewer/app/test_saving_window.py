@@ -21,9 +21,11 @@ from viewer.app.full_picture import FullPicture
 from viewer.app.image_export import render_pixels
 from viewer.model.actions import Action, AskToSave, DismissNotice, DoTask, OpenPath, SetDepthStrength
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.app_state import ReadMaskTask, Saved, SavePrompt, SaveTask, Source
 from viewer.model.state.optics import MoveEye, SetAperture
+from viewer.model.state.prompts import Saved, SavePrompt
 from viewer.model.state.saving import CancelSaveTask
+from viewer.model.state.scene import Source
+from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
 SIZE = 300, 200
 LARGE = 1500, 1000

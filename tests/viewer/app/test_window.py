@@ -19,8 +19,8 @@ from viewer.app.main_loop import App
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model.actions import SetDepthStrength
-from viewer.model.state.app_state import Source
 from viewer.model.state.optics import MoveEye, Optics
+from viewer.model.state.scene import Source
 
 Opener = Callable[..., Driver]
 

@@ -16,8 +16,11 @@ from tests.viewer.conftest import Driver, write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
 from viewer.model.saved_settings import ATTRIBUTE, read_settings
-from viewer.model.state.app_state import AppState, PalettePrompt, ReadMaskTask, SavePrompt, SaveTask, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye, Optics, SetAperture
+from viewer.model.state.prompts import PalettePrompt, SavePrompt
+from viewer.model.state.scene import Source
+from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
 Opener = Callable[..., Driver]
 
@@ -259,7 +262,7 @@ def test_a_lost_worker_is_told_and_replaced(
 
 def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
     from viewer.model.reducers.root import reduce
-    from viewer.model.state.app_state import PathPrompt
+    from viewer.model.state.prompts import PathPrompt
 
     assert reduce(AppState(), AskForPath("mask")).prompt == PathPrompt("mask")
 

@@ -13,7 +13,8 @@ from tests.viewer.conftest import FAR, NEAR, Driver
 from viewer.model.actions import Action, Notify, SetDepthStrength, SetFontScale, SetTheme, ShowPrompt, ShowTiltHandles
 from viewer.model.lens.focal_plane import handle_points, sharp_disparity
 from viewer.model.lens.limits import is_extrapolated
-from viewer.model.state.app_state import Notice, TiltHandles
+from viewer.model.state.app_state import TiltHandles
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
     ApertureShape,
     ApplyPreset,

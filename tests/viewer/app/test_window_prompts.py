@@ -15,7 +15,9 @@ from tests.viewer.conftest import SMALL_WINDOW, Driver
 from viewer.app.window_slot import STEP
 from viewer.model.actions import AskToSave, Notify, OpenPath, ShowPrompt, StopWork
 from viewer.model.commands import COMMANDS
-from viewer.model.state.app_state import Notice, PalettePrompt, PathPrompt, SavePrompt, Source
+from viewer.model.state.notices import Notice
+from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
+from viewer.model.state.scene import Source
 
 Opener = Callable[..., Driver]
 
@@ -142,11 +144,11 @@ def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver
 
 
 def test_notices_go_by_themselves_the_newest_first(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("viewer.model.state.app_state.SHORT_NOTICE_S", 0.0)
+    monkeypatch.setattr("viewer.model.state.notices.SHORT_NOTICE_S", 0.0)
     viewer.app.do(Notify(Notice("It failed.", is_error=True)), Notify(Notice("Saved a.png")))
     viewer.until(lambda app: len(app.state.notices) == 1)
     assert viewer.app.state.notices[0].is_error, "that stays longer"
-    monkeypatch.setattr("viewer.model.state.app_state.LONG_NOTICE_S", 0.0)
+    monkeypatch.setattr("viewer.model.state.notices.LONG_NOTICE_S", 0.0)
     viewer.until(lambda app: not app.state.notices)
 
 

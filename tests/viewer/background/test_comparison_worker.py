@@ -36,8 +36,8 @@ from viewer.background.comparison_worker import (
 from viewer.background.jobs import Failed
 from viewer.background.loaded_photo import load_photo
 from viewer.model.inspection_request import InspectionRequest
-from viewer.model.state.app_state import Source
 from viewer.model.state.inspection import GroundTruth
+from viewer.model.state.scene import Source
 
 GRID = GridShape(3, 3)
 DEADLINE_S = 60.0

@@ -14,8 +14,8 @@ from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.runtime.tiling import Cancelled
 from viewer.background.light_field_job import FINDING, FROM_VIEWS
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
-from viewer.model.state.app_state import Source
 from viewer.model.state.optics import CENTRE
+from viewer.model.state.scene import Source
 
 WALL_PX, SQUARE_PX = -0.5, 1.25
 

@@ -27,8 +27,8 @@ from viewer.background.scene_worker import (
     ViewReady,
     results_of,
 )
-from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.optics import CENTRE
+from viewer.model.state.scene import Progress, Source
 
 DEADLINE_S = 120.0
 VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)

@@ -21,7 +21,7 @@ import pytest
 from iibr_core.formats.images.photo import write_image
 from viewer.app.batch.cluster import ALLOWED_FAILURES, local_workers, outcomes_of, remote_workers
 from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask
-from viewer.model.state.app_state import Source
+from viewer.model.state.scene import Source
 
 SETTINGS = BatchSettings("disparity", Source(""))
 DEADLY = "deadly.png"

@@ -22,8 +22,8 @@ from tests.viewer.conftest import write_scene
 from viewer.background.jobs import ProgressReport
 from viewer.background.scene_worker import SceneReady, SceneRequest, SceneWorker, results_of
 from viewer.cli.options import depth_start_from_text, refine_from_text
-from viewer.model.state.app_state import Progress, Source
 from viewer.model.state.optics import CENTRE
+from viewer.model.state.scene import Progress, Source
 
 
 def run_models(

@@ -13,8 +13,8 @@ from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
-from viewer.model.state.app_state import Source
 from viewer.model.state.optics import MoveEye, SetAperture
+from viewer.model.state.scene import Source
 
 PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255))
 IN_SRGB = converted(np.array([PATCHES], np.uint8), profile_bytes())[0].astype(float)

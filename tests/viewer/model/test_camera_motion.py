@@ -16,7 +16,8 @@ from viewer.model.actions import PauseMotion, ReturnHome, SetLoop, SetSpeed, Tic
 from viewer.model.lens.limits import SPEED_LIMITS
 from viewer.model.reducers.camera_motion import HOME_S, LONGEST_STEP_S, ease, point_on_loop
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import LOOPS, AppState, LoopKind
+from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import LOOPS, LoopKind
 from viewer.model.state.optics import MoveEye, ResetOptics, SetDolly
 
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))

@@ -12,8 +12,10 @@ from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, ChooseTask, PalettePrompt, SavePrompt
+from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.prompts import PalettePrompt, SavePrompt
+from viewer.model.state.tasks import ChooseTask
 
 
 def test_names_and_chords_are_unique_and_known_to_imgui() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.choice import DepthChoice, DepthOrigin
 from iibr_core.depth.editing.edits import (
     DEPTH_TOOLS,
     GAMMA_LIMITS,
@@ -34,7 +34,7 @@ from viewer.model.layout import ScreenSize, layout_of
 from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
-from viewer.model.state.app_state import AppState, DepthOrigin, PathPrompt, SavePrompt, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import (
     Brush,
     DepthSample,
@@ -48,6 +48,8 @@ from viewer.model.state.depth_editing import (
     SetTone,
 )
 from viewer.model.state.optics import MoveEye, SetFocus
+from viewer.model.state.prompts import PathPrompt, SavePrompt
+from viewer.model.state.scene import Source
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
 GRID = GridShape(3, 3)

@@ -10,9 +10,9 @@ from iibr_core.types import GridShape
 from viewer.model.export_kinds import EXPORTS
 from viewer.model.export_settings import settle, shear_margin
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Scene, Source
 from viewer.model.state.exporting import ExportOptions
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene, Source
 
 SCENE = Scene(Source("a.png"), "a", 741, 500, GridShape(5, 4), (-1.0, 2.0), "file")
 SHARP_NEAR = Optics(focus_disparity=10.0)

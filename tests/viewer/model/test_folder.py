@@ -10,8 +10,9 @@ from tests.viewer.model.test_reducers import scene_of
 from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.reducers.folder import filmstrip_range, in_order, photos_ahead
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import FolderListed, FolderPhoto, ScrollFilmstrip, SetFolderOrder, StepPhoto
+from viewer.model.state.scene import Source
 
 NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 

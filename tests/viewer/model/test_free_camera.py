@@ -14,8 +14,9 @@ from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import OpenPath, ReturnHome
 from viewer.model.free_camera import FORWARD_LIMITS, MOST_ASIDE, FreeCamera, MoveCamera, Poses, StepPose
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import CENTRE, MoveEye, ResetOptics
+from viewer.model.state.scene import Source
 
 
 def poses_of(count: int, given: int) -> Poses:

@@ -22,8 +22,9 @@ from viewer.model.actions import (
 )
 from viewer.model.reducers.history import EDITS_KEPT
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Source
+from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import FocusOn, MoveEye, SetAperture, SetExposure, SetFocus
+from viewer.model.state.scene import Source
 
 values = st.floats(0, 3)
 edits = st.one_of(

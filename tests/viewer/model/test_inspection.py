@@ -24,7 +24,7 @@ from viewer.model.inspection_request import (
 )
 from viewer.model.layout import Beside, Rect, layout_of
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, ChooseTask, Hover, Scene, Source
+from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import (
     OVERLAYS,
     Compare,
@@ -44,6 +44,8 @@ from viewer.model.state.inspection import (
     TruthRead,
 )
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.scene import Scene, Source
+from viewer.model.state.tasks import ChooseTask
 from viewer.ui.overlays.inspection import status_text
 from viewer.ui.sections.inspect import pair_text, score_text
 

@@ -23,8 +23,9 @@ from viewer.model.lens.photographic_units import (
     metres_text,
     relative_distance,
 )
-from viewer.model.state.app_state import Hover, Scene
+from viewer.model.state.app_state import Hover
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene
 from viewer.ui.overlays.reticle import hover_text
 
 FOCAL_PX, STEP_M = 1000.0, 0.01

@@ -43,8 +43,9 @@ from viewer.model.lens.limits import (
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.notices import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import AppState, Hover, Notice, Picture, Progress, SavedSettings, Scene, Source
+from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.depth_editing import DepthSettings
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     EXPOSURE_LIMIT_STOPS,
@@ -64,6 +65,8 @@ from viewer.model.state.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
+from viewer.model.state.saving import SavedSettings
+from viewer.model.state.scene import Progress, Scene, Source
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)

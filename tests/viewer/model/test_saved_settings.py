@@ -28,8 +28,9 @@ from viewer.model.saved_settings import (
     settings_text_in,
     source_like,
 )
-from viewer.model.state.app_state import SavedSettings, Source
 from viewer.model.state.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
+from viewer.model.state.saving import SavedSettings
+from viewer.model.state.scene import Source
 
 numbers = st.floats(-1e3, 1e3)
 masks = st.builds(lambda n: ApertureMask("ünïcode “mask”.png", 2, n, bytes([255] * 2 * n)), st.integers(1, 64))

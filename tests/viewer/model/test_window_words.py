@@ -14,7 +14,8 @@ from iibr_core.generation.memory_model import budget_of, require_views
 from iibr_core.types import GridShape, ImageSize, InputError
 from viewer.model.commands import BY_NAME
 from viewer.model.reducers.notices import add_notice
-from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
 from viewer.model.window_words import DEPTH_COMMANDS, notice_in_window, words_in_window
 
 

@@ -15,9 +15,10 @@ from viewer.app.headless import HeadlessViewer
 from viewer.display.depth_preview import DepthPreview
 from viewer.model.actions import AskToSave, SetFontScale, SetHover, SetTheme
 from viewer.model.layout import PANEL_WIDTH
-from viewer.model.state.app_state import AppState, Hover, Theme
+from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import Brush, DepthSample, SetBrush, SetTone
 from viewer.model.state.inspection import SetOpacity, SetOverlay
+from viewer.model.state.preferences import Theme
 
 SIZE = 640, 800
 PANEL = np.s_[:, -int(PANEL_WIDTH) :]

@@ -14,7 +14,7 @@ from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import Action, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
 from viewer.model.inspection_request import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, Rect, layout_of
-from viewer.model.state.app_state import Hover, Notice, Theme
+from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import (
     OVERLAYS,
     Compare,
@@ -26,7 +26,9 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.preferences import Theme
 
 SIZE = 640, 760
 GRID = GridShape(3, 3)

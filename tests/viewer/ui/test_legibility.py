@@ -15,7 +15,6 @@ from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import SetFontScale, SetUnits
 from viewer.model.layout import PANEL_WIDTH, ScreenSize
-from viewer.model.state.app_state import SECTIONS, Theme, Units
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     ApertureShape,
@@ -24,6 +23,7 @@ from viewer.model.state.optics import (
     SetFocusRange,
     SetTilt,
 )
+from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.ui.style import Color, palette_of
 
 LEAST_CONTRAST = 4.5

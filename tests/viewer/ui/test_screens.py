@@ -28,18 +28,8 @@ from viewer.model.actions import (
     ToggleSection,
 )
 from viewer.model.layout import PANEL_WIDTH, layout_of
-from viewer.model.state.app_state import (
-    SECTIONS,
-    AppState,
-    DrawReport,
-    Hover,
-    Notice,
-    PalettePrompt,
-    Progress,
-    SavedSettings,
-    Section,
-    Source,
-)
+from viewer.model.state.app_state import AppState, DrawReport, Hover
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     ApertureKind,
@@ -49,7 +39,10 @@ from viewer.model.state.optics import (
     SetAperture,
     SetApertureShape,
 )
-from viewer.model.state.saving import Saving, SavingChanged
+from viewer.model.state.preferences import SECTIONS, Section
+from viewer.model.state.prompts import PalettePrompt
+from viewer.model.state.saving import SavedSettings, Saving, SavingChanged
+from viewer.model.state.scene import Progress, Source
 from viewer.ui.overlays.notices import saving_text
 from viewer.ui.style import DARK, LIGHT
 

@@ -13,8 +13,8 @@ from iibr_core.depth.sidecar import map_to_read
 from iibr_core.formats.files import open_binary
 from viewer.app.batch.archive import ArchivePhoto
 from viewer.model.export_kinds import EXPORTS, ExportKind
-from viewer.model.state.app_state import Source
 from viewer.model.state.exporting import USUAL_OPTIONS, ExportOptions
+from viewer.model.state.scene import Source
 
 MOST_READ_BYTES = 1 << 20
 """At a time."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
     from viewer.app.headless import HeadlessViewer
     from viewer.model.actions import Action
-    from viewer.model.state.app_state import Scene
+    from viewer.model.state.scene import Scene
 
 WARM_SIZE = 120, 160
 _own = threading.local()

@@ -20,9 +20,9 @@ from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
 from viewer.model.lens.limits import aperture_limit, clamp_optics
 from viewer.model.reducers.camera_motion import point_on_loop
-from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import AnimationKind
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene
 
 OPENED = 0.8
 """Of the widest aperture, for motions that need an open one."""

@@ -12,8 +12,8 @@ from iibr_core.types import InputError
 from viewer.app.exports.cameras import cameras_of, colors_of
 from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
-from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import ExportOptions
+from viewer.model.state.scene import Scene
 
 
 def depth_path(path: Path, scene: Scene, options: ExportOptions) -> Path:

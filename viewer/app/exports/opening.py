@@ -15,7 +15,7 @@ from viewer.model.state.optics import CENTRE, Optics
 if TYPE_CHECKING:
     from viewer.app.headless import HeadlessViewer
     from viewer.model.actions import Action
-    from viewer.model.state.app_state import Scene, Source
+    from viewer.model.state.scene import Scene, Source
 
 
 def open_drawn(

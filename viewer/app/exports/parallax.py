@@ -13,8 +13,8 @@ import numpy as np
 from iibr_core.types import InputError, ViewOffset
 from viewer.gpu.refocus.lens import TargetWindow
 from viewer.model.export_settings import shear_margin
-from viewer.model.state.app_state import Scene
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene
 
 LEAST_WIDTH = 0.4
 """What of the picture's width must be left by the shear."""

@@ -15,8 +15,8 @@ from viewer.model.export_settings import settle
 
 if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
-    from viewer.model.state.app_state import Scene
     from viewer.model.state.exporting import ExportOptions
+    from viewer.model.state.scene import Scene
 
 
 def export_path(kind: ExportKind, path: Path, scene: Scene, options: ExportOptions) -> Path:

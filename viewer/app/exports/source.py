@@ -19,8 +19,8 @@ from viewer.background.gloss import add_gloss
 from viewer.background.loaded_photo import LoadedPhoto, inpainting_aids
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Progress, Scene
 from viewer.model.state.optics import CENTRE, Optics
+from viewer.model.state.scene import Progress, Scene
 
 Item = TypeVar("Item")
 

@@ -20,8 +20,8 @@ from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
-from viewer.model.state.app_state import Scene
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene
 
 OPENED = 0.8
 """Of the widest aperture, where it is closed."""

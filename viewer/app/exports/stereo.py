@@ -19,8 +19,8 @@ from viewer.app.exports.pictures import saved_space, write_with_metadata
 from viewer.app.exports.source import ExportSource
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
-from viewer.model.state.app_state import Scene
 from viewer.model.state.exporting import ExportOptions
+from viewer.model.state.scene import Scene
 
 Eyes = tuple[NDArray[Any], NDArray[Any]]
 

@@ -10,8 +10,9 @@ import math
 from dataclasses import replace
 
 from viewer.model.layout import Rect
-from viewer.model.state.app_state import Scene, TiltHandles
+from viewer.model.state.app_state import TiltHandles
 from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene
 
 Place = tuple[float, float]
 

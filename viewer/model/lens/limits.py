@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 from iibr_core.rendering.gloss.settings import require_sound
 from iibr_core.types import GridShape, InputError, ViewOffset
-from viewer.model.state.app_state import Scene
 from viewer.model.state.optics import LIMITS, ApertureShape, Optics
+from viewer.model.state.scene import Scene
 
 Record = TypeVar("Record", Optics, ApertureShape)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from viewer.model.lens.limits import focus_limits
-from viewer.model.state.app_state import Scene
+from viewer.model.state.scene import Scene
 
 ASSUMED_DISTANCE_M = 2.0
 """Of the plane that stays still; f-numbers are those of a lens on full frame focused there."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from viewer.model.lens.limits import aperture_limit, focus_span
-from viewer.model.state.app_state import Scene
 from viewer.model.state.optics import ApertureShape, Optics, PresetName
+from viewer.model.state.scene import Scene
 
 PRESETS: tuple[PresetName, ...] = ("portrait", "macro", "everything sharp")
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.state.app_state import LoopKind, Motion
+from viewer.model.state.motion import LoopKind, Motion
 from viewer.model.state.optics import CENTRE, Optics
 
 HOME_S = 0.4

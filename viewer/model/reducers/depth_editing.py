@@ -17,7 +17,7 @@ from iibr_core.depth.editing.edits import (
 from viewer.model.lens.limits import clamp
 from viewer.model.reducers.history import record_edit
 from viewer.model.reducers.notices import add_notice
-from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import (
     Brush,
     DepthAction,
@@ -30,6 +30,7 @@ from viewer.model.state.depth_editing import (
     SetRefine,
     SetTone,
 )
+from viewer.model.state.notices import Notice
 
 POINT_SPACING = 1 / 6
 """Of the radius: a stroke is remembered by places this far apart."""

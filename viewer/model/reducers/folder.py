@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import PurePath
 
-from viewer.model.state.app_state import AppState, Source, source_beside
+from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import FolderOrder, FolderPhoto, PhotoFolder
+from viewer.model.state.scene import Source, source_beside
 
 AHEAD = (1, -1, 2)
 """Photos read ahead, in steps on in the direction of the last step, the likeliest first."""

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from viewer.model.free_camera import FreeCamera, FreeCameraAction, MoveCamera, StepPose, moved, stepped
 from viewer.model.reducers.notices import add_notice
-from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
 
 FOR_PHOTOS = "A light field from disk has views from its own plane only: open a photo to look around."
 NO_POSES = "There are no poses: the photo was opened without any."

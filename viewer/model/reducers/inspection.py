@@ -8,7 +8,7 @@ from typing import Any
 
 from viewer.model.lens.limits import clamp
 from viewer.model.reducers.notices import add_notice
-from viewer.model.state.app_state import AppState, ChooseTask, Hover, Notice, Scene
+from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import (
     Compare,
     Comparison,
@@ -26,6 +26,9 @@ from viewer.model.state.inspection import (
     ShowValues,
     TruthRead,
 )
+from viewer.model.state.notices import Notice
+from viewer.model.state.scene import Scene
+from viewer.model.state.tasks import ChooseTask
 
 DIVIDER_MARGIN = 0.02
 """The divider stays so far (share of the picture's width) from its borders, where it could not be taken again."""

@@ -11,7 +11,8 @@ from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_throug
 from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, has_sound_gloss, is_finite
 from viewer.model.lens.presets import FIRST_APERTURE, preset_optics
 from viewer.model.reducers.notices import add_notice
-from viewer.model.state.app_state import AppState, Notice, Scene, TiltHandles
+from viewer.model.state.app_state import AppState, TiltHandles
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
     ApplyPreset,
     FocusOn,
@@ -32,6 +33,7 @@ from viewer.model.state.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
+from viewer.model.state.scene import Scene
 
 POINT_SPACING = 1 / 6
 """Of the radius: a stroke of the gloss brush is remembered by places this far apart."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
 from viewer.model.window_words import words_in_window
 
 NOTICES_KEPT = 5

@@ -71,28 +71,20 @@ from viewer.model.reducers.inspection import move_pointer, reduce_inspection, re
 from viewer.model.reducers.lens import reduce_lens
 from viewer.model.reducers.notices import add_notice
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
-from viewer.model.state.app_state import (
-    SECTIONS,
-    AppState,
-    FinishedField,
-    Motion,
-    Notice,
-    PathPrompt,
-    Preferences,
-    Progress,
-    Saved,
-    SavedSettings,
-    SavePrompt,
-    TiltHandles,
-)
+from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction, DepthSettings
 from viewer.model.state.exporting import AskToExport, ExportingChanged
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.model_download import DownloadingChanged
+from viewer.model.state.motion import Motion
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetDolly, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
-from viewer.model.state.saving import SavingChanged
+from viewer.model.state.preferences import SECTIONS, Preferences
+from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
+from viewer.model.state.saving import SavedSettings, SavingChanged
+from viewer.model.state.scene import Progress
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."

@@ -12,11 +12,15 @@ from viewer.model.reducers.folder import is_stepped_to
 from viewer.model.reducers.history import map_optics
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
-from viewer.model.state.app_state import AppState, History, Motion, Notice, Progress, Scene
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.folder import ListFolderTask
+from viewer.model.state.history import History
 from viewer.model.state.inspection import of_next_scene
+from viewer.model.state.motion import Motion
+from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import ReadFactsTask
+from viewer.model.state.scene import Progress, Scene
 from viewer.model.window_words import notice_in_window
 
 RECENT_KEPT = 8

@@ -5,221 +5,27 @@ Comparing two records decides what an edit costs: a new `generation` restarts th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field
 
-from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
-from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels, Stroke
-from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
-from iibr_core.formats.images.picture_kinds import PictureFormat
-from iibr_core.generation.plan import ScenePlan
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ViewOffset
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.layout import WHOLE, Rect, ScreenSize
-from viewer.model.state.depth_editing import Brush, DepthSettings
-from viewer.model.state.exporting import CancelExportTask, Exporting, ExportPrompt, ExportTask
-from viewer.model.state.folder import FolderOrder, ListFolderTask, PhotoFolder
+from viewer.model.state.depth_editing import AS_FOUND, Brush, DepthSettings
+from viewer.model.state.exporting import Exporting
+from viewer.model.state.folder import PhotoFolder
+from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
-from viewer.model.state.model_download import CancelGetTask, Downloading, GetModelTask, ListModelsTask, ModelsPrompt
-from viewer.model.state.optics import CENTRE, GlossBrush, Optics
-from viewer.model.state.photo_facts import NO_FACTS, FactsRead, ReadFactsTask
-from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, Saving, WriteSidecarTask
+from viewer.model.state.model_download import Downloading
+from viewer.model.state.motion import Motion
+from viewer.model.state.notices import Notice
+from viewer.model.state.optics import GlossBrush, Optics
+from viewer.model.state.photo_facts import NO_FACTS, FactsRead
+from viewer.model.state.preferences import Preferences
+from viewer.model.state.prompts import Prompt
+from viewer.model.state.saving import Saving
+from viewer.model.state.scene import Progress, Scene, Source
+from viewer.model.state.tasks import Task
 from viewer.model.zoom import Zoom
-
-AS_FOUND = DepthSettings()
-AS_USUAL = DepthChoice()
-
-
-@dataclass(frozen=True)
-class Source:
-    """What to open and what the user decided about it; None leaves the choice to the program.
-
-    path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
-    transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`. is_literal:
-    disparity counts as it is given, in px per step of the grid, instead of the plan's parallax.
-    """
-
-    path: str
-    depth: DepthChoice = AS_USUAL
-    grid: GridShape | None = None
-    focus_disparity: float | None = None
-    max_pixels: int | None = None
-    quality: Quality | None = None
-    inpaint: str = DEFAULT_INPAINTER
-    is_literal: bool = False
-
-
-def source_beside(source: Source | None, path: str) -> Source:
-    """To open another file: what was decided about the one before counts, but for what belongs to its depth map."""
-    return _with_depth(replace(source or Source(""), path=path), file=None)
-
-
-def source_with_map(source: Source, path: str) -> Source:
-    """The same photo with this disparity map."""
-    return _with_depth(source, file=path, start="auto")
-
-
-def source_with_depth(source: Source, start: DepthStart, model: str | None = None) -> Source:
-    """The same photo, its depth looked for from here on; model: a name or a folder."""
-    return _with_depth(source, file=None, start=start, model=model or source.depth.model)
-
-
-def _with_depth(source: Source, **changes: Any) -> Source:
-    """What was said in the units of the map before, its scale and the focus, counts no longer."""
-    return replace(source, depth=replace(source.depth, file_scale=1.0, **changes), focus_disparity=None)
-
-
-@dataclass(frozen=True)
-class Scene:
-    """What is open: a photo with its plan, or a light field from disk (plan None).
-
-    depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
-    has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
-    not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
-    file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
-    view step as given. depth_models: names of those on this machine. inverse_metres: (slope, offset) of 1 / distance
-    over the disparity as given, None where distances are not known in metres. color_space: of its views. own_size: of
-    the photo in its file, which a view may be smaller than; None for light fields. infinity_px: a photo's field
-    disparity of what is infinitely far, as far as it is known. is_sketch: it is shown in small while it is read.
-    """
-
-    source: Source
-    name: str
-    width: int
-    height: int
-    grid: GridShape
-    disparity_range_px: tuple[float, float]
-    depth_source: str
-    is_hdr: bool = False
-    has_view_disparity: bool = True
-    plan: ScenePlan | None = None
-    notes: tuple[str, ...] = ()
-    focal_px: float | None = None
-    subject_disparity_px: float = 0.0
-    settings: str = ""
-    depth_origin: DepthOrigin | None = None
-    levels: Levels | None = None
-    depth_models: tuple[str, ...] = ()
-    inverse_metres: tuple[float, float] | None = None
-    color_space: ColorSpace = SRGB
-    own_size: ScreenSize | None = None
-    is_sketch: bool = False
-    infinity_px: float = 0.0
-
-    @property
-    def size(self) -> ScreenSize:
-        """Of a view, as it is drawn."""
-        return ScreenSize(self.width, self.height)
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far the worker is: views done of total, in seconds; doing says what in words when no views are counted.
-
-    drafts: of those done, so many will come again, with sharper edges.
-    """
-
-    done: int = 0
-    total: int = 0
-    seconds: float = 0.0
-    doing: str = ""
-    drafts: int = 0
-
-    @property
-    def share(self) -> float:
-        """How much of the work is done, 0..1. A draft is about half of a view's."""
-        return (self.done - 0.5 * self.drafts) / self.total if self.total else 0.0
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether every view is there as it will stay."""
-        return 0 < self.total == self.done and not self.drafts
-
-
-@dataclass(frozen=True)
-class SavedSettings:
-    """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
-
-    depth_edits: of the photo's disparity. unknown_fields: names of what was saved too, but is not known here.
-    """
-
-    optics: Optics
-    depth_strength: float
-    source: Source
-    size_px: ScreenSize
-    depth_edits: DepthEdits = UNEDITED
-    unknown_fields: tuple[str, ...] = ()
-
-
-SHORT_NOTICE_S, LONG_NOTICE_S = 12.0, 60.0
-
-
-@dataclass(frozen=True)
-class Notice:
-    """A message the user can dismiss, or wait for it to go. offer: settings that a button beside it takes over.
-
-    commands: names of commands that do what it advises, a button each.
-    """
-
-    text: str
-    is_error: bool = False
-    offer: SavedSettings | None = None
-    commands: tuple[str, ...] = ()
-
-    @property
-    def seconds(self) -> float:
-        """How long it stays: long enough to be read, and to reach for what it offers."""
-        return LONG_NOTICE_S if self.is_error or self.offer is not None or self.commands else SHORT_NOTICE_S
-
-
-LoopKind = Literal["circle", "eight", "swing"]
-LOOPS: tuple[LoopKind, ...] = ("circle", "eight", "swing")
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A viewpoint that moves by itself; `viewer.model.reducers.camera_motion` says along which path.
-
-    kind: None at rest. turns: of the path since it began at the viewpoint `start` (and its dolly). ticked_s: clock of
-    the last step, None before the first. speed, in turns per second, and is_paused outlast a change of kind.
-    """
-
-    kind: LoopKind | Literal["home"] | None = None
-    turns: float = 0.0
-    ticked_s: float | None = None
-    start: ViewOffset = CENTRE
-    start_dolly: float = 0.0
-    speed: float = 0.25
-    is_paused: bool = False
-
-    @property
-    def is_running(self) -> bool:
-        """Whether the picture changes without anybody touching it."""
-        return self.kind is not None and not self.is_paused
-
-
-@dataclass(frozen=True)
-class Edit:
-    """What undo brings back."""
-
-    optics: Optics
-    depth_strength: float
-    depth: DepthSettings = AS_FOUND
-
-
-@dataclass(frozen=True)
-class History:
-    """Edits to go back to (the latest last) and forth to (the nearest first), in the units of the open scene.
-
-    last: the kind of the latest edit. gesture: that kind too while it is under way, "" after: more of the same belongs
-    to it until the pointer goes down or up.
-    """
-
-    past: tuple[Edit, ...] = ()
-    future: tuple[Edit, ...] = ()
-    last: str = ""
-    gesture: str = ""
 
 
 @dataclass(frozen=True)
@@ -241,132 +47,6 @@ class TiltHandles:
     first: tuple[float, float] = (-0.5, 0.4)
     second: tuple[float, float] = (0.5, -0.4)
     taken: int | None = None
-
-
-ChoiceOf = Literal["photo", "folder", "mask", "truth", "map", "model"]
-"""map: a disparity map for the photo that is open; model: the folder of a depth model."""
-
-
-@dataclass(frozen=True)
-class PathPrompt:
-    """The question for a file, where the system has no file dialog."""
-
-    what: ChoiceOf
-    path: str = ""
-
-
-Saved = Literal["picture", "map"]
-
-
-@dataclass(frozen=True)
-class SavePrompt:
-    """The question where to save the picture, and how large, or its disparity map. already_there: there is one.
-
-    problem: why nothing can be saved there, "" before that is known. form: how the picture is written.
-    """
-
-    path: str
-    size_px: ScreenSize
-    already_there: bool = False
-    what: Saved = "picture"
-    problem: str = ""
-    form: PictureFormat = USUAL_FORM
-
-
-@dataclass(frozen=True)
-class PalettePrompt:
-    """The list of commands, narrowed down by what was typed. selected: which of those left Enter runs."""
-
-    text: str = ""
-    selected: int = 0
-
-
-Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "welcome", "quit"]
-"""quit: whether to close although depth edits are saved nowhere."""
-
-
-@dataclass(frozen=True)
-class ChooseTask:
-    """Let the user choose in the system's dialog."""
-
-    what: ChoiceOf
-
-
-@dataclass(frozen=True)
-class ChoosePlaceTask:
-    """Let the user choose in the system's dialog where the file goes that this prompt asks about."""
-
-    prompt: SavePrompt
-
-
-@dataclass(frozen=True)
-class SaveTask:
-    """Write the picture, or its disparity map. size_px: (width, height). form: how the picture is written."""
-
-    path: str
-    size_px: ScreenSize
-    may_replace: bool = False
-    what: Saved = "picture"
-    form: PictureFormat = USUAL_FORM
-
-
-@dataclass(frozen=True)
-class ReadMaskTask:
-    """Read an aperture mask."""
-
-    path: str
-
-
-@dataclass(frozen=True)
-class ReadTruthTask:
-    """Look what light field this folder holds, to compare with; once a scene is open."""
-
-    path: str
-
-
-Task = (
-    ChooseTask
-    | ChoosePlaceTask
-    | SaveTask
-    | CancelSaveTask
-    | CopyTask
-    | PasteTask
-    | WriteSidecarTask
-    | ExportTask
-    | CancelExportTask
-    | ReadMaskTask
-    | ReadTruthTask
-    | ListFolderTask
-    | ReadFactsTask
-    | ListModelsTask
-    | GetModelTask
-    | CancelGetTask
-)
-"""What the state asks of the outside world; the loop does it and says what came of it by an action."""
-
-Theme = Literal["dark", "light"]
-Units = Literal["photographic", "light field"]
-"""near to far and f-numbers, or pixels per view step and view steps."""
-
-Section = Literal["view", "focus", "aperture", "light", "gloss", "depth", "inspect", "scene"]
-SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "gloss", "depth", "inspect", "scene")
-
-
-@dataclass(frozen=True)
-class Preferences:
-    """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
-    whether it filled the screen then. told_sessions: that depth edits are kept.
-    """
-
-    theme: Theme = "dark"
-    font_scale: float = 1.0
-    open_sections: tuple[Section, ...] = ("view", "focus", "aperture", "light")
-    window: tuple[int, int, int, int] | None = None
-    is_maximized: bool = False
-    shows_filmstrip: bool = False
-    folder_order: FolderOrder = "name"
-    units: Units = "photographic"
-    told_sessions: bool = False
 
 
 @dataclass(frozen=True)
@@ -420,13 +100,13 @@ class AppState:
     should_quit: bool = False
     views_there: frozenset[tuple[int, int]] = frozenset()
     stopped: int | None = None
-    motion: Motion = Motion()
-    history: History = History()
+    motion: Motion = field(default_factory=Motion)
+    history: History = field(default_factory=History)
     hover: Hover | None = None
     tilt_handles: TiltHandles | None = None
     prompt: Prompt | None = None
     tasks: tuple[Task, ...] = ()
-    preferences: Preferences = Preferences()
+    preferences: Preferences = field(default_factory=Preferences)
     recent: tuple[str, ...] = ()
     report: DrawReport | None = None
     inspection: Inspection = field(default_factory=Inspection)

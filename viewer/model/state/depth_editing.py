@@ -18,6 +18,9 @@ class DepthSettings:
     edits: DepthEdits = UNEDITED
 
 
+AS_FOUND = DepthSettings()
+
+
 @dataclass(frozen=True)
 class DepthSample:
     """A place whose depth was picked, (x, y) as shares of the photo's width and height; the disparity seen there."""

@@ -1,8 +1,13 @@
-"""A picture on its way to a file: what the panel says of it, and the action that changes that."""
+"""A picture on its way to a file: what the panel says of it, the action that changes that, and what the file keeps."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from viewer.model.layout import ScreenSize
+from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Source
 
 
 @dataclass(frozen=True)
@@ -23,6 +28,21 @@ class SavingChanged:
     """Another picture is being saved, or it has come further; None: nothing is any more."""
 
     saving: Saving | None
+
+
+@dataclass(frozen=True)
+class SavedSettings:
+    """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
+
+    depth_edits: of the photo's disparity. unknown_fields: names of what was saved too, but is not known here.
+    """
+
+    optics: Optics
+    depth_strength: float
+    source: Source
+    size_px: ScreenSize
+    depth_edits: DepthEdits = UNEDITED
+    unknown_fields: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from viewer.model.export_settings import MOST_FRAMES, RATE_LIMITS, ExportSetting
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import clamp
 from viewer.model.reducers.exporting import export_path_beside
-from viewer.model.state.app_state import AppState, Scene
+from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ANIMATIONS, ExportOptions, ExportPrompt, ExportTask
+from viewer.model.state.scene import Scene
 from viewer.ui.overlays.prompt_rows import (
     choice_row,
     prompt_actions,

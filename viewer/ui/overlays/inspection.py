@@ -16,8 +16,9 @@ from viewer.model.inspection_request import (
 )
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.photographic_units import relative_distance
-from viewer.model.state.app_state import AppState, Hover, Scene
+from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Comparison, Origin, Probe
+from viewer.model.state.scene import Scene
 from viewer.ui.style import DARK, Color, pack_color, palette_of
 
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0

@@ -9,9 +9,10 @@ from imgui_bundle import imgui
 from viewer.model.actions import Action, DismissNotice, DismissNotices, DoTask, TakeSettings
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
-from viewer.model.state.app_state import AppState, Notice
+from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import CancelExportTask, Exporting
 from viewer.model.state.model_download import CancelGetTask, Downloading
+from viewer.model.state.notices import Notice
 from viewer.model.state.saving import CancelSaveTask, Saving
 from viewer.ui.style import palette_of
 

@@ -14,17 +14,11 @@ from iibr_core.types import SRGB
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
 from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching, recent_commands
 from viewer.model.layout import Layout, ScreenSize
-from viewer.model.state.app_state import (
-    AppState,
-    ChoosePlaceTask,
-    PalettePrompt,
-    PathPrompt,
-    Prompt,
-    SavePrompt,
-    SaveTask,
-)
+from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import GetModelTask, ModelsPrompt
+from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
+from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.prompt_rows import (
     focus_on_appearing,

@@ -10,8 +10,10 @@ from iibr_core.depth.editing.edits import DEPTH_TOOLS
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
-from viewer.model.state.app_state import AppState, Hover, Scene, TiltHandles, Units
+from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.optics import GlossBrush, Optics
+from viewer.model.state.preferences import Units
+from viewer.model.state.scene import Scene
 from viewer.ui.style import DARK, pack_color
 
 RETICLE_RADIUS = 11.0

@@ -12,9 +12,11 @@ from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthSt
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import DEPTH_STRENGTH_LIMIT
-from viewer.model.state.app_state import AppState, ChooseTask, Scene, source_with_depth
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
+from viewer.model.state.scene import Scene, source_with_depth
+from viewer.model.state.tasks import ChooseTask
 from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
 from viewer.ui.widgets import button, checkbox, choice, gap, label, last_part, quiet, slider, tooltip

@@ -10,7 +10,7 @@ from viewer.model.actions import Action, DoTask, SetUnits
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
 from viewer.model.reducers.inspection import NOTHING_KEPT, lacks_kept_state, obstacle_to_comparison, obstacle_to_overlay
-from viewer.model.state.app_state import AppState, ChooseTask, Scene
+from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import (
     COMPARISONS,
     OVERLAYS,
@@ -23,6 +23,8 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
+from viewer.model.state.scene import Scene
+from viewer.model.state.tasks import ChooseTask
 from viewer.ui.widgets import button, checkbox, choice, quiet, slider
 
 OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "Disparity", "entropy": "Entropy", "inpainted": "Inpainted"}

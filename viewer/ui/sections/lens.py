@@ -24,7 +24,7 @@ from viewer.model.lens.photographic_units import (
     metres_text,
     relative_distance,
 )
-from viewer.model.state.app_state import AppState, ChooseTask, Scene
+from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     EXPOSURE_LIMIT_STOPS,
@@ -39,6 +39,8 @@ from viewer.model.state.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
+from viewer.model.state.scene import Scene
+from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette
 from viewer.ui.widgets import button, checkbox, choice, end_words, quiet, slider, whole_slider

@@ -7,8 +7,8 @@ from imgui_bundle import imgui
 from iibr_core.inpainting.registry import INPAINTERS
 from viewer.model.actions import Action, SetInpainter
 from viewer.model.layout import Layout
-from viewer.model.state.app_state import Scene
 from viewer.model.state.photo_facts import FactsRead
+from viewer.model.state.scene import Scene
 from viewer.ui.widgets import gap, label, last_part, quiet, tooltip
 
 HOLES_TIP = (

@@ -8,8 +8,10 @@ from viewer.model.actions import Action, PauseMotion, ReturnHome, SetLoop, SetSp
 from viewer.model.commands import LOOP_WORDS
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import SPEED_LIMITS, dolly_limit, is_extrapolated
-from viewer.model.state.app_state import LOOPS, AppState, Scene
+from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import LOOPS
 from viewer.model.state.optics import SetDolly
+from viewer.model.state.scene import Scene
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
 from viewer.ui.style import Palette, pack_color
 from viewer.ui.widgets import button, choice, slider, tooltip

@@ -10,8 +10,9 @@ from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.limits import clamp_to_grid, eye_limits, is_extrapolated
-from viewer.model.state.app_state import AppState, Scene
+from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.scene import Scene
 from viewer.ui.style import Palette, pack_color
 
 PAD_SIDE = 136.0

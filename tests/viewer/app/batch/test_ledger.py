@@ -11,7 +11,7 @@ from iibr_core.types import GridShape, InputError
 from viewer.app.batch.archive import ArchivePhoto
 from viewer.app.batch.ledger import FAILURES, MANIFEST, Ledger, require_batch_place
 from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask, key_of
-from viewer.model.state.app_state import Source
+from viewer.model.state.scene import Source
 
 SETTINGS = BatchSettings("disparity", Source(""))
 

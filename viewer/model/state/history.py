@@ -1,0 +1,31 @@
+"""What undo and redo go through. `viewer.model.reducers.history` says how."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from viewer.model.state.depth_editing import AS_FOUND, DepthSettings
+from viewer.model.state.optics import Optics
+
+
+@dataclass(frozen=True)
+class Edit:
+    """What undo brings back."""
+
+    optics: Optics
+    depth_strength: float
+    depth: DepthSettings = AS_FOUND
+
+
+@dataclass(frozen=True)
+class History:
+    """Edits to go back to (the latest last) and forth to (the nearest first), in the units of the open scene.
+
+    last: the kind of the latest edit. gesture: that kind too while it is under way, "" after: more of the same belongs
+    to it until the pointer goes down or up.
+    """
+
+    past: tuple[Edit, ...] = ()
+    future: tuple[Edit, ...] = ()
+    last: str = ""
+    gesture: str = ""

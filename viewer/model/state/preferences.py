@@ -1,0 +1,32 @@
+"""What the user sets once, for every photo."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from viewer.model.state.folder import FolderOrder
+
+Theme = Literal["dark", "light"]
+Units = Literal["photographic", "light field"]
+"""near to far and f-numbers, or pixels per view step and view steps."""
+
+Section = Literal["view", "focus", "aperture", "light", "gloss", "depth", "inspect", "scene"]
+SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "gloss", "depth", "inspect", "scene")
+
+
+@dataclass(frozen=True)
+class Preferences:
+    """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
+    whether it filled the screen then. told_sessions: that depth edits are kept.
+    """
+
+    theme: Theme = "dark"
+    font_scale: float = 1.0
+    open_sections: tuple[Section, ...] = ("view", "focus", "aperture", "light")
+    window: tuple[int, int, int, int] | None = None
+    is_maximized: bool = False
+    shows_filmstrip: bool = False
+    folder_order: FolderOrder = "name"
+    units: Units = "photographic"
+    told_sessions: bool = False

@@ -1,0 +1,121 @@
+"""What to open, and what is open: a photo or a light field, and how far the work on it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
+from iibr_core.depth.editing.edits import Levels
+from iibr_core.generation.plan import ScenePlan
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
+from iibr_core.types import SRGB, ColorSpace, GridShape, Quality
+from viewer.model.layout import ScreenSize
+
+AS_USUAL = DepthChoice()
+
+
+@dataclass(frozen=True)
+class Source:
+    """What to open and what the user decided about it; None leaves the choice to the program.
+
+    path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
+    transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`. is_literal:
+    disparity counts as it is given, in px per step of the grid, instead of the plan's parallax.
+    """
+
+    path: str
+    depth: DepthChoice = AS_USUAL
+    grid: GridShape | None = None
+    focus_disparity: float | None = None
+    max_pixels: int | None = None
+    quality: Quality | None = None
+    inpaint: str = DEFAULT_INPAINTER
+    is_literal: bool = False
+
+
+def source_beside(source: Source | None, path: str) -> Source:
+    """To open another file: what was decided about the one before counts, but for what belongs to its depth map."""
+    return _with_depth(replace(source or Source(""), path=path), file=None)
+
+
+def source_with_map(source: Source, path: str) -> Source:
+    """The same photo with this disparity map."""
+    return _with_depth(source, file=path, start="auto")
+
+
+def source_with_depth(source: Source, start: DepthStart, model: str | None = None) -> Source:
+    """The same photo, its depth looked for from here on; model: a name or a folder."""
+    return _with_depth(source, file=None, start=start, model=model or source.depth.model)
+
+
+def _with_depth(source: Source, **changes: Any) -> Source:
+    """What was said in the units of the map before, its scale and the focus, counts no longer."""
+    return replace(source, depth=replace(source.depth, file_scale=1.0, **changes), focus_disparity=None)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is open: a photo with its plan, or a light field from disk (plan None).
+
+    depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
+    has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
+    not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
+    file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
+    view step as given. depth_models: names of those on this machine. inverse_metres: (slope, offset) of 1 / distance
+    over the disparity as given, None where distances are not known in metres. color_space: of its views. own_size: of
+    the photo in its file, which a view may be smaller than; None for light fields. infinity_px: a photo's field
+    disparity of what is infinitely far, as far as it is known. is_sketch: it is shown in small while it is read.
+    """
+
+    source: Source
+    name: str
+    width: int
+    height: int
+    grid: GridShape
+    disparity_range_px: tuple[float, float]
+    depth_source: str
+    is_hdr: bool = False
+    has_view_disparity: bool = True
+    plan: ScenePlan | None = None
+    notes: tuple[str, ...] = ()
+    focal_px: float | None = None
+    subject_disparity_px: float = 0.0
+    settings: str = ""
+    depth_origin: DepthOrigin | None = None
+    levels: Levels | None = None
+    depth_models: tuple[str, ...] = ()
+    inverse_metres: tuple[float, float] | None = None
+    color_space: ColorSpace = SRGB
+    own_size: ScreenSize | None = None
+    is_sketch: bool = False
+    infinity_px: float = 0.0
+
+    @property
+    def size(self) -> ScreenSize:
+        """Of a view, as it is drawn."""
+        return ScreenSize(self.width, self.height)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the worker is: views done of total, in seconds; doing says what in words when no views are counted.
+
+    drafts: of those done, so many will come again, with sharper edges.
+    """
+
+    done: int = 0
+    total: int = 0
+    seconds: float = 0.0
+    doing: str = ""
+    drafts: int = 0
+
+    @property
+    def share(self) -> float:
+        """How much of the work is done, 0..1. A draft is about half of a view's."""
+        return (self.done - 0.5 * self.drafts) / self.total if self.total else 0.0
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every view is there as it will stay."""
+        return 0 < self.total == self.done and not self.drafts

@@ -1,0 +1,74 @@
+"""What the state asks of the outside world. The loop has it done, and says what came of it by an action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
+from iibr_core.formats.images.picture_kinds import PictureFormat
+from viewer.model.layout import ScreenSize
+from viewer.model.state.exporting import CancelExportTask, ExportTask
+from viewer.model.state.folder import ListFolderTask
+from viewer.model.state.model_download import CancelGetTask, GetModelTask, ListModelsTask
+from viewer.model.state.photo_facts import ReadFactsTask
+from viewer.model.state.prompts import ChoiceOf, Saved, SavePrompt
+from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, WriteSidecarTask
+
+
+@dataclass(frozen=True)
+class ChooseTask:
+    """Let the user choose in the system's dialog."""
+
+    what: ChoiceOf
+
+
+@dataclass(frozen=True)
+class ChoosePlaceTask:
+    """Let the user choose in the system's dialog where the file goes that this prompt asks about."""
+
+    prompt: SavePrompt
+
+
+@dataclass(frozen=True)
+class SaveTask:
+    """Write the picture, or its disparity map. size_px: (width, height). form: how the picture is written."""
+
+    path: str
+    size_px: ScreenSize
+    may_replace: bool = False
+    what: Saved = "picture"
+    form: PictureFormat = USUAL_FORM
+
+
+@dataclass(frozen=True)
+class ReadMaskTask:
+    """Read an aperture mask."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class ReadTruthTask:
+    """Look what light field this folder holds, to compare with; once a scene is open."""
+
+    path: str
+
+
+Task = (
+    ChooseTask
+    | ChoosePlaceTask
+    | SaveTask
+    | CancelSaveTask
+    | CopyTask
+    | PasteTask
+    | WriteSidecarTask
+    | ExportTask
+    | CancelExportTask
+    | ReadMaskTask
+    | ReadTruthTask
+    | ListFolderTask
+    | ReadFactsTask
+    | ListModelsTask
+    | GetModelTask
+    | CancelGetTask
+)
