@@ -10,7 +10,7 @@ Writes docs/tables/degradation.md and its curves.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,8 +78,8 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=4)
     parser.add_argument("--data", type=Path)
     options = parser.parse_args()
-    drawn = [_drawn(seed) for seed in range(FIRST_SEED, FIRST_SEED + options.scenes)]
-    sets = {f"{len(drawn)} drawn scenes": drawn} | {known.name: [known] for known in _read(options.data)}
+    scenes = [drawn(seed, outer_views_of_grid(GRID)) for seed in range(FIRST_SEED, FIRST_SEED + options.scenes)]
+    sets = {f"{len(scenes)} drawn scenes": scenes} | {known.name: [known] for known in _read(options.data)}
     curves = {name: {fault.name: _curve(fault, scenes) for fault in FAULTS} for name, scenes in sets.items()}
     _plot(curves)
     parts = [
@@ -101,11 +101,12 @@ def main() -> None:
     write_report("degradation", "What wrong disparity costs", parts)
 
 
-def _drawn(seed: int) -> Known:
+def drawn(seed: int, judged: Iterable[ViewOffset]) -> Known:
+    """The scene of a seed, with its views at the offsets to be judged."""
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, SIZE, float(np.exp(rng.uniform(*np.log(DISPARITIES_PX)))))
     photo, disparity = render(scene, SIZE, ViewOffset(0, 0))
-    truths = {offset: render(scene, SIZE, offset)[0] for offset in outer_views_of_grid(GRID)}
+    truths = {offset: render(scene, SIZE, offset)[0] for offset in judged}
     return Known(f"scene {seed}", quantise_as_stored(photo), disparity, truths)
 
 

@@ -1,0 +1,266 @@
+"""What each part of making views is worth: one switch at a time against the default, error beside processor time.
+
+    python -m benchmarks.tables.ablations --data DATA [--scenes 3] [--out docs/tables/ablations.md]
+
+Scenes are drawn like those that training learns from, by seeds of their own, with exact maps and with spoilt ones; and
+those of DATA (folders as `iibr evaluate` takes them) that have true maps. Parts that need no training only: those of
+the transformer are in docs/transformer.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import count
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+
+from benchmarks.speed.measure import Cost, in_turns, median_ratio
+from benchmarks.speed.variants import BenchScene, Variant, bench_scenes, evaluated_views, field_cost
+from benchmarks.tables.degradation import GRID, SIZE, drawn
+from benchmarks.tables.report import FOLDER, markdown, write_report
+from iibr_core.depth.refine import refine
+from iibr_core.evaluation.consistency import consistency
+from iibr_core.evaluation.datasets import find_scenes, read_view
+from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.trials import trials_of
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+from iibr_core.generation.update_loop import render_outer_views
+from iibr_core.generation.view_maker import ViewMaker
+from iibr_core.inpainting.patch import fill_patches
+from iibr_core.rendering.ray_set import NO_MARGINS
+from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.training.degradation import degrade
+from iibr_core.types import FloatImage, ViewOffset, ignore_progress
+
+FIRST_SEED = 9000
+MOST_VIEWS = 8
+ROUNDS = 2
+MATTERS_DB = 0.05
+JUDGED = tuple(
+    ViewOffset(t * share_t, s * share_s)
+    for share_t, share_s in ((4.0, 4.0), (3.0, 1.0))
+    for t in (-1, 1)
+    for s in (-1, 1)
+)
+"""Views of drawn scenes: the corners of the grid, and four that no ray was added from."""
+PAPERS_LEAST_COVERED = 0.09
+"""Covered so far, a ray has 99 % of the most entropy: the paper's threshold."""
+TRAINED = (
+    "What needs training (disparity encoding, entropy loss, EPI loss, raw coordinates) stands in"
+    " [transformer.md](../transformer.md), from short runs at an earlier commit: it is not made anew here, as five"
+    " equal trainings of 2500 steps, such as the shipped weights had, take most of an hour on these two cores."
+)
+
+
+DEFAULT_VARIANT = Variant("balanced", "balanced")
+
+
+@dataclass(frozen=True)
+class Switch:
+    """One part changed. variant: how fields are made. swaps: what else is put in place of names of the core."""
+
+    name: str
+    variant: Variant = DEFAULT_VARIANT
+    swaps: Mapping[str, object] = field(default_factory=dict)
+
+    @contextmanager
+    def applied(self) -> Iterator[None]:
+        """With the swaps in place."""
+        with ExitStack() as until_done:
+            for name, part in self.swaps.items():
+                until_done.enter_context(patch(f"iibr_core.{name}", part))
+            yield
+
+
+def _do_not_split(colors: FloatImage, disparity: FloatImage, *_: object) -> tuple[FloatImage, ...]:
+    """Of `split_mixed_pixels`: every pixel is one surface's."""
+    return colors, colors, np.full_like(disparity, np.nan), np.zeros_like(disparity)
+
+
+DEFAULT = Switch("default")
+NOTHING_SHARED = Switch(
+    "every view fills its own holes", swaps={"generation.view_maker.render_outer_views": lambda *_, **__: iter(())}
+)
+SWITCHES = (
+    DEFAULT,
+    *(Switch(f"quality {quality}", replace(DEFAULT_VARIANT, quality=quality)) for quality in ("fast", "exact")),
+    *(Switch(f"{k} candidates a ray (5)", replace(DEFAULT_VARIANT, slots=k)) for k in (1, 3, 6)),
+    *(Switch(f"{k} hypotheses for the transformer (6)", replace(DEFAULT_VARIANT, hypotheses=k)) for k in (3, 9)),
+    Switch("no refinement of the map", replace(DEFAULT_VARIANT, refined=0.0)),
+    Switch("refinement leaves rims", swaps={"depth.refine.settle_rims": lambda _, values, *__: values}),
+    Switch("mixed pixels stay whole", swaps={"rendering.view_synthesis.split_mixed_pixels": _do_not_split}),
+    Switch("rims hide what is behind them", swaps={"rendering.view_synthesis.WHOLE": 0.0}),
+    Switch(
+        "occlusion: the paper's entropy", swaps={"rendering.occlusion.LEAST_COVERED": PAPERS_LEAST_COVERED}
+    ),
+    Switch("occlusion: lower entropy", swaps={"rendering.occlusion.LEAST_COVERED": 0.4}),
+    Switch(
+        "no canvas beyond the frame", swaps={"generation.view_maker.margins_beyond_frame": lambda *_: NO_MARGINS}
+    ),
+    NOTHING_SHARED,
+    Switch(
+        "inpainting: patch",
+        swaps={
+            "generation.view_maker.render_outer_views": partial(render_outer_views, inpainter=fill_patches),
+            "generation.view_maker.ViewSynthesis": partial(ViewSynthesis, inpainter=fill_patches),
+        },
+    ),
+)  # fmt: skip
+
+
+Judged = tuple[BenchScene, BenchScene]
+"""A scene to make views of, and the same with its exact map, which tells what the given view does not see."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """PSNR in dB of whole views, and of what the given view does not see (NaN where it sees everything)."""
+
+    full_db: float
+    hole_db: float
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--scenes", type=int, default=3)
+    parser.add_argument("--out", type=Path, default=FOLDER / "ablations.md")
+    options = parser.parse_args()
+    exact = [_drawn(seed) for seed in range(FIRST_SEED, FIRST_SEED + options.scenes)]
+    spoilt = [replace(scene, disparity=_spoil(scene.disparity, seed)) for seed, scene in enumerate(exact)]
+    known = list(_read(options.data))
+    sets = {
+        f"{len(exact)} drawn, exact maps": list(zip(exact, exact)),
+        f"{len(exact)} drawn, spoilt maps": list(zip(spoilt, exact)),
+        **{scene.name: [(scene, scene)] for scene in known},
+    }
+    found = {switch.name: {name: _mean_figures(switch, scenes) for name, scenes in sets.items()} for switch in SWITCHES}
+    parts = [
+        "First row: PSNR in dB, whole views / what the given view does not see (by a plain warp of the exact map)."
+        " Others: what the switch changes; more is better. Time: processor time of the whole field of the first drawn"
+        f" scene, its map spoilt, against the default's, median of {ROUNDS} rounds. Default: balanced, refined; its"
+        f" numbers in brackets. Drawn scenes: seeds from {FIRST_SEED}, {SIZE} px, {GRID.rows}x{GRID.columns} views,"
+        f" {len(JUDGED)} judged.",
+        markdown(("switch", *sets, "time"), table_rows(found, time_ratios(spoilt[0]))),
+        unimportant_sentence(found),
+        _agreement_sentence(exact),
+        TRAINED,
+    ]
+    write_report("ablations", "What each part is worth", parts, options.out)
+
+
+def table_rows(found: Mapping[str, Mapping[str, Figures]], ratios: Mapping[str, float]) -> Iterator[tuple[str, ...]]:
+    """The default's decibels, which is the first; gains over it."""
+    (first, default), *others = found.items()
+    yield first, *(f"{own.full_db:.2f} / {_word(own.hole_db, '.2f')}" for own in default.values()), "1.00"
+    for name, of_sets in others:
+        gains = [_gains(of_sets[of], default[of]) for of in default]
+        yield name, *(f"{full:+.2f} / {_word(hole, '+.2f')}" for full, hole in gains), f"{ratios[name]:.2f}"
+
+
+def unimportant_sentence(found: Mapping[str, Mapping[str, Figures]]) -> str:
+    """Which rows change nothing worth a word, neither in whole views nor in holes, on any of the sets."""
+    (_, default), *others = found.items()
+    idle = [
+        name
+        for name, of_sets in others
+        if not any(abs(gain) >= MATTERS_DB for of in default for gain in _gains(of_sets[of], default[of]))
+    ]
+    bound = f"less than {MATTERS_DB:g} dB on every set, in whole views and in holes"
+    return f"What does not matter, {bound}: {'; '.join(idle)}." if idle else f"No row changes {bound}."
+
+
+def _gains(own: Figures, default: Figures) -> tuple[float, float]:
+    """Of whole views and of holes."""
+    return own.full_db - default.full_db, own.hole_db - default.hole_db
+
+
+def _word(decibels: float, form: str) -> str:
+    return "–" if math.isnan(decibels) else f"{decibels:{form}}"
+
+
+def _drawn(seed: int) -> BenchScene:
+    known = drawn(seed, JUDGED)
+    grid = tuple(GRID.offset(*at) for at in np.ndindex(*GRID))
+    return BenchScene(known.name, known.photo, known.disparity, known.truths, grid)
+
+
+def _spoil(disparity: FloatImage, seed: int) -> FloatImage:
+    """As training spoils maps; it leaves some alone, those draws are passed over."""
+    reach = max(map(max, JUDGED))
+    draws = (degrade(disparity, np.random.default_rng((seed, k)), reach) for k in count())
+    return next(map_ for map_ in draws if not np.array_equal(map_, disparity))
+
+
+def _read(data: Path) -> Iterator[BenchScene]:
+    """The scenes of a folder that have a true map, with a few of their views, spread over all."""
+    for scene in find_scenes(data):
+        if any(known.is_truth for known in scene.disparity.values()):
+            (made,) = bench_scenes(scene, DEFAULT_MAX_PIXELS, with_soft=False)
+            trial = trials_of(scene, "auto", MOST_VIEWS)[0]
+            truth = {trial.offset(k): read_view(scene.views[k], DEFAULT_MAX_PIXELS) for k in trial.judged}
+            yield replace(made, truth=truth)
+
+
+def _mean_figures(switch: Switch, scenes: Sequence[Judged]) -> Figures:
+    figures = [measure(switch, scene, truth) for scene, truth in scenes]
+    mean = Figures(_mean(one.full_db for one in figures), _mean(one.hole_db for one in figures))
+    print(f"{switch.name}, {scenes[0][0].name}: {mean}", flush=True)
+    return mean
+
+
+def measure(switch: Switch, scene: BenchScene, truth: BenchScene) -> Figures:
+    """Means over the judged views of a scene. truth: the same with its exact map."""
+    with switch.applied():
+        made = evaluated_views(switch.variant, scene, None)
+    full, hole = [], []
+    for at, image in made.items():
+        full.append(bounded_psnr(image, truth.truth[at]))
+        unseen = reference_warp(truth.photo, truth.disparity, at).hole
+        hole.append(bounded_psnr(image, truth.truth[at], unseen))
+    return Figures(_mean(full), _mean(hole))
+
+
+def time_ratios(scene: BenchScene) -> dict[str, float]:
+    """By switch: processor time of a scene's whole field, against the default's."""
+
+    def cost(switch: Switch) -> Cost:
+        with switch.applied():
+            return field_cost(switch.variant, scene)
+
+    costs = in_turns({switch.name: partial(cost, switch) for switch in SWITCHES}, ROUNDS, ignore_progress)
+    return {name: median_ratio(own, costs[DEFAULT.name]) for name, own in costs.items()}
+
+
+def _mean(values: Iterable[float]) -> float:
+    """Of what is known; NaN of nothing."""
+    known = [value for value in values if not math.isnan(value)]
+    return float(np.mean(known)) if known else math.nan
+
+
+def _agreement_sentence(scenes: Sequence[BenchScene]) -> str:
+    """What sharing rays is for, and PSNR cannot tell."""
+    shared, own = (_mean(_disagreement(switch, scene) for scene in scenes) for switch in (DEFAULT, NOTHING_SHARED))
+    return (
+        "Sharing what was filled is there for views that agree, which PSNR does not see: on the drawn scenes with exact"
+        f" maps, what was filled differs between two views by {shared:.1f}/255 (rms); where every view fills its own"
+        f" holes, by {own:.1f}/255."
+    )
+
+
+def _disagreement(switch: Switch, scene: BenchScene) -> float:
+    quality, values = switch.variant.quality, refine(scene.photo, scene.disparity)
+    with switch.applied(), ViewMaker(scene.photo, values, scene.field, (quality,)) as maker:
+        return consistency(lambda at: maker.view(quality, at), scene.field, scene.photo, values).hole_rms
+
+
+if __name__ == "__main__":
+    main()
