@@ -10,18 +10,17 @@ from pathlib import Path
 
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
+from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_look import FreeLook, FreePicture
 from viewer.app.gamepad import Gamepad, actions_from_gamepad
-from viewer.app.input import (
+from viewer.app.keys import actions_from_keys, read_keys
+from viewer.app.pointer import (
     NO_POINTER,
     Pointer,
-    actions_from_drop,
     actions_from_hover,
-    actions_from_keys,
     actions_from_pointer,
     gesture_end,
     gesture_start,
-    read_keys,
     read_pointer,
 )
 from viewer.app.preferences_store import PREFERENCES_FILE, load_preferences, store_preferences

@@ -16,7 +16,7 @@ from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
-from viewer.app.input import actions_from_drop
+from viewer.app.dropped_files import actions_from_drop
 from viewer.app.main_loop import App, initial_state
 from viewer.background.loaded_photo import load_photo
 from viewer.model.actions import OpenPath, SetLoop, ToggleSection

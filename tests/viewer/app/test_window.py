@@ -14,8 +14,8 @@ from imgui_bundle import imgui
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
-from viewer.app.input import units_per_view
 from viewer.app.main_loop import App
+from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model.actions import SetDepthStrength

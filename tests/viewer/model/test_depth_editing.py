@@ -23,9 +23,11 @@ from iibr_core.types import GridShape, ImageSize, InputError
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
 from tests.viewer.model.test_history import after
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
+from viewer.app.dropped_files import actions_from_drop
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_map, settings_of
-from viewer.app.input import Keys, Pointer, actions_from_drop, actions_from_keys, actions_from_pointer
+from viewer.app.keys import Keys, actions_from_keys
+from viewer.app.pointer import Pointer, actions_from_pointer
 from viewer.background.loaded_photo import apply_depth_settings, load_photo, make_plan
 from viewer.background.scene_worker import SceneRequest, results_of
 from viewer.model.actions import AskToSave, EndGesture, OpenFailed, OpenPath, Redo, SceneOpened, Undo

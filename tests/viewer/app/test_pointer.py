@@ -1,4 +1,4 @@
-"""Mouse and keys as pure functions: what they ask for, and which way things move."""
+"""The mouse as pure functions: what they ask for, and which way things move."""
 
 from __future__ import annotations
 
@@ -6,28 +6,23 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.depth.choice import DepthChoice
 from iibr_core.types import GridShape, ViewOffset
-from viewer.app.input import (
+from viewer.app.pointer import (
     DRAG_ACROSS_GRID,
-    Keys,
     Pointer,
-    actions_from_drop,
     actions_from_hover,
-    actions_from_keys,
     actions_from_pointer,
     gesture_end,
     gesture_start,
     units_per_view,
 )
-from viewer.model.actions import EndGesture, OpenPath, ReturnHome, SetHover, ShowPrompt, Undo
-from viewer.model.commands import BY_NAME
+from viewer.model.actions import EndGesture, ReturnHome, SetHover
 from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
 from viewer.model.layout import Rect as R
 from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.history import History
-from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, Optics, ResetOptics, SetFocus
+from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, Optics, SetFocus
 from viewer.model.state.scene import Scene, Source
 from viewer.model.zoom import SetZoom, Zoom
 
@@ -138,17 +133,6 @@ def test_nothing_is_asked_for_without_a_scene_or_room() -> None:
     assert asked(pointer, layout=layout_of((200, 100), (600, 400))) == []
 
 
-def test_keys() -> None:
-    assert actions_from_keys(Keys(), STATE) == []
-    reset = "Reset viewpoint, focus and aperture"
-    assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [ResetOptics(), Undo()]
-    assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [ShowPrompt(None)]
-    assert reset in BY_NAME
-    (move,) = actions_from_keys(Keys(arrows=ViewOffset(1, -1)), STATE)
-    assert isinstance(move, MoveEye)
-    assert move.eye.t > 0 > move.eye.s
-
-
 WITH_HANDLES = replace(STATE, tilt_handles=TiltHandles())
 HANDLES = handle_points(TiltHandles(), PICTURE)
 
@@ -203,25 +187,6 @@ def test_presses_and_releases_part_the_edits() -> None:
     assert gesture_start(pressed, STATE) == gesture_start(released, under_way) == []
     assert gesture_end(released) == [EndGesture()]
     assert gesture_end(pressed) == []
-
-
-@pytest.mark.parametrize(
-    ("paths", "opened", "disparity"),
-    [
-        (["a.jpg"], "a.jpg", None),
-        (["a.jpg", "b.jpg"], "a.jpg", None),
-        (["a.PFM", "b.jpg"], "b.jpg", "a.PFM"),
-        (["better.npy"], "photo.png", "better.npy"),
-    ],
-)
-def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:
-    (action,) = actions_from_drop(paths, STATE)
-    assert action == OpenPath(Source(opened, DepthChoice(file=disparity), max_pixels=7))
-
-
-def test_a_map_dropped_on_nothing_is_tried_as_a_photo() -> None:
-    assert actions_from_drop(["a.pfm"], AppState()) == [OpenPath(Source("a.pfm"))]
-    assert actions_from_drop([], AppState()) == []
 
 
 @pytest.mark.parametrize("window", [(1280, 800), (500, 900), (2000, 400)])

@@ -1,35 +1,22 @@
-"""Mouse, keys and dropped files -> actions. Reading ImGui's input is one function; judging it another, a pure one."""
+"""The mouse -> actions. Reading ImGui's input is one function; judging it another, a pure one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import PurePath
 
 from iibr_core.types import ViewOffset
-from viewer.model.actions import (
-    Action,
-    DoTask,
-    EndGesture,
-    OpenPath,
-    ReturnHome,
-    SetFullscreen,
-    SetHover,
-    ShowBefore,
-    ShowPrompt,
-)
-from viewer.model.commands import BY_NAME, COMMANDS, Chord
+from viewer.model.actions import Action, EndGesture, ReturnHome, SetHover
 from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, Rect, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.lens.limits import focus_limits
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.depth_editing import DepthSample, DropStroke, Paint, PickDepth, SetBrush
-from viewer.model.state.inspection import MoveDivider, ShowGrid
-from viewer.model.state.optics import CENTRE, FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
-from viewer.model.state.scene import Scene, Source, source_beside, source_with_map
-from viewer.model.state.tasks import ReadTruthTask
+from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush
+from viewer.model.state.inspection import MoveDivider
+from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
+from viewer.model.state.scene import Scene
 from viewer.model.zoom import SetZoom
 
 DRAG_THRESHOLD = 4.0
@@ -44,14 +31,11 @@ FOCUS_STEPS = 40
 BRUSH_NOTCH = 1.15
 """A notch of the wheel makes the brush so many times as large."""
 
-ARROW_STEP_VIEWS = 0.5
 HANDLE_REACH = 14.0
 """A press this close to a tilt handle (window units at usual size) takes it."""
 
 DIVIDER_REACH = 8.0
 """A press this close to the divider takes it."""
-
-DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
 
 
 @dataclass(frozen=True)
@@ -84,15 +68,6 @@ class Pointer:
 
 
 NO_POINTER = Pointer()
-
-
-@dataclass(frozen=True)
-class Keys:
-    """The keys of this frame that mean something: arrows as a view offset, Esc, and commands by name."""
-
-    arrows: ViewOffset = CENTRE
-    is_escape: bool = False
-    commands: tuple[str, ...] = ()
 
 
 Pick = Callable[[float, float], float | None]
@@ -156,53 +131,6 @@ def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: 
         x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
         hover = Hover(x_px, y_px, pick(x_px, y_px))
     return [SetHover(hover)] if hover != state.hover else []
-
-
-def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
-    """What the keys ask for. Esc closes what is open in the window first."""
-    actions: list[Action] = []
-    if keys.is_escape:
-        actions += _escape_actions(state)
-    actions += [BY_NAME[name].action(state) for name in keys.commands]
-    if any(keys.arrows):
-        eye = state.optics.eye
-        step = ARROW_STEP_VIEWS
-        actions.append(MoveEye(ViewOffset(eye.t + step * keys.arrows.t, eye.s + step * keys.arrows.s)))
-    return actions
-
-
-def _escape_actions(state: AppState) -> list[Action]:
-    """What Esc closes, one at a time: a prompt, a stroke, the sheet of views, the brush. It never quits."""
-    if state.prompt is not None:
-        return [ShowPrompt(None)]
-    if state.stroke is not None:
-        return [DropStroke()]
-    if state.inspection.shows_grid:
-        return [ShowGrid(False)]
-    if is_marking_gloss(state):
-        return [SetGlossBrush(replace(state.gloss_brush, is_on=False))]
-    if state.shows_before:
-        return [ShowBefore(False)]
-    if state.is_fullscreen and not state.brush.is_on:
-        return [SetFullscreen(False)]
-    return [SetBrush(replace(state.brush, is_on=False))] if state.brush.is_on else []
-
-
-def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bool = False) -> list[Action]:
-    """Open the dropped photo, with a disparity map dropped along; a map alone is for the photo that is open.
-
-    is_ground_truth: it was dropped where ground truth is.
-    """
-    if is_ground_truth and state.scene is not None:
-        return [DoTask(ReadTruthTask(paths[0]))]
-    maps = [path for path in paths if PurePath(path).suffix.lower() in DISPARITY_SUFFIXES]
-    others = [path for path in paths if path not in maps]
-    if others:
-        source = source_beside(state.source, others[0])
-        return [OpenPath(source_with_map(source, maps[0]) if maps else source)]
-    if maps and state.source:
-        return [OpenPath(source_with_map(state.source, maps[0]))]
-    return [OpenPath(Source(path)) for path in maps[:1]]
 
 
 def is_brushing(state: AppState) -> bool:
@@ -382,31 +310,3 @@ def read_pointer(before: Pointer = NO_POINTER) -> Pointer:
         pulls=pulls,
         used_space=(pulls_left or before.used_space) and (holds_space or imgui.is_key_released(imgui.Key.space)),
     )
-
-
-def read_keys(used_space: bool = False) -> Keys:
-    """The keys of this ImGui frame; none while a text field has them. used_space: the mouse was dragged with Space
-    held: no more comes of it. That is known only when Space is let go.
-    """
-    from imgui_bundle import imgui
-
-    io = imgui.get_io()
-    if io.want_text_input:
-        return Keys()
-
-    def pressed(key: imgui.Key) -> bool:
-        return imgui.is_key_pressed(key)
-
-    def is_struck(chord: Chord) -> bool:
-        holds = bool(io.key_ctrl or io.key_super) == chord.ctrl and bool(io.key_shift) == chord.shift
-        if chord.key == "space":
-            return holds and imgui.is_key_released(imgui.Key.space) and not used_space
-        return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key))
-
-    down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
-    right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
-    commands = tuple(command.name for command in COMMANDS if any(map(is_struck, command.chords)))
-    # A drop-down that is open takes Esc for itself.
-    is_menu_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
-    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False)) and not is_menu_open
-    return Keys(ViewOffset(float(down), float(right)), is_escape, commands)

@@ -1,0 +1,34 @@
+"""What files dropped on the window ask for."""
+
+from __future__ import annotations
+
+import pytest
+
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.types import GridShape
+from viewer.app.dropped_files import actions_from_drop
+from viewer.model.actions import OpenPath
+from viewer.model.state.app_state import AppState
+from viewer.model.state.scene import Scene, Source
+
+SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
+STATE = AppState(source=SCENE.source, scene=SCENE)
+
+
+@pytest.mark.parametrize(
+    ("paths", "opened", "disparity"),
+    [
+        (["a.jpg"], "a.jpg", None),
+        (["a.jpg", "b.jpg"], "a.jpg", None),
+        (["a.PFM", "b.jpg"], "b.jpg", "a.PFM"),
+        (["better.npy"], "photo.png", "better.npy"),
+    ],
+)
+def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:
+    (action,) = actions_from_drop(paths, STATE)
+    assert action == OpenPath(Source(opened, DepthChoice(file=disparity), max_pixels=7))
+
+
+def test_a_map_dropped_on_nothing_is_tried_as_a_photo() -> None:
+    assert actions_from_drop(["a.pfm"], AppState()) == [OpenPath(Source("a.pfm"))]
+    assert actions_from_drop([], AppState()) == []

@@ -1,0 +1,30 @@
+"""Files dropped on the window -> actions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+
+from viewer.model.actions import Action, DoTask, OpenPath
+from viewer.model.state.app_state import AppState
+from viewer.model.state.scene import Source, source_beside, source_with_map
+from viewer.model.state.tasks import ReadTruthTask
+
+DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
+
+
+def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bool = False) -> list[Action]:
+    """Open the dropped photo, with a disparity map dropped along; a map alone is for the photo that is open.
+
+    is_ground_truth: it was dropped where ground truth is.
+    """
+    if is_ground_truth and state.scene is not None:
+        return [DoTask(ReadTruthTask(paths[0]))]
+    maps = [path for path in paths if PurePath(path).suffix.lower() in DISPARITY_SUFFIXES]
+    others = [path for path in paths if path not in maps]
+    if others:
+        source = source_beside(state.source, others[0])
+        return [OpenPath(source_with_map(source, maps[0]) if maps else source)]
+    if maps and state.source:
+        return [OpenPath(source_with_map(state.source, maps[0]))]
+    return [OpenPath(Source(path)) for path in maps[:1]]

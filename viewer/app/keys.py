@@ -1,0 +1,83 @@
+"""Keys -> actions. Reading ImGui's input is one function; judging it another, a pure one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from iibr_core.types import ViewOffset
+from viewer.app.pointer import is_marking_gloss
+from viewer.model.actions import Action, SetFullscreen, ShowBefore, ShowPrompt
+from viewer.model.commands import BY_NAME, COMMANDS, Chord
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_editing import DropStroke, SetBrush
+from viewer.model.state.inspection import ShowGrid
+from viewer.model.state.optics import CENTRE, MoveEye, SetGlossBrush
+
+ARROW_STEP_VIEWS = 0.5
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The keys of this frame that mean something: arrows as a view offset, Esc, and commands by name."""
+
+    arrows: ViewOffset = CENTRE
+    is_escape: bool = False
+    commands: tuple[str, ...] = ()
+
+
+def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
+    """What the keys ask for. Esc closes what is open in the window first."""
+    actions: list[Action] = []
+    if keys.is_escape:
+        actions += _escape_actions(state)
+    actions += [BY_NAME[name].action(state) for name in keys.commands]
+    if any(keys.arrows):
+        eye = state.optics.eye
+        step = ARROW_STEP_VIEWS
+        actions.append(MoveEye(ViewOffset(eye.t + step * keys.arrows.t, eye.s + step * keys.arrows.s)))
+    return actions
+
+
+def _escape_actions(state: AppState) -> list[Action]:
+    """What Esc closes, one at a time: a prompt, a stroke, the sheet of views, the brush. It never quits."""
+    if state.prompt is not None:
+        return [ShowPrompt(None)]
+    if state.stroke is not None:
+        return [DropStroke()]
+    if state.inspection.shows_grid:
+        return [ShowGrid(False)]
+    if is_marking_gloss(state):
+        return [SetGlossBrush(replace(state.gloss_brush, is_on=False))]
+    if state.shows_before:
+        return [ShowBefore(False)]
+    if state.is_fullscreen and not state.brush.is_on:
+        return [SetFullscreen(False)]
+    return [SetBrush(replace(state.brush, is_on=False))] if state.brush.is_on else []
+
+
+def read_keys(used_space: bool = False) -> Keys:
+    """The keys of this ImGui frame; none while a text field has them. used_space: the mouse was dragged with Space
+    held: no more comes of it. That is known only when Space is let go.
+    """
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    if io.want_text_input:
+        return Keys()
+
+    def pressed(key: imgui.Key) -> bool:
+        return imgui.is_key_pressed(key)
+
+    def is_struck(chord: Chord) -> bool:
+        holds = bool(io.key_ctrl or io.key_super) == chord.ctrl and bool(io.key_shift) == chord.shift
+        if chord.key == "space":
+            return holds and imgui.is_key_released(imgui.Key.space) and not used_space
+        return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key))
+
+    down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
+    right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
+    commands = tuple(command.name for command in COMMANDS if any(map(is_struck, command.chords)))
+    # A drop-down that is open takes Esc for itself.
+    is_menu_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False)) and not is_menu_open
+    return Keys(ViewOffset(float(down), float(right)), is_escape, commands)
