@@ -53,7 +53,7 @@ RAYS = 256
 """Of a pixel of the truth, each through a place of its own in the lens and in the pixel."""
 PHOTO_SAMPLES = 5
 BLUR_SIGMA_PX, EDGE_PX, PATCH_SIGMA_PX, NOISE_PX, GRAIN_PX = 2.0, 5, 8.0, 0.1, 1.0
-TRUE, BLURRED, EDGES, NOISY = "true", "blurred", "edges moved", "noisy"
+TRUE, BLURRED, REFINED, EDGES, NOISY = "true", "blurred", "blurred, refined", "edges moved", "noisy"
 SHARP, OURS, SCATTER, GATHER = "photo as it is", "ours", "scatter blur", "gather blur"
 METHODS = (OURS, SCATTER, GATHER)
 ALL = (SHARP, *METHODS)
@@ -86,13 +86,12 @@ class Shot:
 
 @dataclass(frozen=True)
 class Figures:
-    """Of one picture, made with a map, refined or not. before_s: what its field took, before any lens, drawing_s the
-    picture itself; processor seconds.
+    """Of one picture, made with a map. before_s: what its field took, before any lens, drawing_s the picture itself;
+    processor seconds.
     """
 
     method: str
     map: str
-    is_refined: bool
     radius: float
     focus: int
     db: float
@@ -125,14 +124,15 @@ def draw_shot(seed: int, size: ImageSize, rays: int) -> Shot:
     """The scene of a seed. rays: of a pixel, see `trace_lens`."""
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, size, LARGEST_DISPARITY_PX)
-    photo, disparity = render(scene, size, ViewOffset(0, 0), PHOTO_SAMPLES)
+    pixels, disparity = render(scene, size, ViewOffset(0, 0), PHOTO_SAMPLES)
+    photo = quantise_as_stored(pixels)
     exposures = []
     for radius, focus in product(RADII_VIEWS, FOCUS_PERCENTILES):
         lens = ThinLens(float(np.percentile(disparity, focus)), radius)
         margin = math.ceil(float(circle_radius(disparity, lens).max()))
         inside = slice(margin, size.height - margin), slice(margin, size.width - margin)
         exposures.append(Exposure(lens, focus, trace_lens(scene, size, lens, rays), inside))
-    return Shot(quantise_as_stored(photo), wrong_maps(disparity, rng), tuple(exposures))
+    return Shot(photo, maps_of(photo, disparity, rng), tuple(exposures))
 
 
 def trace_lens(scene: RaycastScene, size: ImageSize, lens: ThinLens, rays: int, seed: int = 0) -> FloatImage:
@@ -154,17 +154,20 @@ def trace_lens(scene: RaycastScene, size: ImageSize, lens: ThinLens, rays: int, 
     return srgb_from_linear(light / rays).reshape(*size, 3)
 
 
-def wrong_maps(disparity: FloatImage, rng: np.random.Generator) -> dict[str, FloatImage]:
-    """The true map and three wrong ones, (H, W). Edges moved: what is near grows in some places and shrinks in others,
-    by half EDGE_PX.
+def maps_of(photo: FloatImage, disparity: FloatImage, rng: np.random.Generator) -> dict[str, FloatImage]:
+    """The true map, three wrong ones, and the blurred one drawn to the photo's edges, (H, W).
+
+    Edges moved: what is near grows in some places and shrinks in others, by half EDGE_PX.
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
     patches = faults.blur(rng.standard_normal(disparity.shape).astype(np.float32), PATCH_SIGMA_PX)
     grown, shrunk = maximum_filter(disparity, EDGE_PX), minimum_filter(disparity, EDGE_PX)
+    blurred = faults.blur(disparity, BLUR_SIGMA_PX)
     return {
         TRUE: disparity,
-        BLURRED: faults.blur(disparity, BLUR_SIGMA_PX),
+        BLURRED: blurred,
+        REFINED: refine(photo, blurred),
         EDGES: np.where(patches > 0, grown, shrunk),
         NOISY: faults.add_noise(disparity, rng, NOISE_PX, GRAIN_PX),
     }
@@ -195,31 +198,23 @@ class LensCamera:
 
 
 def judge(camera: LensCamera, shot: Shot) -> Iterator[Figures]:
-    """Every method with every map, as given and refined, at every exposure; the photo itself once."""
+    """Every method with every map at every exposure; the photo itself once."""
     for exposure in shot.exposures:
-        yield _figures(SHARP, TRUE, False, exposure, shot.photo, 0.0, 0.0)
-    for name, given in shot.maps.items():
-        for is_refined in (False, True):
-            disparity, refining_s = _timed(partial(refine, shot.photo, given)) if is_refined else (given, 0.0)
-            _, field_s = _timed(partial(camera.open, shot.photo, disparity))
-            before_s = {OURS: field_s, SCATTER: 0.0, GATHER: 0.0}
-            for exposure, method in product(shot.exposures, METHODS):
-                picture, drawing_s = _timed(partial(_picture, method, camera, shot.photo, disparity, exposure.lens))
-                yield _figures(method, name, is_refined, exposure, picture, refining_s + before_s[method], drawing_s)
+        yield _figures(SHARP, TRUE, exposure, shot.photo, 0.0, 0.0)
+    for name, disparity in shot.maps.items():
+        _, field_s = _timed(partial(camera.open, shot.photo, disparity))
+        before_s = {OURS: field_s, SCATTER: 0.0, GATHER: 0.0}
+        for exposure, method in product(shot.exposures, METHODS):
+            picture, drawing_s = _timed(partial(_picture, method, camera, shot.photo, disparity, exposure.lens))
+            yield _figures(method, name, exposure, picture, before_s[method], drawing_s)
 
 
 def _figures(
-    method: str,
-    name: str,
-    is_refined: bool,
-    exposure: Exposure,
-    picture: FloatImage,
-    before_s: float,
-    drawing_s: float,
+    method: str, name: str, exposure: Exposure, picture: FloatImage, before_s: float, drawing_s: float
 ) -> Figures:
     made, truth = picture[exposure.inside], exposure.truth[exposure.inside]
     errors = bounded_psnr(made, truth), ssim(made, truth), flip(made, truth)
-    return Figures(method, name, is_refined, exposure.lens.radius_views, exposure.focus, *errors, before_s, drawing_s)
+    return Figures(method, name, exposure.lens.radius_views, exposure.focus, *errors, before_s, drawing_s)
 
 
 def _picture(method: str, camera: LensCamera, photo: FloatImage, disparity: FloatImage, lens: ThinLens) -> FloatImage:
@@ -244,9 +239,9 @@ def report_parts(figures: Sequence[Figures], scenes: int) -> Iterator[str]:
         f" {RAYS} rays of a pixel traced through the lens; scenes are matt. Ours: a field of {GRID.rows}x{GRID.columns}"
         f" views in quality *{QUALITY}*, drawn by software GL until nothing changes. *Blurred*: sigma"
         f" {BLUR_SIGMA_PX:g} px; *edges moved*: by {EDGE_PX // 2} px, in some places out, in others in; *noisy*: sigma"
-        f" {NOISE_PX:g} px per view step. *refined*: the map drawn to the photo's edges first, for all methods. Judged"
+        f" {NOISE_PX:g} px per view step. *refined*: drawn to the photo's edges first. Judged"
         " inside the frame, where no circle of confusion reaches from outside. Means over scenes and lenses; seconds"
-        " are medians of processor time: *before* once for a photo (refining, the field), then for each picture."
+        " are medians of processor time: *before* once for a photo (the field), then for each picture."
     )
     yield (
         "The published figures of DeepLens, DeepFocus, BokehMe and Dr.Bokeh are of other sets, so none of them stand"
@@ -254,7 +249,7 @@ def report_parts(figures: Sequence[Figures], scenes: int) -> Iterator[str]:
     )
     yield "## Maps"
     yield markdown(("map", "method", *QUALITY_HEAD, "s before", "s a picture"), _rows_of_maps(figures))
-    exact = [each for each in figures if each.map == TRUE and not each.is_refined]
+    exact = [each for each in figures if each.map == TRUE]
     yield "## Apertures and foci: PSNR in dB with the true map"
     by_radius = {f"radius {radius:g}": [f for f in exact if f.radius == radius] for radius in RADII_VIEWS}
     by_focus = {f"focus {focus} %": [f for f in exact if f.focus == focus] for focus in FOCUS_PERCENTILES}
@@ -276,8 +271,8 @@ def of(method: str, figures: Iterable[Figures]) -> list[Figures]:
 
 
 def _rows_of_maps(figures: Sequence[Figures]) -> Iterator[tuple[str, ...]]:
-    for name, is_refined, method in product((TRUE, BLURRED, EDGES, NOISY), (False, True), ALL):
-        found = [each for each in of(method, figures) if each.map == name and each.is_refined == is_refined]
+    for name, method in product((TRUE, BLURRED, REFINED, EDGES, NOISY), ALL):
+        found = [each for each in of(method, figures) if each.map == name]
         if found:
             errors = (
                 _mean((each.db for each in found), 2),
@@ -288,7 +283,7 @@ def _rows_of_maps(figures: Sequence[Figures]) -> Iterator[tuple[str, ...]]:
                 f"{np.median([each.before_s for each in found]):.3f}",
                 f"{np.median([each.drawing_s for each in found]):.3f}",
             )
-            yield name + ", refined" * is_refined, method, *errors, *times
+            yield name, method, *errors, *times
 
 
 def _mean(values: Iterable[float], places: int) -> str:

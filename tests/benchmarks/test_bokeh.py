@@ -9,17 +9,7 @@ from math import hypot
 import numpy as np
 import pytest
 
-from benchmarks.tables.bokeh import (
-    OURS,
-    SHARP,
-    TRUE,
-    LensCamera,
-    draw_shot,
-    judge,
-    report_parts,
-    trace_lens,
-    wrong_maps,
-)
+from benchmarks.tables.bokeh import OURS, SHARP, TRUE, LensCamera, draw_shot, judge, maps_of, report_parts, trace_lens
 from benchmarks.tables.lens_blurs import circle_radius, gather, scatter
 from benchmarks.thin_lens import ThinLens
 from iibr_core.evaluation.metrics import psnr
@@ -112,8 +102,8 @@ def test_a_pinhole_sees_the_photo() -> None:
 
 
 def test_wrong_maps_are_wrong_and_keep_the_true_one() -> None:
-    _, disparity = render(random_scene(np.random.default_rng(SEED), SMALL, 2.0), SMALL, ViewOffset(0, 0))
-    maps = wrong_maps(disparity, np.random.default_rng(0))
+    photo, disparity = render(random_scene(np.random.default_rng(SEED), SMALL, 2.0), SMALL, ViewOffset(0, 0))
+    maps = maps_of(photo, disparity, np.random.default_rng(0))
     np.testing.assert_array_equal(maps.pop(TRUE), disparity)
     for wrong in maps.values():
         assert wrong.shape == disparity.shape
@@ -124,7 +114,7 @@ def test_a_small_report_has_a_row_for_every_method(gl: GLContext) -> None:
     shot = draw_shot(SEED, SMALL, rays=64)
     shot = replace(shot, maps={TRUE: shot.maps[TRUE]}, exposures=shot.exposures[-1:])
     figures = list(judge(LensCamera(gl), shot))
-    by_method = {each.method: each.db for each in figures if not each.is_refined}
+    by_method = {each.method: each.db for each in figures}
     assert by_method[OURS] > by_method[SHARP]
     text = "\n".join(report_parts(figures, 1))
     for method, decibels in by_method.items():
