@@ -26,8 +26,9 @@ WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
 EGL_DRAW, EGL_READ = 0x3059, 0x305A
 SMALL_WINDOW = 0, 0, 720, 800
-"""x, y, width, height: high enough for the panel; a small picture, because each test waits for it to converge."""
-
+"""x, y, width, height: high enough for most of the panel; a small picture, because each test waits for it to converge."""
+SCROLL_DOWN = 5
+"""The button that the X server takes for a turn of the wheel."""
 DEADLINE_S = 120.0
 """For a condition that always comes true; generous, because the first run compiles the core."""
 
@@ -116,20 +117,26 @@ class Driver:
         return round(picture.x + x_share * picture.width), round(picture.y + y_share * picture.height)
 
     def find(self, widget: str, window: str = "panel") -> tuple[int, int]:
-        """Move the pointer down a window until it is over the widget of this ImGui name, and say where that is."""
+        """Move the pointer down a window until it is over the widget of this ImGui name, and say where that is; where
+        nothing is found, scroll on.
+        """
         from imgui_bundle import imgui
 
         self.until(lambda app: imgui.internal.find_window_by_name(window) is not None)
         frame = imgui.internal.find_window_by_name(window)
         wanted = frame.get_id(widget)
-        for share in (0.7, 0.33, 0.5, 0.12, 0.9):
-            x = round(frame.pos.x + share * frame.size.x)
-            for y in range(round(frame.pos.y) + 8, round(frame.pos.y + frame.size.y), 8):
-                self.send("mousemove", x, y)
-                self.until(lambda app, y=y: imgui.get_io().mouse_pos.y == y)  # type: ignore[misc]
-                if imgui.get_current_context().hovered_id == wanted:
-                    return x, y
-        raise AssertionError(f"no {widget} in {window}")
+        while True:
+            for share in (0.7, 0.33, 0.5, 0.12, 0.9):
+                x = round(frame.pos.x + share * frame.size.x)
+                for y in range(round(frame.pos.y) + 8, round(frame.pos.y + frame.size.y), 8):
+                    self.send("mousemove", x, y)
+                    self.until(lambda app, y=y: imgui.get_io().mouse_pos.y == y)  # type: ignore[misc]
+                    if imgui.get_current_context().hovered_id == wanted:
+                        return x, y
+            before = frame.scroll.y
+            assert before < frame.scroll_max.y, f"no {widget} in {window}"
+            self.send("click", "--repeat", 5, SCROLL_DOWN)
+            self.until(lambda app: frame.scroll.y > before)
 
     def press(self, widget: str, window: str = "panel") -> None:
         """Click a widget."""
