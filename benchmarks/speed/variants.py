@@ -100,7 +100,7 @@ def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> l
     reach = max(round(max(abs(part) for part in at)) for at in offsets.values())
     field = tuple(ViewOffset(float(t), float(s)) for t in range(-reach, reach + 1) for s in range(-reach, reach + 1))
     judged = _evenly_spaced(trial)
-    truth = {offsets[k]: read_view(scene.views[k], max_pixels)[0] for k in judged}
+    truth = {offsets[k]: read_view(scene.views[k], max_pixels) for k in judged}
     own = BenchScene(scene.name, given.photo, given.maps[0].values, truth, field)
     return [own, soften(own)] if with_soft else [own]
 

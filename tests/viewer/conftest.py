@@ -26,7 +26,7 @@ WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
 EGL_DRAW, EGL_READ = 0x3059, 0x305A
 SMALL_WINDOW = 0, 0, 720, 800
-"""x, y, width, height: high enough for most of the panel; a small picture, because each test waits for it to converge."""
+"""x, y, width, height: high enough for most of the panel; a small picture, as each test waits for it to converge."""
 SCROLL_DOWN = 5
 """The button that the X server takes for a turn of the wheel."""
 DEADLINE_S = 120.0
@@ -136,7 +136,7 @@ class Driver:
             before = frame.scroll.y
             assert before < frame.scroll_max.y, f"no {widget} in {window}"
             self.send("click", "--repeat", 5, SCROLL_DOWN)
-            self.until(lambda app: frame.scroll.y > before)
+            self.until(lambda app, before=before: frame.scroll.y > before)  # type: ignore[misc]
 
     def press(self, widget: str, window: str = "panel") -> None:
         """Click a widget."""
