@@ -148,9 +148,9 @@ def test_a_home_that_is_none_leaves_nothing_in_the_working_folder(tmp_path: Path
 def test_what_nobody_expected_is_one_line_and_tells_more_when_asked(failure: str) -> None:
     code = f"""
 import sys
-import viewer.cli.plan
-def plan(**_): raise {failure}
-viewer.cli.plan.plan.__code__ = plan.__code__
+import viewer.background.loaded_photo
+def load_photo(*_): raise {failure}
+viewer.background.loaded_photo.load_photo = load_photo
 sys.argv = ["iibr", "plan", "photo.png"]
 from viewer.entry import main
 main()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
 from viewer.model.actions import Action, Notify, SetDepthStrength, SetFontScale, SetTheme, ShowPrompt, ShowTiltHandles
@@ -23,6 +24,7 @@ from viewer.model.state.optics import (
     SetApertureShape,
     SetDolly,
     SetFocusRange,
+    SetGloss,
     SetHighlightRecovery,
     SetTilt,
 )
@@ -161,6 +163,7 @@ DRAWS = (
     SetApertureShape(ApertureShape("polygon", blades=5)),
     SetHighlightRecovery(0.5),
     MoveEye(ViewOffset(0.5, 0.5)),
+    SetGloss(Gloss()),
     ApplyPreset("portrait"),
 )
 ONLY_PANELS = (
@@ -220,4 +223,5 @@ def test_optics_name_every_field_that_an_edit_can_change() -> None:
         "aperture_shape",
         "highlight_recovery",
         "exposure_stops",
+        "gloss",
     }
