@@ -5,8 +5,6 @@ renderer decides.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 import moderngl
@@ -15,7 +13,8 @@ import numpy as np
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
-from viewer.gpu.refocus.lens import WHOLE, WHOLE_PICTURE, Lens, PictureCell
+from viewer.gpu.refocus.lens import WHOLE_PICTURE, Lens, PictureCell
+from viewer.gpu.refocus.picture_cells import cells_between_views, covering_pixels, pixels_of
 from viewer.gpu.refocus.view_sampling import (
     MAX_SOURCES,
     ApertureSample,
@@ -74,13 +73,13 @@ class Passes:
         kinds = ("FLAT", "EDGES") if self.adaptive and field.has_disparity.any() else ("",)
         target = targets.sum_of(lens.keeps_layers)
         size_px = target.framebuffer.size
-        for cell in _cells(field, lens):
+        for cell in cells_between_views(field.grid, lens):
             drawn = lens.part.in_target(cell).within(rows)
             if drawn is None:
                 continue
             if "FLAT" in kinds:
                 self._find_march_intervals(field, lens, cell, drawn, targets)
-            target.framebuffer.scissor = _pixels_of(drawn, *size_px)
+            target.framebuffer.scissor = pixels_of(drawn, *size_px)
             target.add(keeps)
             for kind in kinds:
                 self._draw_pinhole_tiles(field, lens, cell, drawn, within_px, targets, kind)
@@ -133,7 +132,7 @@ class Passes:
         width, height = targets.size_px
         program.set_uniforms(pixel_uv=(lens.part.width / width, lens.part.height / height))
         target = targets.spans
-        target.framebuffer.scissor = _covering_pixels(drawn, *target.framebuffer.size)
+        target.framebuffer.scissor = covering_pixels(drawn, *target.framebuffer.size)
         self._ctx.disable(moderngl.BLEND)
         target.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
@@ -198,7 +197,7 @@ class Passes:
             _set_declared(
                 program, tiles=UNITS["tiles"], sparse_count=sparse_count, sparse_up_to_px=lens.sparse_up_to_px
             )
-        target.framebuffer.scissor = _pixels_of(rows, *target.framebuffer.size)
+        target.framebuffer.scissor = pixels_of(rows, *target.framebuffer.size)
         target.add(keeps)
         quad.render(moderngl.TRIANGLES, vertices=3)
         target.framebuffer.scissor = 0, 0, *target.framebuffer.size
@@ -388,36 +387,3 @@ def _search_steps(field: LightFieldTexture, lens: Lens, view: ViewOffset, cell: 
     distance = max(math.hypot(view.s - ray.s, view.t - ray.t) for ray in rays)
     parallax_px = distance * (field.range_px[1] - field.range_px[0])
     return min(max(math.ceil(parallax_px), 2), MAX_SEARCH_STEPS)
-
-
-def _cells(field: LightFieldTexture, lens: Lens) -> Iterator[PictureCell]:
-    """Parts of the picture whose rays cross one cell of the grid each; the whole picture without dolly."""
-    if not lens.has_dolly:
-        yield WHOLE
-        return
-    first, last = field.grid.offset(0, 0), field.grid.offset(field.grid.rows - 1, field.grid.columns - 1)
-    across = _crossings(lens.eye.s, lens.dolly[0], first.s, last.s)
-    down = _crossings(lens.eye.t, lens.dolly[1], first.t, last.t)
-    for top, bottom in pairwise(down):
-        for left, right in pairwise(across):
-            yield PictureCell(left, top, right, bottom)
-
-
-def _pixels_of(cell: PictureCell, width: int, height: int) -> tuple[int, int, int, int]:
-    """Scissor: (x, y, width, height) of the pixels whose cell this is."""
-    left, top = round(cell.left * width), round(cell.top * height)
-    return left, top, round(cell.right * width) - left, round(cell.bottom * height) - top
-
-
-def _covering_pixels(cell: PictureCell, width: int, height: int) -> tuple[int, int, int, int]:
-    """Scissor: (x, y, width, height) of all pixels (here: tiles) that the cell and its border pixels lie in."""
-    left, top = max(math.ceil(cell.left * width) - 1, 0), max(math.ceil(cell.top * height) - 1, 0)
-    right, bottom = min(math.floor(cell.right * width) + 1, width), min(math.floor(cell.bottom * height) + 1, height)
-    return left, top, right - left, bottom - top
-
-
-def _crossings(eye: float, dolly: float, first: float, last: float) -> list[float]:
-    """Texture coordinates along one axis where the ray passes a row or column of views, and the borders."""
-    lines = np.arange(first, last + 1)
-    places = 0.5 + (lines - eye) / dolly
-    return [0.0, *sorted(places[(places > 0) & (places < 1)].tolist()), 1.0]
