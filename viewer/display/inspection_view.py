@@ -43,6 +43,8 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.scene import Scene
 
 INPAINTED_RGB = (255, 184, 60)
+ROUNDING = 1
+"""Of 255: by so much one picture differs that was summed up in other steps."""
 
 
 @dataclass(frozen=True)
@@ -281,10 +283,10 @@ class InspectionView:
         return {"difference": self._once("difference", (record, drawn), lambda: self._show_difference(kept))}
 
     def _show_difference(self, kept: NDArray[np.uint8]) -> int:
-        """Black where nothing differs; amplified, for what differs little is what one looks for."""
-        now = self._scene_view.renderer.read_image().astype(np.int16)
-        difference = np.minimum(np.abs(now - kept) * DIFFERENCE_GAIN, 255).astype(np.uint8)
-        return self._passes.show("difference", difference)
+        """Black where nothing differs but by rounding; amplified, for what differs little is what one looks for."""
+        difference = np.abs(self._scene_view.renderer.read_image().astype(np.int16) - kept)
+        difference[difference <= ROUNDING] = 0
+        return self._passes.show("difference", np.minimum(difference * DIFFERENCE_GAIN, 255).astype(np.uint8))
 
     def _probe_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
         seen = None

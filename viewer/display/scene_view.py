@@ -73,7 +73,6 @@ class SceneView:
         self._disparities: dict[ViewOffset, FloatImage] = {}
         self._drawn: Picture | None = None
         self._drawn_at = 0.0
-        self._passes_shown = 0
         self._unprepared = list(USUAL_NEXT)
         self._view_came_at = 0.0
 
@@ -209,18 +208,18 @@ class SceneView:
         )
         budget_s = self._gl.frame_budget_s
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
-            # A picture that only new views change is seen on: it must not become softer.
             is_still = self._differs_by_views_only(wanted)
-            passes, budget_s = (self._passes_shown, STILL_BUDGET_S) if is_still else (0, budget_s)
-            self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, passes, window_of(part))
+            if is_still and self.renderer.passes_shown:  # it is seen on, and must not become softer
+                self.renderer.renew(wanted.optics, wanted.size_px, window_of(part))
+            else:
+                budget_s = STILL_BUDGET_S if is_still else budget_s
+                self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, window_of(part))
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
             self._drawn = replace(wanted, samples=self.report.samples)
-            self._passes_shown = self.renderer.passes_drawn
-        elif self._is_same(wanted) and not self.renderer.is_converged and self._refines():
+        elif self.renderer.is_renewing or (self._is_same(wanted) and self._refines()):
             self.renderer.refine(budget_s)
-            self._drawn = replace(wanted, samples=self._drawn.samples + 1)
-            self._passes_shown = self.renderer.passes_drawn
+            self._drawn = replace(self._drawn, samples=self._drawn.samples + 1)
         if self._unprepared and self._is_same(wanted) and self._drawn_at < time.perf_counter() - PREPARED_AFTER_S:
             self.renderer.prepare(self._unprepared.pop())
         return self._drawn
@@ -283,8 +282,9 @@ class SceneView:
             self._disparities[scene.grid.offset(view.row, view.column)] = view.disparity
 
     def _can_wait(self, wanted: Picture) -> bool:
-        """Whether only views are new, and the picture is too."""
-        return time.perf_counter() - self._drawn_at < VIEW_REFRESH_S and self._differs_by_views_only(wanted)
+        """Whether only views are new, and the picture is too, or not yet all of it."""
+        is_new = self.renderer.is_renewing or time.perf_counter() - self._drawn_at < VIEW_REFRESH_S
+        return is_new and self._differs_by_views_only(wanted)
 
     def _differs_by_views_only(self, wanted: Picture) -> bool:
         if self._drawn is None:
@@ -296,7 +296,9 @@ class SceneView:
         return self._drawn is not None and replace(wanted, samples=self._drawn.samples) == self._drawn
 
     def _refines(self) -> bool:
-        """While views are being made, the processor has better things to do."""
+        """Whether there is more to draw, and time for it: while views are being made, the processor has none."""
+        if self.renderer.is_converged:
+            return False
         scene = self._scene
         views_final = sum(self._is_final.values())
         has_all = scene is not None and views_final == scene.grid.rows * scene.grid.columns

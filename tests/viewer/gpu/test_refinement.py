@@ -92,6 +92,42 @@ def test_refining_waits_for_a_driver_that_queues_its_work(renderer: Renderer, mo
     assert renderer.report.samples == 1
 
 
+def test_a_picture_that_views_change_stays_until_the_new_one_has_as_many_passes(renderer: Renderer) -> None:
+    """What is drawn of it at once is a sample, not all of them: the hand must not wait."""
+    SCENE.fill(renderer, GRID)
+    before = converged(renderer, WIDE)
+    passes, samples, sample_s = renderer.passes_shown, renderer.report.samples, renderer._refining_s
+    assert passes > 1
+    white, disparity = np.full((SCENE.height, SCENE.width, 3), 255, np.uint8), SCENE.view(CENTRE)[1]
+    renderer.upload_view(2, 3, white, disparity)
+    renderer.renew(WIDE, SIZE)
+    steps = 0
+    while renderer.is_renewing:
+        assert np.array_equal(renderer.read_image(), before)
+        assert renderer.passes_shown == passes
+        if steps == samples // 2:
+            renderer.upload_view(2, 2, white, disparity)  # it does not put off what is on its way
+        renderer._refining_s = sample_s
+        renderer.refine(1e-9)
+        steps += 1
+    assert steps == samples
+    assert renderer.passes_shown == passes
+    assert renderer.read_image().mean() > before.mean()
+    renderer.renew(WIDE, SIZE)
+    renderer.refine()
+    assert np.abs(renderer.read_image().astype(int) - converged(renderer, WIDE)).max() <= 1
+
+
+def test_the_first_picture_after_a_move_is_drawn_at_once_whatever_was_begun(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    before = converged(renderer, WIDE)
+    renderer.renew(WIDE, SIZE)
+    renderer.refine(1e-9)
+    renderer.render_in_time(Optics(ViewOffset(1.0, 1.0)), SIZE, 1e-9)
+    assert not renderer.is_renewing
+    assert not np.array_equal(renderer.read_image(), before)
+
+
 def test_more_time_takes_more_samples(renderer: Renderer) -> None:
     SCENE.fill(renderer, GRID)
     drawn = []

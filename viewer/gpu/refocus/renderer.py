@@ -52,7 +52,8 @@ class Renderer:
 
     prefilter: smooth what lies between sparse samples; off, it shows them as separate copies. adaptive: tiles take few
     samples where all is sharp, and skip searches that find nothing. report: what is known of the picture drawn last.
-    note: what had to be left out, a sentence for people.
+    note: what had to be left out, a sentence for people. passes_shown: how many passes of the best picture what is
+    shown is made of; 0: it is softer than that.
     """
 
     def __init__(self, gl: GLContext, prefilter: bool = True, adaptive: bool = True) -> None:
@@ -62,12 +63,14 @@ class Renderer:
         self.field: LightFieldTexture | None = None
         self.report = DrawReport()
         self.note = ""
+        self.passes_shown = 0
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self.adaptive = adaptive
         self._targets: dict[ScreenSize, RenderTargets] = {}
         self._shown: RenderTargets | None = None
         self._accumulation: ProgressiveAccumulation | None = None
+        self._shown_from_pass = 0
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
         self._refining_s = 4 * gl.seconds_per_fetch
         self._level = 0
@@ -111,7 +114,8 @@ class Renderer:
         if 0 <= row < field.grid.rows and 0 <= column < field.grid.columns and field.present[row, column]:
             self._stop_picture()
         field.upload(row, column, colors, disparity)
-        self._accumulation = None
+        if not self.is_renewing:
+            self._accumulation = None
 
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """What gloss means for the field, for optics that have one; None where it means nothing."""
@@ -137,7 +141,7 @@ class Renderer:
         is drawn, stretched to size_px. Before the first view the
         picture is black. The framebuffer stays bound.
         """
-        self._accumulation = self._accumulation_of(optics, size_px, level, part)
+        self._accumulation, self._shown_from_pass = self._accumulation_of(optics, size_px, level, part), 0
         self._draw(math.inf, passes=1)
         self._finish(framebuffer)
         self._errors.begin(level)
@@ -147,54 +151,58 @@ class Renderer:
         optics: Optics,
         size_px: ScreenSize,
         budget_s: float,
-        passes: int = 0,
         part: TargetWindow = WHOLE_PICTURE,
     ) -> None:
         """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
 
-        Its own image may then be smaller than size_px. passes: draw so many of the best picture, whatever time they
-        take; 0: what there is time for. part: what of the picture is drawn, stretched to size_px.
+        Its own image may then be smaller than size_px. part: what of the picture is drawn, stretched to size_px.
         """
         start = time.perf_counter()
         programs_before = len(self.programs)
-        self._level = (
-            0
-            if passes
-            else choose_quality_level(
-                partial(self._work, optics, size_px, part), self._frame_time, budget_s, self._level
-            )
+        self._level = choose_quality_level(
+            partial(self._work, optics, size_px, part), self._frame_time, budget_s, self._level
         )
         level = QUALITY_LEVELS[self._level]
         self.render(optics, scale_size(size_px, level.scale), level=level, part=part)
-        if passes > 1:
-            self._draw(math.inf, min(passes, len(self._current().places)))
-            self._finish(None)
         self.ctx.finish()
         seconds = time.perf_counter() - start
-        if len(self.programs) == programs_before and passes <= 1:
+        if len(self.programs) == programs_before:
             self._frame_time.learn(self._work(optics, size_px, part, level), seconds)
         drawn = self._current().done
         self._refining_s = seconds / max(drawn, 1) / math.prod(self._current().size_px)
         if level != BEST_QUALITY:
             self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
+            self.passes_shown = 0
         self._learn(drawn, seconds)
+
+    def renew(self, optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE) -> None:
+        """Begin the picture that is shown again, as its views have changed: `refine` draws it.
+
+        What is shown stays until the new one is made of as many passes; it has a texture of its own already. Views that
+        come in between are seen in the passes that follow, so that they do not keep the new one from being shown.
+        """
+        self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
+        self._shown_from_pass = min(self.passes_shown, len(self._accumulation.places))
+        self._errors.begin(BEST_QUALITY)
 
     def refine(self, budget_s: float = math.inf) -> None:
         """Draw more samples of the same picture, for about that long; the image changes after each pass."""
         if self.is_converged:
             return
         accumulation = self._current()
-        if self._errors.is_new:
+        if self._errors.is_new and not self.is_renewing:
             self._errors.add(self.read_image(), 0)
         start = time.perf_counter()
         pass_before, done_before, programs_before = accumulation.pass_index, accumulation.done, len(self.programs)
         self._draw(budget_s, passes=len(accumulation.places))
-        if accumulation.pass_index > pass_before:
+        if accumulation.pass_index > pass_before and not self.is_renewing:
             self._finish(None)
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs_before:
             self._refining_s = seconds / max(accumulation.done - done_before, 1) / math.prod(accumulation.size_px)
+        if self.is_renewing:
+            return
         if accumulation.pass_index > pass_before and (
             accumulation.is_complete or math.log2(accumulation.pass_index).is_integer()
         ):
@@ -247,10 +255,9 @@ class Renderer:
         return self._accumulation is None or self._accumulation.is_complete
 
     @property
-    def passes_drawn(self) -> int:
-        """How many passes of the best picture what is shown is made of; 0: it is softer than that."""
-        is_best = self._accumulation is not None and self._shown is self._targets.get(self._accumulation.size_px)
-        return self._current().pass_index if is_best else 0
+    def is_renewing(self) -> bool:
+        """Whether what is shown still waits for what `renew` has begun."""
+        return self._accumulation is not None and self._accumulation.pass_index < self._shown_from_pass
 
     def prepare(self, optics: Optics) -> None:
         """Have what draws such a picture compiled, so that the first frame of it does not wait; none is shown."""
@@ -342,7 +349,7 @@ class Renderer:
     def _finish(self, framebuffer: moderngl.Framebuffer | None) -> None:
         targets = self._targets_of(self._current().size_px)
         self._accumulator.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
-        self._shown = targets
+        self._shown, self.passes_shown = targets, self._current().pass_index
 
     def _stop_picture(self) -> None:
         if self._picture is not None:

@@ -1,0 +1,71 @@
+"""What stands on the screen while views come: drawn a bit a frame, and never softer than it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.viewer.conftest import headless_with_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.display import scene_view
+from viewer.display.scene_view import SceneView
+from viewer.model.layout import ScreenSize
+from viewer.model.state.optics import SetAperture
+
+SIZE = ScreenSize(384, 256)
+
+
+@pytest.fixture
+def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[HeadlessViewer]:
+    """A picture that has got every pass; views are shown as soon as they come, and no frame has time for more than one
+    sample.
+    """
+    monkeypatch.setattr(scene_view, "VIEW_REFRESH_S", 0.0)
+    with headless_with_scene(tmp_path) as viewer:
+        viewer.do(SetAperture(3.0))
+        monkeypatch.setattr(type(viewer._gl), "frame_budget_s", 1e-9)
+        viewer._scene_view.converge(viewer.state, SIZE)
+        yield viewer
+
+
+def a_view_comes(view: SceneView) -> None:
+    centre = view.centre
+    assert centre is not None
+    view.add(replace(centre, row=0, column=1, colors=np.full_like(centre.colors, 255)))
+    view.upload_all()
+
+
+def test_a_view_that_comes_costs_no_frame_all_passes(opened: HeadlessViewer) -> None:
+    view = opened._scene_view
+    passes, before = view.renderer.passes_shown, view.renderer.read_image()
+    samples_in_all = view.report.samples
+    assert passes > 1
+    a_view_comes(view)
+    frames = 0
+    while np.array_equal(view.renderer.read_image(), before):
+        view.renderer._refining_s = 1.0  # a slow machine
+        view.draw(opened.state, SIZE)
+        frames += 1
+        assert view.renderer.passes_shown == passes
+    assert frames > samples_in_all, "at most a sample each, after the one that began it"
+    assert view.shows_all_views()
+    assert view.renderer.is_converged
+
+
+def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: HeadlessViewer) -> None:
+    view = opened._scene_view
+    before, samples_in_all = view.renderer.read_image(), view.report.samples
+    for _ in range(2 * samples_in_all):
+        a_view_comes(view)
+        view.renderer._refining_s = 1.0
+        view.draw(opened.state, SIZE)
+    assert not np.array_equal(view.renderer.read_image(), before)
+    while not view.shows_all_views():
+        view.draw(opened.state, SIZE)
+    view.renderer.refine()
+    shown = view.renderer.read_image().astype(int)
+    assert np.abs(shown - view.picture(opened.state.optics, SIZE)).max() <= 1
