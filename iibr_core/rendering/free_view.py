@@ -19,7 +19,7 @@ from iibr_core.rendering.joined_rays import BELOW, RIGHT
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
 from iibr_core.rendering.view_synthesis import RenderedView
-from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
+from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, ShouldStop, in_bands, never
 from iibr_core.types import Camera, FloatImage, ImageSize, Margins
 
@@ -125,15 +125,15 @@ def _draw(
     first, last = rows
     shape = SAMPLES * (last - first), SAMPLES * width
     nearest, source = np.full(shape, -np.inf, np.float32), np.zeros(shape, np.uint8)
-    offsets, _, disparity, coverage, _ = rays.arrays
+    _, _, disparity, coverage, _ = rays.arrays
     apart = np.zeros_like(rays.joined)
     for k, matrix in enumerate(matrices):
         joined = rays.joined if k == 0 else apart
         # What the photo shows goes before what was made up beside it.
         ahead = surface if k >= rays.photo_images else 0.0
         _draw_rays(
-            disparity[k], coverage[k], joined, landing[k], disparity[0], *offsets[k], matrix, k, rays.photo_images,
-            ahead, SEALED_GAP_PX / rays.farthest_views, first, nearest, source,
+            disparity[k], coverage[k], joined, landing[k], matrix, k, rays.photo_images, ahead,
+            SEALED_GAP_PX / rays.farthest_views, first, nearest, source,
         )  # fmt: skip
     return nearest, source
 
@@ -176,8 +176,7 @@ def _land_cells(low, high, m, first, last, landing):
 
 @kernel
 def _draw_rays(
-    disparity, coverage, joined, landing, photo_disparity, t, s, m, index, photo_images, ahead, one_surface, first_row,
-    nearest, source,
+    disparity, coverage, joined, landing, m, index, photo_images, ahead, one_surface, first_row, nearest, source,
 ):  # fmt: skip
     """Draw the rays of one image, seen from (t, s); see `_draw`. ahead: so much nearer than the photo's surface it must
     be to hide it.
@@ -191,12 +190,6 @@ def _draw_rays(
             v, u = y // CELL_PX, x // CELL_PX
             is_near = landing[v, u, 1] >= first_row - 1 and landing[v, u, 0] <= last_row + 1
             is_drawn[x] = is_near and coverage[y, x] > 0
-            # What was made up in front of what the photo shows there cannot be: the photo would show it.
-            if is_drawn[x] and index >= photo_images:
-                d = disparity[y, x]
-                v, u = nearest_pixel(y + d * t), nearest_pixel(x + d * s)
-                if 0 <= v < height and 0 <= u < width:
-                    is_drawn[x] = not d > photo_disparity[v, u] + one_surface
             any_drawn = any_drawn or is_drawn[x]
         if any_drawn:
             _land_squares(disparity, joined, m, one_surface, y, corners, is_drawn)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from iibr_core.rendering.ambiguity import SOFT
 from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, DisparityStatistics, measure_disparity
 from iibr_core.rendering.joined_rays import BELOW, RIGHT, join_rays, joined_either_way
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
@@ -27,6 +27,8 @@ NO_MARGINS = Margins()
 HIGHEST_LEVEL = 255
 SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
+IN_FRONT_PX = 1.0
+"""What was made up is in front of what the photo shows if it parts from it by this much in the farthest view."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +91,9 @@ class RaySet:
         coverage: FloatImage,
         should_stop: ShouldStop = never,
     ) -> None:
-        """Add the rays of one image (H, W), or of one view. Raises Cancelled once should_stop is true; then nothing is
-        added.
+        """Add the rays of one image (H, W), or of one view. All but the photo's, which come first, were made up: those
+        in front of what the photo shows are left out, as it would show them. Raises Cancelled once should_stop is true;
+        then nothing is added.
         """
         if image_size(disparity) != self.size:
             colors, disparity, coverage = (
@@ -101,6 +104,8 @@ class RaySet:
             least_edge = EDGE_PARALLAX_PX / max(self._farthest_views, 1e-9)
             self._joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
             self._steep = _any_in_cells(joined_either_way(joined))
+        elif any(offset):
+            coverage = self._not_in_front(offset, disparity, coverage, should_stop)
 
         def band(first: int, last: int) -> None:
             rows = slice(first, last)
@@ -215,6 +220,19 @@ class RaySet:
         """(H, W) disparity of the photo, as large as views."""
         return np.ascontiguousarray(self.in_view(self._disparity[0]))
 
+    def _not_in_front(
+        self, offset: ViewOffset, disparity: FloatImage, coverage: FloatImage, should_stop: ShouldStop
+    ) -> FloatImage:
+        """The coverage (H, W) of rays seen from there, without those in front of what the photo shows."""
+        kept, step = np.empty_like(coverage, order="C"), IN_FRONT_PX / max(self._farthest_views, 1e-9)
+
+        def band(first: int, last: int) -> None:
+            kept[first:last] = coverage[first:last]
+            _leave_out_in_front(disparity, self._disparity[0], self._margins, *offset, step, first, last, kept)
+
+        in_bands(band, self.size, should_stop)
+        return kept
+
     def _with_margins(self, view: FloatImage, around: float) -> FloatImage:
         """A view (H, W, ...) as large as the images."""
         image = np.full((*self.size, *view.shape[2:]), around, np.float32)
@@ -226,6 +244,21 @@ def _any_in_cells(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(M, N): cells of which any pixel (H, W) is marked."""
     rows, columns = (np.arange(0, length, CELL_PX) for length in marked.shape)
     return np.asarray(np.logical_or.reduceat(np.logical_or.reduceat(marked, rows, 0), columns, 1))
+
+
+@kernel
+def _leave_out_in_front(disparity, photo_disparity, margins, t, s, step, first, last, coverage):
+    """Rows [first, last): no coverage for rays seen from (t, s) that lie more than a step in front of the photo's."""
+    height, width = disparity.shape
+    top, bottom, left, right = margins
+    for y in range(first, last):
+        for x in range(width):
+            if coverage[y, x] > 0:
+                d = disparity[y, x]
+                # Only within its frame the photo shows anything.
+                v, u = nearest_pixel(y + d * t), nearest_pixel(x + d * s)
+                if top <= v < height - bottom and left <= u < width - right and d > photo_disparity[v, u] + step:
+                    coverage[y, x] = 0.0
 
 
 @kernel

@@ -84,15 +84,17 @@ def test_no_cell_is_smooth_where_two_surfaces_or_none_show(offset):
     assert not smooth[candidates.count != 1].any()
 
 
-@pytest.mark.parametrize(("disparity", "is_smooth"), [(3.0, False), (-3.0, True)], ids=["in front", "behind"])
+@pytest.mark.parametrize(("disparity", "is_smooth"), [(12.0, False), (-12.0, True)], ids=["in front", "behind"])
 def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
-    rays, at = ray_set(np.zeros(SIZE, np.float32)), ViewOffset(0, 1)
+    photo, at = np.zeros(SIZE, np.float32), ViewOffset(0, 1)
+    photo[:, 32:36] = 20  # hides from the photo what is in front of its wall there
+    rays = ray_set(photo)
     filled = np.zeros(SIZE, np.float32)
     filled[20:24, 20:24] = 1
     rays.add(at, np.zeros((*SIZE, 3), np.float32), np.full(SIZE, disparity, np.float32), filled)
     smooth, _ = find_coherent_cells(rays, at, (0, SIZE[0]))
     assert by_pixel(smooth, (0, SIZE[0]))[20:24, 20:24].all() == is_smooth
-    assert by_pixel(smooth, (0, SIZE[0]))[8:12, 40:44].all()
+    assert by_pixel(smooth, (0, SIZE[0]))[8:12, 48:52].all()
 
 
 @pytest.mark.parametrize("rows", [(0, 5), (3, 4), (17, 48)])
