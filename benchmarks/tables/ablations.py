@@ -1,10 +1,10 @@
 """What each part of making views is worth: one switch at a time against the default, error beside processor time.
 
-    python -m benchmarks.tables.ablations --data DATA [--scenes 3] [--out docs/tables/ablations.md]
+    python -m benchmarks.tables.ablations --data DATA [--weights FOLDER] [--scenes 3] [--out docs/tables/ablations.md]
 
 Scenes are drawn like those that training learns from, by seeds of their own, with exact maps and with spoilt ones; and
-those of DATA (folders as `iibr evaluate` takes them) that have true maps. Parts that need no training only: those of
-the transformer are in docs/transformer.md.
+those of DATA (folders as `iibr evaluate` takes them) that have true maps. FOLDER: ray transformers that lack one thing
+each; those that it does not hold yet are trained first, see `benchmarks.tables.trained_variants`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from benchmarks.speed.measure import Cost, in_turns, median_ratio
 from benchmarks.speed.variants import BenchScene, Variant, bench_scenes, evaluated_views, field_cost
 from benchmarks.tables.degradation import GRID, SIZE, drawn
 from benchmarks.tables.report import FOLDER, markdown, write_report
+from benchmarks.tables.trained_variants import STEPS, TRAINED_VARIANTS, TrainedVariant, train_missing
 from iibr_core.depth.refine import refine
 from iibr_core.evaluation.consistency import consistency
 from iibr_core.evaluation.datasets import find_scenes, read_view
@@ -53,10 +54,10 @@ JUDGED = tuple(
 """Views of drawn scenes: the corners of the grid, and four that no ray was added from."""
 PAPERS_LEAST_COVERED = 0.09
 """Covered so far, a ray has 99 % of the most entropy: the paper's threshold."""
-TRAINED = (
-    "What needs training (disparity encoding, entropy loss, EPI loss, raw coordinates) stands in"
-    " [transformer.md](../transformer.md), from short runs at an earlier commit: it is not made anew here, as five"
-    " equal trainings of 2500 steps, such as the shipped weights had, take most of an hour on these two cores."
+ABOUT_TRAINED = (
+    f"Ray transformers, T, were trained by `benchmarks.tables.trained_variants`: {STEPS} steps each, as the shipped"
+    " weights, all on the same scenes. *Trained again* lacks nothing: what a row differs from that one by less than it"
+    " does from the default may be chance."
 )
 
 
@@ -116,6 +117,13 @@ SWITCHES = (
 )  # fmt: skip
 
 
+def trained_switch(trained: TrainedVariant, folder: Path) -> Switch:
+    """The default with another T, which is told as much of the rays as it was when it learnt."""
+    variant = replace(DEFAULT_VARIANT, hypotheses=trained.choice.hypotheses)
+    others = {} if trained.choice.inpainted else NOTHING_SHARED.swaps
+    return Switch(trained.name, variant, {**others, **trained.swaps(folder)})
+
+
 Judged = tuple[BenchScene, BenchScene]
 """A scene to make views of, and the same with its exact map, which tells what the given view does not see."""
 
@@ -131,9 +139,14 @@ class Figures:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--weights", type=Path)
     parser.add_argument("--scenes", type=int, default=3)
     parser.add_argument("--out", type=Path, default=FOLDER / "ablations.md")
     options = parser.parse_args()
+    switches = list(SWITCHES)
+    if options.weights:
+        train_missing(options.weights, STEPS)
+        switches += [trained_switch(trained, options.weights) for trained in TRAINED_VARIANTS]
     exact = [_drawn(seed) for seed in range(FIRST_SEED, FIRST_SEED + options.scenes)]
     spoilt = [replace(scene, disparity=_spoil(scene.disparity, seed)) for seed, scene in enumerate(exact)]
     known = list(_read(options.data))
@@ -142,17 +155,17 @@ def main() -> None:
         f"{len(exact)} drawn, spoilt maps": list(zip(spoilt, exact)),
         **{scene.name: [(scene, scene)] for scene in known},
     }
-    found = {switch.name: {name: _mean_figures(switch, scenes) for name, scenes in sets.items()} for switch in SWITCHES}
+    found = {switch.name: {name: _mean_figures(switch, scenes) for name, scenes in sets.items()} for switch in switches}
     parts = [
         "First row: PSNR in dB, whole views / what the given view does not see (by a plain warp of the exact map)."
         " Others: what the switch changes; more is better. Time: processor time of the whole field of the first drawn"
         f" scene, its map spoilt, against the default's, median of {ROUNDS} rounds. Default: balanced, refined; its"
         f" numbers in brackets. Drawn scenes: seeds from {FIRST_SEED}, {SIZE} px, {GRID.rows}x{GRID.columns} views,"
         f" {len(JUDGED)} judged.",
-        markdown(("switch", *sets, "time"), table_rows(found, time_ratios(spoilt[0]))),
+        markdown(("switch", *sets, "time"), table_rows(found, time_ratios(spoilt[0], switches))),
         unimportant_sentence(found),
         _agreement_sentence(exact),
-        TRAINED,
+        *([ABOUT_TRAINED] if options.weights else []),
     ]
     write_report("ablations", "What each part is worth", parts, options.out)
 
@@ -229,14 +242,14 @@ def measure(switch: Switch, scene: BenchScene, truth: BenchScene) -> Figures:
     return Figures(_mean(full), _mean(hole))
 
 
-def time_ratios(scene: BenchScene) -> dict[str, float]:
+def time_ratios(scene: BenchScene, switches: Sequence[Switch]) -> dict[str, float]:
     """By switch: processor time of a scene's whole field, against the default's."""
 
     def cost(switch: Switch) -> Cost:
         with switch.applied():
             return field_cost(switch.variant, scene)
 
-    costs = in_turns({switch.name: partial(cost, switch) for switch in SWITCHES}, ROUNDS, ignore_progress)
+    costs = in_turns({switch.name: partial(cost, switch) for switch in switches}, ROUNDS, ignore_progress)
     return {name: median_ratio(own, costs[DEFAULT.name]) for name, own in costs.items()}
 
 

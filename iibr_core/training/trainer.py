@@ -32,6 +32,7 @@ __all__ = [
     "Batch",
     "TrainConfig",
     "TrainingDiverged",
+    "TrainingRun",
     "checkpoint_path",
     "choose_device",
     "learning_rate",
@@ -126,7 +127,7 @@ def train(
     require_run_files(out)
     device = choose_device(config.device)
     model.to(device).train()
-    run = _Run(model, config, checkpoint_path(out))
+    run = TrainingRun(model, config, checkpoint_path(out))
     if resume:
         run.restore()
     with _log(log_path(out), run.step) as write_row:
@@ -182,8 +183,11 @@ class _Row(NamedTuple):
     seconds: float
 
 
-class _Run:
-    """The state that training changes: the model, Adam's moments, steps and seconds done; and its checkpoint."""
+class TrainingRun:
+    """The state that training changes: the model, Adam's moments, steps and seconds done; and its checkpoint.
+
+    For those who have loops of their own; `train` is the usual one.
+    """
 
     def __init__(self, model: nn.Module, config: TrainConfig, checkpoint: Path) -> None:
         self.model, self.config, self.checkpoint = model, config, checkpoint

@@ -72,8 +72,8 @@ def test_figures_are_means_over_views(judged: tuple[BenchScene, BenchScene]) -> 
 
 
 def test_times_are_against_the_default(judged: tuple[BenchScene, BenchScene]) -> None:
-    ratios = time_ratios(judged[0])
-    assert list(ratios) == [switch.name for switch in SWITCHES]
+    ratios = time_ratios(judged[0], SWITCHES[:2])
+    assert list(ratios) == [switch.name for switch in SWITCHES[:2]]
     assert ratios["default"] == 1
     assert min(ratios.values()) > 0
 
