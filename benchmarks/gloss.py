@@ -66,7 +66,8 @@ class Track:
 def read(path: Path) -> Truth:
     held = np.load(path)
     # The surface is what stands before the wall: the share of the range that lies before its back.
-    disparity, glossy = held["disparity"], held["glossy"][2, 2]
+    disparity = held["disparity"]
+    glossy = held["glossy"][GridShape(*held["glossy"].shape[:2]).centre]
     low, high = disparity.min(), disparity.max()
     farthest = float((disparity[glossy].min() - low) / (high - low))
     light = GlossLight(tuple(held["light"].tolist()), (float(held["light_color"]),) * 3, float(held["light_radius"]))

@@ -9,35 +9,22 @@ Mitsuba renders in linear light; lights are rendered one by one and added up, so
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
-import math
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.path_traced import CameraRig, Image, Shapes, load_mitsuba, matte
 from iibr_core.color import srgb_from_linear
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, ImageSize, ViewOffset
 
-INSTALL = "benchmarks.thin_lens: needs Mitsuba; install it with: pip install mitsuba==3.9.1"
-WIDTH, HEIGHT = 128, 96
+RIG = CameraRig(ImageSize(96, 128), field_of_view_deg=40.0, step=0.055, still_depth=3.2)
 GRID = GridShape(5, 5)
-FIELD_OF_VIEW_DEG = 40.0
-FOCAL_PX = WIDTH / 2 / math.tan(math.radians(FIELD_OF_VIEW_DEG / 2))
-STEP = 0.055
-"""From view to view, in units of the scene."""
-STILL_DEPTH = 3.2
-"""Of the plane that does not move from view to view."""
 LIGHTS = (((1.6, 2.4, 0.2), 40.0), ((-2.6, 1.2, 0.4), 24.0))
 """Places and strengths; small, so that shadows are hard."""
-
-Shapes = dict[str, Any]
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -55,32 +42,6 @@ class LensScene:
     name: str
     lens: ThinLens
     shapes: Callable[[Any], Shapes]
-
-
-def disparity_at(depth: float) -> float:
-    """Pixels per view step of a point that far in front of the camera."""
-    return FOCAL_PX * STEP * (1 / depth - 1 / STILL_DEPTH)
-
-
-def depth_at(disparity: float) -> float:
-    """The other way round."""
-    return 1 / (disparity / (FOCAL_PX * STEP) + 1 / STILL_DEPTH)
-
-
-def matte(mi: Any, seed: int, dark: Sequence[float], bright: Sequence[float], cells: int = 24) -> Shapes:
-    """A matte surface of irregular blotches between two colours, the same for the same seed."""
-    rng = np.random.default_rng(seed)
-    share = np.zeros((256, 256))
-    for octave, weight in ((cells // 4, 0.5), (cells, 0.5)):
-        at = np.arange(256) * octave / 256
-        low = np.floor(at).astype(int)
-        rest = (at - low)[:, None]
-        nodes = np.pad(rng.random((octave, octave)), (0, 1), mode="wrap")
-        rows = nodes[low] * (1 - rest) + nodes[low + 1] * rest
-        share += weight * (rows[:, low] * (1 - rest.T) + rows[:, low + 1] * rest.T)
-    share = np.clip(0.5 + 2.2 * (share - 0.5), 0, 1)[..., None]
-    colors = (np.array(dark) * (1 - share) + np.array(bright) * share).astype(np.float32)
-    return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": mi.Bitmap(colors), "raw": True}}
 
 
 def room(mi: Any, seed: int) -> Shapes:
@@ -157,24 +118,10 @@ SCENES = (
 )
 
 
-def sensor_of(mi: Any, offset: ViewOffset, lens: ThinLens | None) -> Any:
-    """The camera of a view; with a lens, one that is focused, at the centre view's place."""
-    at = np.array([offset.s * STEP, -offset.t * STEP, 0.0])
-    shift_px = FOCAL_PX * STEP / STILL_DEPTH
-    camera = {
-        "fov": FIELD_OF_VIEW_DEG,
-        "fov_axis": "x",
-        "to_world": mi.ScalarTransform4f().look_at(at.tolist(), (at - [0, 0, 1]).tolist(), [0, 1, 0]),
-        "film": {"type": "hdrfilm", "width": WIDTH, "height": HEIGHT, "rfilter": {"type": "box"}},
-        "sampler": {"type": "multijitter"},
-    }
-    if lens is None:
-        # The frame moves with the camera, so that the plane at STILL_DEPTH stays.
-        shifts = {"principal_point_offset_x": -shift_px * offset.s / WIDTH}
-        shifts["principal_point_offset_y"] = -shift_px * offset.t / HEIGHT
-        return mi.load_dict({"type": "perspective", **camera, **shifts})
-    opened = {"aperture_radius": lens.radius_views * STEP, "focus_distance": depth_at(lens.focus_disparity)}
-    return mi.load_dict({"type": "thinlens", **camera, **opened})
+def lens_sensor(mi: Any, lens: ThinLens) -> Any:
+    """The centre view's camera with a lens, focused."""
+    opened = {"aperture_radius": lens.radius_views * RIG.step, "focus_distance": RIG.depth_at(lens.focus_disparity)}
+    return mi.load_dict({"type": "thinlens", **RIG.camera(mi, ViewOffset(0, 0)), **opened})
 
 
 def render_linear(mi: Any, lit: Sequence[Any], sensor: Any, samples: int) -> Image:
@@ -182,29 +129,13 @@ def render_linear(mi: Any, lit: Sequence[Any], sensor: Any, samples: int) -> Ima
     return np.asarray(sum(np.array(mi.render(scene, sensor=sensor, spp=samples)) for scene in lit), np.float32)
 
 
-def visible_points(mi: Any, scene: Any, sensor: Any, y: NDArray[Any], x: NDArray[Any]) -> NDArray[np.float64]:
-    """(N, 3): what the rays through these places of the picture hit; pixel centres are integers."""
-    points = []
-    for row, column in zip(y, x):
-        place = [(column + 0.5) / WIDTH, (row + 0.5) / HEIGHT]
-        points.append(np.array(scene.ray_intersect(sensor.sample_ray(0.0, 0.0, place, [0.5, 0.5])[0]).p).ravel())
-    return np.array(points)
-
-
-def exact_disparity(mi: Any, scene: Any) -> Image:
-    """(H, W) at the pixel centres of the centre view."""
-    y, x = (grid.ravel() for grid in np.mgrid[0:HEIGHT, 0:WIDTH])
-    depth = -visible_points(mi, scene, sensor_of(mi, ViewOffset(0, 0), None), y, x)[:, 2]
-    return np.array([disparity_at(z) for z in depth], np.float32).reshape(HEIGHT, WIDTH)
-
-
 def require_convention(mi: Any, scene: Any, disparity: Image) -> None:
     """Raise ValueError unless a view shows at (x - d * s, y - d * t) what the centre view shows at (x, y)."""
     offset = ViewOffset(2.0, -1.0)
-    y, x = (grid.ravel() for grid in np.mgrid[8 : HEIGHT - 8 : 4, 8 : WIDTH - 8 : 4])
+    y, x = (grid.ravel() for grid in np.mgrid[8 : RIG.size.height - 8 : 4, 8 : RIG.size.width - 8 : 4])
     d = disparity[y, x]
-    here = visible_points(mi, scene, sensor_of(mi, ViewOffset(0, 0), None), y, x)
-    there = visible_points(mi, scene, sensor_of(mi, offset, None), y - d * offset.t, x - d * offset.s)
+    here = RIG.visible_points(scene, RIG.pinhole(mi, ViewOffset(0, 0)), y, x)
+    there = RIG.visible_points(scene, RIG.pinhole(mi, offset), y - d * offset.t, x - d * offset.s)
     apart = np.linalg.norm(here - there, axis=1)
     if np.quantile(apart, 0.8) > 1e-3:
         raise ValueError(f"views do not follow the project's convention: points lie {np.median(apart):.4f} apart")
@@ -225,17 +156,18 @@ def make(mi: Any, scene: LensScene, folder: Path, view_samples: int, lens_sample
         light = {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": strength}}
         integrator = {"type": "path", "max_depth": 2}
         lit.append(mi.load_dict({"type": "scene", "integrator": integrator, "light": light, **shapes}))
-    disparity = exact_disparity(mi, lit[0])
+    centre = RIG.pinhole(mi, ViewOffset(0, 0))
+    disparity = RIG.disparity_at(RIG.depths(lit[0], centre)).astype(np.float32)
     require_convention(mi, lit[0], disparity)
     (folder / "views").mkdir(parents=True, exist_ok=True)
     v, u = GRID.centre
     np.save(folder / f"gt_disp_u{u:02d}_v{v:02d}.npy", disparity)
     brightest = 0.0
     for row, column in np.ndindex(*GRID):
-        picture = render_linear(mi, lit, sensor_of(mi, GRID.offset(row, column), None), view_samples)
+        picture = render_linear(mi, lit, RIG.pinhole(mi, GRID.offset(row, column)), view_samples)
         brightest = max(brightest, float(picture.max()))
         write(mi, folder / "views" / f"v{row:02d}_u{column:02d}.png", picture, 8)
-    through = render_linear(mi, lit, sensor_of(mi, ViewOffset(0, 0), scene.lens), lens_samples)
+    through = render_linear(mi, lit, lens_sensor(mi, scene.lens), lens_samples)
     write(mi, folder / "lens.png", through, 16)
     about = {**asdict(scene.lens), "samples": lens_samples, "mitsuba": mi.__version__, "variant": mi.variant()}
     (folder / "lens.json").write_text(json.dumps(about, indent=1) + "\n")
@@ -248,11 +180,7 @@ def main() -> None:
     parser.add_argument("--view-samples", type=int, default=64, help="of a pixel, for each light")
     parser.add_argument("--lens-samples", type=int, default=2025, help="of a pixel, for each light")
     args = parser.parse_args()
-    try:
-        mi = importlib.import_module("mitsuba")
-    except ImportError:
-        sys.exit(INSTALL)
-    mi.set_variant("scalar_rgb")
+    mi = load_mitsuba("benchmarks.thin_lens")
     for scene in SCENES:
         make(mi, scene, args.out / scene.name, args.view_samples, args.lens_samples)
 
