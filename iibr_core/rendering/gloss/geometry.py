@@ -32,6 +32,13 @@ class SceneGeometry:
         nearest = float(above.max(initial=0.0))
         return np.asarray(np.maximum(above, max(LEAST_NEARNESS * nearest, 1e-6)), np.float32)
 
+    def points(self, disparity: FloatImage) -> FloatImage:
+        """Points (H, W, 3), in view steps, that a photo of this disparity (H, W) shows."""
+        height, width = disparity.shape
+        y, x = np.mgrid[:height, :width].astype(np.float32)
+        ray = np.stack([x - (width - 1) / 2, y - (height - 1) / 2, np.full_like(x, self.focal_px)], axis=-1)
+        return np.asarray(ray / self.nearness(disparity)[..., None], np.float32)
+
 
 def infinity_of(given: Disparity) -> float:
     """The disparity, as given, of what is infinitely far: known with metres; else 0 as long as nothing lies beyond,

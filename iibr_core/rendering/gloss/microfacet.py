@@ -7,7 +7,28 @@ from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+
 from iibr_core.runtime.jit import kernel
+from iibr_core.types import FloatImage
+
+
+def lobe_shares(
+    normals: FloatImage, to_eye: FloatImage, light: FloatImage, width2: float, disc: float, reflectance: float
+) -> FloatImage:
+    """`reflected_share` of many places under one light (3,). normals, to_eye: (N, 3), of length 1; (N,)."""
+    shares = np.empty(len(normals), np.float32)
+    _fill_shares(normals, to_eye, np.asarray(light, np.float32), width2, disc, reflectance, shares)
+    return shares
+
+
+@kernel
+def _fill_shares(normals, to_eye, light, width2, disc, reflectance, shares):
+    for i in range(len(shares)):
+        shares[i] = reflected_share(
+            normals[i, 0], normals[i, 1], normals[i, 2], to_eye[i, 0], to_eye[i, 1], to_eye[i, 2],
+            light[0], light[1], light[2], width2, disc, reflectance,
+        )  # fmt: skip
 
 
 @kernel

@@ -14,9 +14,11 @@ import numpy as np
 from iibr_core.color import encoded_from_stored, linear_from_srgb, stored_from_encoded
 from iibr_core.rendering.gloss.environment import prefilter_environment
 from iibr_core.rendering.gloss.geometry import SceneGeometry
-from iibr_core.rendering.gloss.microfacet import reflected_share
-from iibr_core.rendering.gloss.reflection import reflected_light, reflection_disparity, separate_light
-from iibr_core.rendering.gloss.settings import Gloss, require_sound
+from iibr_core.rendering.gloss.light_search import find_light
+from iibr_core.rendering.gloss.microfacet import lobe_shares, reflected_share
+from iibr_core.rendering.gloss.reflection import reflection_disparity
+from iibr_core.rendering.gloss.separation import reflected_light, separate_light
+from iibr_core.rendering.gloss.settings import Gloss, Triple, require_sound
 from iibr_core.rendering.gloss.surface import fit_normals, surface_mask
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -69,23 +71,27 @@ def make_gloss_maps(
     maps = GlossMaps(gloss, geometry, normals, disparity, mask, None, None, around)
     if not gloss.photo_shines:
         return maps
-    linear = linear_from_srgb(photo)
-    if any(gloss.light.color):
-        lobe = _lobe_in_photo(maps, should_stop)
-        color, reflected = separate_light(linear, normals, mask, lobe)
-        red, green, blue = map(float, color)
-        lit = replace(gloss, light=replace(gloss.light, color=(red, green, blue)))
-        return replace(maps, gloss=lit, reflected=reflected)
-    virtual = reflection_disparity(disparity, normals, geometry)
-    return replace(maps, reflected=reflected_light(linear, normals, mask), reflected_disparity=virtual)
+    linear, points = linear_from_srgb(photo), geometry.points(disparity)
+    direction: Triple | None = gloss.light.direction
+    if not any(gloss.light.color):
+        direction = find_light(gloss, linear, points, normals, mask, should_stop)
+    if direction is None:
+        virtual = reflection_disparity(disparity, normals, geometry)
+        return replace(maps, reflected=reflected_light(linear, normals, mask), reflected_disparity=virtual)
+    white = replace(gloss.light, direction=direction, color=(1.0, 1.0, 1.0))
+    lobe = mask * _lobe_of(replace(gloss, light=white), points, normals)
+    color, reflected = separate_light(linear, normals, mask, lobe)
+    red, green, blue = map(float, color)
+    found = replace(gloss, light=replace(white, color=(red, green, blue)))
+    return replace(maps, gloss=found, reflected=reflected)
 
 
-def _lobe_in_photo(maps: GlossMaps, should_stop: ShouldStop) -> FloatImage:
-    """Linear light (H, W) that a white light of strength 1 adds to the photo's surface, were it black."""
-    white = replace(maps.gloss, light=replace(maps.gloss.light, color=(1.0, 1.0, 1.0)), environment="")
-    black = np.zeros((*maps.mask.shape, 3), np.float32)
-    shade(black, maps.disparity, ViewOffset(0.0, 0.0), replace(maps, gloss=white, environment=None), should_stop)
-    return linear_from_srgb(black[..., 0])
+def _lobe_of(gloss: Gloss, points: FloatImage, normals: FloatImage) -> FloatImage:
+    """Linear light (H, W) that a gloss adds to black surfaces as the photo's eye sees them, in the first channel."""
+    to_eye = -points / np.linalg.norm(points, axis=-1, keepdims=True)
+    towards, (width2, disc) = np.array(gloss.light.unit_direction, np.float32), gloss.lobe_widths
+    shares = lobe_shares(normals.reshape(-1, 3), to_eye.reshape(-1, 3), towards, width2, disc, gloss.reflectance)
+    return np.asarray(shares.reshape(points.shape[:2]) * np.float32(gloss.light.radiance[0]))
 
 
 def shade_views(
@@ -136,6 +142,18 @@ def shade(
 
 
 @kernel
+def _is_inside(v, u, height, width):
+    """Whether a place is on a pixel of the photo."""
+    return v > -0.5 and v < height - 0.5 and u > -0.5 and u < width - 0.5
+
+
+@kernel
+def _is_same(apart, t, s):
+    """Whether disparities so far apart are of the same surface, as the view at (t, s) sees it."""
+    return apart * apart * (t * t + s * s) <= SAME_SURFACE_PX * SAME_SURFACE_PX
+
+
+@kernel
 def _add_lobes(
     colors, disparity, near, photo_disparity, normals, mask, t, s, focal, light, width2, disc, reflectance,
     has_environment, environment, first, last,
@@ -153,10 +171,9 @@ def _add_lobes(
             # the place in the photo, and whether the same surface is seen there
             d = disparity[y, x]
             v, u = y + d * t, x + d * s
-            if not (v > -0.5 and v < height - 0.5 and u > -0.5 and u < width - 0.5):
-                continue
-            beside = photo_disparity[int(v + 0.5), int(u + 0.5)] - d
-            if beside * beside * (t * t + s * s) > SAME_SURFACE_PX * SAME_SURFACE_PX:
+            if not _is_inside(v, u, height, width) or not _is_same(
+                photo_disparity[int(v + 0.5), int(u + 0.5)] - d, t, s
+            ):
                 continue
             v, u = min(max(v, 0.0), height - 1.0), min(max(u, 0.0), width - 1.0)
             top, left = int(v), int(u)
@@ -218,10 +235,9 @@ def _move_reflections(colors, disparity, photo_disparity, reflected, moves, virt
         for x in range(width):
             d = disparity[y, x]
             own_v, own_u = y + d * t, x + d * s
-            if not (own_v > -0.5 and own_v < height - 0.5 and own_u > -0.5 and own_u < width - 0.5):
-                continue
-            beside = photo_disparity[int(own_v + 0.5), int(own_u + 0.5)] - d
-            if beside * beside * (t * t + s * s) > SAME_SURFACE_PX * SAME_SURFACE_PX:
+            if not _is_inside(own_v, own_u, height, width) or not _is_same(
+                photo_disparity[int(own_v + 0.5), int(own_u + 0.5)] - d, t, s
+            ):
                 continue
             # the fixed point place = pixel + M(place) offset, from the surface's own place on
             v, u = own_v, own_u

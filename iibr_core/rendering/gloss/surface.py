@@ -113,14 +113,13 @@ def _fit_rows(near, focal, spacing, step, first, last, normals):
     height, width = near.shape
     centre_x, centre_y = np.float32((width - 1) / 2), np.float32((height - 1) / 2)
     side = 2 * TAPS + 1
-    gauss = np.empty(side, np.float32)
-    for i in range(side):
-        gauss[i] = np.exp(-0.5 * ((i - TAPS) / (0.5 * TAPS)) ** 2)
+    gauss = np.empty((side, side), np.float32)
     norm = np.float32(0)
     for i in range(side):
         for j in range(side):
-            norm += gauss[i] * gauss[j] * np.float32((j - TAPS) ** 2)
-    system = np.empty((6, 7), np.float64)
+            gauss[i, j] = np.exp(-0.5 * ((i - TAPS) ** 2 + (j - TAPS) ** 2) / (0.5 * TAPS) ** 2)
+            norm += gauss[i, j] * np.float32((j - TAPS) ** 2)
+    beside, weights = np.empty((side, side), np.float32), np.empty((side, side), np.float32)
     for y in range(first, last):
         for x in range(width):
             middle = near[y, x]
@@ -129,56 +128,21 @@ def _fit_rows(near, focal, spacing, step, first, last, normals):
             # slopes by the whole window: odd moments vanish, so that each is one weighted sum
             for i in range(side):
                 v = y + (i - TAPS) * spacing
-                if v < 0 or v >= height:
-                    continue
                 for j in range(side):
                     u = x + (j - TAPS) * spacing
-                    if u < 0 or u >= width:
+                    weights[i, j] = 0
+                    if v < 0 or v >= height or u < 0 or u >= width:
                         continue
-                    beside = near[v, u] - middle
-                    if abs(beside) > step + slope * np.float32(max(abs(i - TAPS), abs(j - TAPS))):
+                    apart = near[v, u] - middle
+                    if abs(apart) > step + slope * np.float32(max(abs(i - TAPS), abs(j - TAPS))):
                         continue
-                    weight = gauss[i] * gauss[j]
-                    right += weight * np.float32(j - TAPS) * beside
-                    down += weight * np.float32(i - TAPS) * beside
+                    beside[i, j], weights[i, j] = apart, gauss[i, j]
+                    right += gauss[i, j] * np.float32(j - TAPS) * apart
+                    down += gauss[i, j] * np.float32(i - TAPS) * apart
                     kept += 1
             right, down = right / norm, down / norm
             if kept < side * side:
-                # part of the window is cut off: all six terms of the quadratic, by elimination
-                system[:] = 0
-                for i in range(side):
-                    v = y + (i - TAPS) * spacing
-                    if v < 0 or v >= height:
-                        continue
-                    for j in range(side):
-                        u = x + (j - TAPS) * spacing
-                        if u < 0 or u >= width:
-                            continue
-                        beside = near[v, u] - middle
-                        if abs(beside) > step + slope * np.float32(max(abs(i - TAPS), abs(j - TAPS))):
-                            continue
-                        p, q = (j - TAPS) / TAPS, (i - TAPS) / TAPS
-                        terms = (1.0, p, q, p * p, p * q, q * q)
-                        weight = gauss[i] * gauss[j]
-                        for a in range(6):
-                            for b in range(a, 6):
-                                system[a, b] += weight * terms[a] * terms[b]
-                            system[a, 6] += weight * terms[a] * beside
-                for a in range(6):
-                    # what the taps do not tell stays 0, the bends first
-                    system[a, a] += 1e-4 if a < 3 else 0.05
-                    for b in range(a):
-                        system[a, b] = system[b, a]
-                for a in range(6):
-                    for b in range(a + 1, 6):
-                        factor = system[b, a] / system[a, a]
-                        for c in range(a, 7):
-                            system[b, c] -= factor * system[a, c]
-                for a in range(5, -1, -1):
-                    for b in range(a + 1, 6):
-                        system[a, 6] -= system[a, b] * system[b, 6]
-                    system[a, 6] /= system[a, a]
-                right, down = np.float32(system[1, 6] / TAPS), np.float32(system[2, 6] / TAPS)
+                right, down = _slopes_of_part(beside, weights)
             right, down = right / spacing, down / spacing
             # the plane 1/Z = a x + b y + c through this pixel has the normal (a, b, c), away from the camera
             away = middle / focal - ((x - centre_x) * right + (y - centre_y) * down) / focal
@@ -186,3 +150,36 @@ def _fit_rows(near, focal, spacing, step, first, last, normals):
             if not length > 0:
                 right, down, away, length = np.float32(0), np.float32(0), np.float32(1), np.float32(1)
             normals[y, x, 0], normals[y, x, 1], normals[y, x, 2] = -right / length, -down / length, -away / length
+
+
+@kernel
+def _slopes_of_part(beside, weights):
+    """(right, down): slopes of a window that is cut off, where weights are 0: all six terms of the quadratic."""
+    system = np.zeros((6, 7), np.float64)
+    side = 2 * TAPS + 1
+    for i in range(side):
+        for j in range(side):
+            if weights[i, j] == 0:
+                continue
+            p, q = (j - TAPS) / TAPS, (i - TAPS) / TAPS
+            terms = (1.0, p, q, p * p, p * q, q * q)
+            for a in range(6):
+                for b in range(a, 6):
+                    system[a, b] += weights[i, j] * terms[a] * terms[b]
+                system[a, 6] += weights[i, j] * terms[a] * beside[i, j]
+    for a in range(6):
+        # what the taps do not tell stays 0, the bends first
+        system[a, a] += 1e-4 if a < 3 else 0.05
+        for b in range(a):
+            system[a, b] = system[b, a]
+    # elimination: the matrix is positive definite
+    for a in range(6):
+        for b in range(a + 1, 6):
+            factor = system[b, a] / system[a, a]
+            for c in range(a, 7):
+                system[b, c] -= factor * system[a, c]
+    for a in range(5, 0, -1):
+        for b in range(a + 1, 6):
+            system[a, 6] -= system[a, b] * system[b, 6]
+        system[a, 6] /= system[a, a]
+    return np.float32(system[1, 6] / TAPS), np.float32(system[2, 6] / TAPS)
