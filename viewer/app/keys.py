@@ -10,7 +10,7 @@ from viewer.model.actions import Action, SetFullscreen, ShowBefore, ShowPrompt
 from viewer.model.commands import BY_NAME, COMMANDS, Chord
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke, SetBrush
-from viewer.model.state.inspection import ShowGrid
+from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
 from viewer.model.state.optics import CENTRE, MoveEye, SetGlossBrush
 
 ARROW_STEP_VIEWS = 0.5
@@ -39,7 +39,9 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
 
 
 def _escape_actions(state: AppState) -> list[Action]:
-    """What Esc closes, one at a time: a prompt, a stroke, the sheet of views, the brush. It never quits."""
+    """What Esc closes, one at a time: a prompt, a stroke, the sheet of views, a brush, what is compared or laid over
+    the picture, the full screen. It never quits.
+    """
     if state.prompt is not None:
         return [ShowPrompt(None)]
     if state.stroke is not None:
@@ -50,9 +52,13 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [SetGlossBrush(replace(state.gloss_brush, is_on=False))]
     if state.shows_before:
         return [ShowBefore(False)]
-    if state.is_fullscreen and not state.brush.is_on:
-        return [SetFullscreen(False)]
-    return [SetBrush(replace(state.brush, is_on=False))] if state.brush.is_on else []
+    if state.brush.is_on:
+        return [SetBrush(replace(state.brush, is_on=False))]
+    if state.inspection.comparison is not None:
+        return [Compare(None)]
+    if state.inspection.overlay is not None:
+        return [SetOverlay(None)]
+    return [SetFullscreen(False)] if state.is_fullscreen else []
 
 
 def read_keys(used_space: bool = False) -> Keys:

@@ -78,6 +78,11 @@ class PictureSaver:
         """Whether `advance` has something to draw here."""
         return bool(self._requests) and not self._is_writing and self._progress is None
 
+    @property
+    def is_copying(self) -> bool:
+        """Whether a picture is on its way into the clipboard."""
+        return any(request.is_copied for request in self._requests)
+
     def add(self, task: SaveTask, state: AppState, inputs: Sequence[Path]) -> list[Action]:
         """Save the present picture after those asked for before; says so where that cannot be. inputs: what is read."""
         if state.scene is None:

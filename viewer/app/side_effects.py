@@ -80,6 +80,8 @@ class SideEffects:
         for task in state.tasks:
             if isinstance(task, ReadTruthTask) and not is_scene_open(state):
                 continue  # what it must fit is not known yet
+            if isinstance(task, PasteTask) and self._saver.is_copying:
+                continue  # what is pasted is not in the clipboard yet
             actions += [TaskTaken(task), *self._begin(task, state)]
         return actions
 

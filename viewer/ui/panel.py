@@ -156,6 +156,8 @@ def _is_possible(name: str, state: AppState) -> bool:
 
 def _welcome(state: AppState, layout: Layout) -> list[Action]:
     """What to do in an empty window, and what was open before."""
+    if progress_text(state.progress):
+        return []  # it says what is being read
     imgui.text_wrapped("Drop a photo or a folder of views on this window to open it.")
     gap(layout)
     return _recent(state.recent, state.source, layout)

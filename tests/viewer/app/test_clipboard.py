@@ -64,6 +64,13 @@ def test_the_picture_is_copied_as_it_is_drawn_and_pasted_again(viewer: Driver) -
         assert np.array_equal(np.asarray(pasted.convert("RGB")), copied)
 
 
+def test_what_is_pasted_at_once_waits_until_it_is_copied(viewer: Driver) -> None:
+    put(b"some words")
+    viewer.send("key", "ctrl+c", "key", "ctrl+v")
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name.startswith("pasted-"))
+    assert not any(notice.is_error for notice in viewer.app.state.notices)
+
+
 @pytest.mark.parametrize("form", ["{}", "file://{}\r\n"])
 def test_a_path_in_the_clipboard_opens(viewer: Driver, tmp_path: Path, form: str) -> None:
     other = write_scene(tmp_path, "other", seed=1)

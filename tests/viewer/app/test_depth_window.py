@@ -29,6 +29,7 @@ from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetOpacity, SetOverlay, ShowEpis
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 Opener = Callable[..., Driver]
@@ -186,6 +187,24 @@ def test_the_brush_is_taken_from_the_panel_and_by_key(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.optics.eye.s != 0)
     viewer.send("mouseup", 1)
     assert viewer.app.state.depth.edits.strokes == ()
+
+
+def test_the_key_that_takes_the_brush_brings_it_into_sight(viewer: Driver) -> None:
+    """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
+    sections = tuple(section for section in SECTIONS if section != "depth")
+    preferences = replace(viewer.app.state.preferences, open_sections=sections)
+    viewer.app.state = replace(viewer.app.state, preferences=preferences)
+    viewer.send("mousemove", *viewer.position(0.5, 0.5))
+    viewer.until_idle()
+    panel = imgui.internal.find_window_by_name("panel")
+    assert panel.scroll.y == 0
+    viewer.send("key", "b")
+    viewer.until(lambda app: app.state.brush.is_on)
+    viewer.until_idle()
+    assert viewer.app.state.preferences.open_sections == SECTIONS
+    assert panel.scroll.y > 0
+    viewer.press("Smooth")
+    viewer.until(lambda app: app.state.brush.tool == "smooth")
 
 
 def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver) -> None:

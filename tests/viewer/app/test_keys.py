@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
+
+import pytest
 
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model.actions import ShowPrompt, Undo
+from viewer.model.actions import Action, SetFullscreen, ShowPrompt, Undo
 from viewer.model.commands import BY_NAME
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
 from viewer.model.state.optics import MoveEye, ResetOptics
 from viewer.model.state.scene import Scene, Source
 
@@ -22,6 +27,23 @@ def test_keys() -> None:
     assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [ResetOptics(), Undo()]
     assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [ShowPrompt(None)]
     assert reset in BY_NAME
+
+
+@pytest.mark.parametrize(
+    ("opens", "closes"),
+    [
+        ((Compare("photo"),), Compare(None)),
+        ((SetOverlay("disparity"),), SetOverlay(None)),
+        ((SetFullscreen(True), SetOverlay("disparity")), SetOverlay(None)),
+        ((SetFullscreen(True),), SetFullscreen(False)),
+        ((ShowGrid(True), Compare("photo")), ShowGrid(False)),
+    ],
+)
+def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], closes: Action) -> None:
+    assert actions_from_keys(Keys(is_escape=True), functools.reduce(reduce, opens, STATE)) == [closes]
+
+
+def test_arrows() -> None:
     (move,) = actions_from_keys(Keys(arrows=ViewOffset(1, -1)), STATE)
     assert isinstance(move, MoveEye)
     assert move.eye.t > 0 > move.eye.s

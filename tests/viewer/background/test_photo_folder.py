@@ -22,6 +22,14 @@ def test_maps_hidden_files_and_others_are_no_photos(tmp_path: Path) -> None:
     assert list_photos(str(tmp_path / "gone")).photos == ()
 
 
+def test_what_was_saved_or_exported_of_a_photo_is_none_of_its_folder(tmp_path: Path) -> None:
+    made = ("a-iibr.png", "a-quilt_qs8x6a1.482.png", "a-sbs_2x1.png", "a-focal-stack-exr.exr", "a-b-anaglyph.jpg")
+    kept = ("a.jpg", "a-b.png", "gone-iibr.png", "a-iibre.png", "a-quilted.png", "iibr-quilt.png", "-iibr.png")
+    for name in (*made, *kept):
+        (tmp_path / name).write_bytes(b"-")
+    assert {photo.name for photo in list_photos(str(tmp_path)).photos} == set(kept)
+
+
 @pytest.mark.parametrize("inside", ["", "views"])
 def test_a_light_field_is_no_folder_of_photos_also_in_views(tmp_path: Path, inside: str) -> None:
     folder = tmp_path / inside

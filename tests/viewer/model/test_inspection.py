@@ -10,7 +10,7 @@ import pytest
 
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover
+from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover, SetUnits
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME
 from viewer.model.inspection_request import (
@@ -23,6 +23,7 @@ from viewer.model.inspection_request import (
     view_to_compare,
 )
 from viewer.model.layout import Beside, Rect, layout_of
+from viewer.model.reducers.inspection import KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import (
@@ -30,6 +31,7 @@ from viewer.model.state.inspection import (
     Compare,
     GroundTruth,
     Inspection,
+    KeepState,
     MoveDivider,
     OverlayKind,
     Pair,
@@ -46,7 +48,8 @@ from viewer.model.state.inspection import (
 from viewer.model.state.optics import MoveEye
 from viewer.model.state.scene import Scene, Source
 from viewer.model.state.tasks import ChooseTask
-from viewer.ui.overlays.inspection import status_text
+from viewer.ui.overlays.inspection import legend_words, status_text
+from viewer.ui.overlays.reticle import hover_text
 from viewer.ui.sections.inspect import pair_text, score_text
 
 GRID = GridShape(5, 7)
@@ -272,11 +275,29 @@ def test_words() -> None:
     assert score_text(math.inf, 0.0) == "identical"
     assert "still" in score_text(None, None)
     hover = Hover(12.3, 4.0, -0.5)
-    assert status_text(SCENE, hover, None) == ["12, 4", "−0.50 px"]
-    words = status_text(SCENE, hover, Probe((1, 20, 255), 7, 35, "inpainted"))
-    assert words == ["12, 4", "−0.50 px", "inpainted", "RGB 1 20 255", "seen in 7 of 35 views"]
-    flat = status_text(SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "stored"))
+    plain, numbers = after(OPEN), after(OPEN, SetUnits("light field"))
+    assert status_text(plain, SCENE, hover, None) == ["12, 4", hover_text(plain.optics, SCENE, hover)]
+    assert "px" not in hover_text(plain.optics, SCENE, hover)
+    words = status_text(numbers, SCENE, hover, Probe((1, 20, 255), 7, 35, "inpainted"))
+    assert words == ["12, 4", "−0.50 px", "0.50 behind", "inpainted", "RGB 1 20 255", "seen in 7 of 35 views"]
+    flat = status_text(plain, SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "stored"))
     assert flat == ["12, 4", "stored view", "RGB 0 0 0", "35 views"]
+
+
+def test_the_legend_speaks_the_units_of_the_panel() -> None:
+    shown, ends = after(OPEN, SetOverlay("disparity")), (-1.5, 2.0)
+    assert legend_words(shown, SCENE, ends) == ("distance", ["far", "near"])
+    assert legend_words(reduce(shown, SetUnits("light field")), SCENE, ends) == ("px per step", ["−1.50", "2.00"])
+    in_metres = replace(SCENE, inverse_metres=(0.1, 0.2))
+    assert legend_words(shown, in_metres, ends) == ("distance", ["20 m", "2.50 m"])
+    assert legend_words(reduce(shown, SetOverlay("entropy")), SCENE, (0.0, 1.0)) == ("entropy", ["0.00", "1.00"])
+
+
+def test_comparing_with_the_kept_state_closes_the_notice_that_advised_it() -> None:
+    kept = after(OPEN, KeepState())
+    assert [notice.text for notice in kept.notices] == [KEPT]
+    assert reduce(kept, Compare("kept")).notices == ()
+    assert reduce(kept, Compare("photo")).notices == ()
 
 
 def test_scores_are_shown_only_with_the_view_they_belong_to() -> None:

@@ -15,12 +15,14 @@ from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import (
     DismissNotice,
     EditsSaved,
+    EndGesture,
     Notify,
     OpenFailed,
     OpenPath,
     ProgressMade,
     Quit,
     SceneOpened,
+    SessionsKept,
     SetDepthStrength,
     SetHover,
     SetInpainter,
@@ -44,7 +46,7 @@ from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.notices import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover, Picture
-from viewer.model.state.depth_editing import DepthSettings
+from viewer.model.state.depth_editing import DepthSettings, SetTone
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
     APERTURE_KINDS,
@@ -235,6 +237,27 @@ def test_quitting_asks_where_depth_edits_would_be_lost() -> None:
     other = reduce(reduce(edited, EditsSaved(edits)), OpenPath(Source("other.png")))
     other = reduce(other, SceneOpened(other.generation, scene_of(source=other.source)))
     assert not reduce(replace(other, depth=DepthSettings(edits=edits)), Quit()).should_quit, "those of another photo"
+
+
+def test_undone_edits_are_lost_as_little_as_others() -> None:
+    """Redo alone is not asked for: what is there is kept, in a file or for the next time."""
+    opened = state_with(scene_of(plan=plan_of(GridShape(9, 9))))
+    first, second = replace(UNEDITED, gamma=1.5), replace(UNEDITED, gamma=1.5, is_inverted=True)
+    half = opened
+    for action in (SetTone(first, is_finished=True), EndGesture(), SetTone(second, is_finished=True), Undo()):
+        half = reduce(half, action)
+    assert half.depth.edits == first
+    assert reduce(half, Quit()).prompt == "quit"
+    assert reduce(reduce(half, EditsSaved(second)), Quit()).prompt == "quit", "the file has what was undone"
+    assert reduce(reduce(half, EditsSaved(first)), Quit()).should_quit
+    assert reduce(reduce(half, Undo()), Quit()).should_quit, "all is as it was found"
+    assert reduce(reduce(half, SessionsKept(True)), Quit()).should_quit, "it opens as it is left"
+
+
+def test_the_first_help_stays_while_a_folder_opens_its_first_photo() -> None:
+    welcomed = replace(AppState(), prompt="welcome")
+    assert reduce(welcomed, OpenPath(Source("photo.png"))).prompt == "welcome"
+    assert reduce(replace(welcomed, prompt="help"), OpenPath(Source("photo.png"))).prompt is None
 
 
 def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> None:

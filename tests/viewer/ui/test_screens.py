@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import headless_with_scene
@@ -17,6 +18,8 @@ from viewer.model.actions import (
     AskToSave,
     DismissNotice,
     Notify,
+    OpenFailed,
+    OpenPath,
     PictureDrawn,
     ProgressMade,
     SetFontScale,
@@ -28,6 +31,7 @@ from viewer.model.actions import (
     ToggleSection,
 )
 from viewer.model.layout import PANEL_WIDTH, layout_of
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
@@ -181,3 +185,21 @@ def test_what_is_being_saved_in_words() -> None:
     assert saving_text(Saving("a.png", 0.234)) == "Drawing a.png, 23 %"
     assert saving_text(Saving("a.png", 0.0, 2)) == "Drawing a.png, 0 %, 2 more to save"
     assert saving_text(Saving("a.exr", 1.0)) == "Writing a.exr"
+
+
+def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(
+    viewer: HeadlessViewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words: list[str] = []
+    monkeypatch.setattr(imgui, "text_wrapped", words.append)
+    viewer.state = AppState(recent=("old.png",))
+    viewer.screen(SIZE)
+    assert any(text.startswith("Drop a photo") for text in words)
+    words.clear()
+    viewer.state = reduce(viewer.state, OpenPath(Source("holiday.jpg")))
+    viewer.screen(SIZE)
+    assert not words
+    words.clear()
+    viewer.state = reduce(viewer.state, OpenFailed(viewer.state.generation, "no photo"))
+    viewer.screen(SIZE)
+    assert any(text.startswith("Drop a photo") for text in words)

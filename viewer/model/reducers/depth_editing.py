@@ -31,6 +31,7 @@ from viewer.model.state.depth_editing import (
     SetTone,
 )
 from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import SECTIONS
 
 POINT_SPACING = 1 / 6
 """Of the radius: a stroke is remembered by places this far apart."""
@@ -55,7 +56,8 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
             return _with_settings(state, replace(state.depth, edits=edits), "SetTone", is_finished)
         case SetBrush(brush) if isfinite(brush.radius) and isfinite(brush.strength):
             gloss_brush = replace(state.gloss_brush, is_on=state.gloss_brush.is_on and not brush.is_on)
-            return replace(state, brush=_clamp_brush(brush), gloss_brush=gloss_brush)
+            taken = replace(state, brush=_clamp_brush(brush), gloss_brush=gloss_brush)
+            return _with_depth_section(taken) if brush.is_on and not state.brush.is_on else taken
         case Paint(place) if all(map(isfinite, place)):
             return _paint(state, place)
         case PickDepth(sample) if all(map(isfinite, (*sample.place, sample.disparity))):
@@ -97,6 +99,13 @@ def is_depth_ahead(state: AppState, asked_for: DepthSettings) -> bool:
     """Whether the depth of the open scene is being edited: it is not what the worker was asked for."""
     is_open = state.scene is not None and state.scene.source is state.source
     return is_open and current_depth_settings(state) != asked_for
+
+
+def _with_depth_section(state: AppState) -> AppState:
+    """Who takes the brush by its key sees what it is and can do."""
+    is_open = state.preferences.open_sections
+    sections = tuple(section for section in SECTIONS if section in (*is_open, "depth"))
+    return replace(state, preferences=replace(state.preferences, open_sections=sections))
 
 
 def _with_settings(state: AppState, depth_settings: DepthSettings, kind: str, is_finished: bool) -> AppState:

@@ -128,7 +128,10 @@ def _set_comparison(state: AppState, kind: Comparison | None) -> AppState:
     if kind == "truth" and state.inspection.truth is None:
         return replace(state, tasks=(*state.tasks, ChooseTask("truth")))
     obstacle = NOTHING_KEPT if lacks_kept_state(state, kind) else obstacle_to_comparison(state.scene, kind)
-    return add_notice(state, Notice(obstacle)) if obstacle else _with(state, comparison=kind, overlay=None, pair=None)
+    if obstacle:
+        return add_notice(state, Notice(obstacle))
+    advised = tuple(notice for notice in state.notices if notice.text != KEPT)  # is done now
+    return _with(replace(state, notices=advised), comparison=kind, overlay=None, pair=None)
 
 
 def _set_truth(state: AppState, truth: GroundTruth) -> AppState:

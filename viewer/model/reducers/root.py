@@ -162,8 +162,9 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
         case OpenPath(source):
             progress = Progress(doing=f"reading {PurePath(source.path).name}")
             generation, left = state.next_generation, _leave_field(state)
-            state = replace(state, free_camera=None, poses=None)
-            return replace(state, source=source, progress=progress, generation=generation, prompt=None, left_field=left)
+            prompt = state.prompt if state.prompt == "welcome" else None  # a folder opens a photo of it by itself
+            state = replace(state, free_camera=None, poses=None, prompt=prompt)
+            return replace(state, source=source, progress=progress, generation=generation, left_field=left)
         case StopWork():
             return stop_work(state)
         case ResumeWork() if state.scene is not None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from viewer.model.state.saving import SavedSettings
 
-SHORT_NOTICE_S, LONG_NOTICE_S = 12.0, 60.0
+SHORT_NOTICE_S, LONG_NOTICE_S = 12.0, 30.0
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,11 @@ from viewer.model.inspection_request import (
     view_near,
 )
 from viewer.model.layout import Layout, Rect
-from viewer.model.lens.photographic_units import relative_distance
+from viewer.model.lens.photographic_units import metres, metres_text
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Comparison, Origin, Probe
 from viewer.model.state.scene import Scene
+from viewer.ui.overlays.reticle import WORD_GAP, hover_text
 from viewer.ui.style import DARK, Color, pack_color, palette_of
 
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
@@ -68,13 +69,11 @@ def draw_beside_picture(state: AppState, layout: Layout, textures: InspectionTex
         _draw_status(state, scene, layout, layout.status)
 
 
-def status_text(scene: Scene, hover: Hover, probe: Probe | None) -> list[str]:
+def status_text(state: AppState, scene: Scene, hover: Hover, probe: Probe | None) -> list[str]:
     """What is under the pointer, in order of importance."""
     words = [f"{hover.x_px:.0f}, {hover.y_px:.0f}"]
     if hover.disparity is not None:
-        words.append(f"{hover.disparity:+.2f} px".replace("-", "−"))
-        distance = relative_distance(scene, hover.disparity)
-        words += [] if distance is None else [f"× {distance:.2f}"]
+        words += hover_text(state.optics, scene, hover, state.preferences.units).split(WORD_GAP)
     if probe is None:
         return words
     words.append(ORIGIN_WORDS[probe.origin])
@@ -114,7 +113,7 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
     draw, line = imgui.get_background_draw_list(), imgui.get_text_line_height()
     width, height = LEGEND_WIDTH * scale, LEGEND_HEIGHT * scale
     ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
-    labels = [f"{value:.2f}".replace("-", "−") for value in ends]
+    name, labels = legend_words(state, scene, ends)
     far = imgui.ImVec2(x + width + 2 * room, y + height + line + 2.5 * room)
     draw.add_rect_filled(imgui.ImVec2(x, y), far, pack_color(DARK.background, 0.72), 4 * scale)
     left, top = x + room, y + room
@@ -128,13 +127,23 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
     draw.add_text(
         imgui.ImVec2(left + width - imgui.calc_text_size(labels[1]).x, below), pack_color(DARK.text), labels[1]
     )
-    name = "px per step" if kind == "disparity" else "entropy"
     middle = left + (width - imgui.calc_text_size(name).x) / 2
     draw.add_text(imgui.ImVec2(middle, below), pack_color(DARK.quiet), name)
     if kind == "disparity" and state.hover is not None and state.hover.disparity is not None and ends[1] > ends[0]:
         share = min(max((state.hover.disparity - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
         at = left + share * width
         _line(at, top - 2 * scale, at, top + height + 2 * scale, pack_color(DARK.text), 1.5 * scale)
+
+
+def legend_words(state: AppState, scene: Scene, ends: tuple[float, float]) -> tuple[str, list[str]]:
+    """What the colours are of, and the words at their ends."""
+    numbers = [f"{value:.2f}".replace("-", "−") for value in ends]
+    if state.inspection.overlay != "disparity":
+        return "entropy", numbers
+    if state.preferences.units == "light field":
+        return "px per step", numbers
+    distances = [metres(scene, disparity) for disparity in ends]
+    return "distance", [name if m is None else metres_text(m) for name, m in zip(("far", "near"), distances)]
 
 
 def _draw_comparison(state: AppState, scene: Scene, layout: Layout, frame: Rect, textures: InspectionTextures) -> None:
@@ -243,7 +252,7 @@ def _draw_status(state: AppState, scene: Scene, layout: Layout, rect: Rect) -> N
         draw.add_text(imgui.ImVec2(rect.x, y), pack_color(palette.quiet), "Point at the picture to see its values.")
         return
     x, gap = rect.x, 18 * scale
-    for words in status_text(scene, hover, probe):
+    for words in status_text(state, scene, hover, probe):
         is_color = words.startswith("RGB")
         swatch = imgui.get_text_line_height() if is_color else 0.0
         width = imgui.calc_text_size(words).x + (swatch + 5 * scale if swatch else 0)

@@ -16,6 +16,7 @@ from viewer.model.state.preferences import Units
 from viewer.model.state.scene import Scene
 from viewer.ui.style import DARK, pack_color
 
+WORD_GAP = "  ·  "
 RETICLE_RADIUS = 11.0
 HANDLE_RADIUS = 8.0
 SAMPLE_RADIUS = 6.0
@@ -63,7 +64,7 @@ def hover_text(optics: Optics, scene: Scene, hover: Hover, units: Units = "photo
         words.append("sharp")
     else:
         words.append(f"{abs(ahead):.2f} {'in front' if ahead > 0 else 'behind'}")
-    return "  ·  ".join(words).replace("-", "−")
+    return WORD_GAP.join(words).replace("-", "−")
 
 
 def _distance_words(scene: Scene, disparity: float, sharp: float, is_sharp: bool) -> str:
@@ -74,9 +75,9 @@ def _distance_words(scene: Scene, disparity: float, sharp: float, is_sharp: bool
         percent = abs(far_percent(scene, disparity) - far_percent(scene, sharp))
         return "sharp" if is_sharp else f"{percent:.0f} % {side}"
     if is_sharp:
-        return f"{metres_text(here)}  ·  sharp"
+        return f"{metres_text(here)}{WORD_GAP}sharp"
     away = "far" if math.isinf(here) or math.isinf(focus) else metres_text(abs(here - focus))
-    return f"{metres_text(here)}  ·  {away} {side}"
+    return f"{metres_text(here)}{WORD_GAP}{away} {side}"
 
 
 def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:

@@ -165,7 +165,16 @@ def _brush(state: AppState, layout: Layout) -> list[Action]:
         size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, tip, is_logarithmic=True)
         actions += [] if size is None else [SetBrush(replace(brush, radius=size / 100))]
         actions += _sample(brush, layout) if brush.tool in DEPTH_TOOLS else _strength(brush, layout)
+    _scroll_here_when_taken(brush.is_on)
     return actions
+
+
+def _scroll_here_when_taken(is_in_hand: bool) -> None:
+    """Taken by its key the brush may be out of sight."""
+    before, key = imgui.get_state_storage(), imgui.get_id("brush in hand")
+    if is_in_hand and not before.get_bool(key) and not imgui.is_item_visible():
+        imgui.set_scroll_here_y(1.0)
+    before.set_bool(key, is_in_hand)
 
 
 def _strength(brush: Brush, layout: Layout) -> list[Action]:
