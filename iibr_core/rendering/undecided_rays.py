@@ -50,7 +50,11 @@ def find_undecided_rays(
 ) -> UndecidedRays:
     """The rays of `find_ambiguous_rays`, but for those already decided (N, W), and as little as will do to describe
     them later.
+
+    Raises ValueError for fewer than two hypotheses: a surface and the plain look-up.
     """
+    if hypotheses < 2:
+        raise ValueError(f"{hypotheses} hypotheses a ray: give 2 at least")
     from_sources = np.array(candidates.offset) - rays.arrays[0]
     around = rays.statistics
     parallax = max(*map(abs, candidates.offset), 1e-9)

@@ -291,3 +291,13 @@ def test_a_transformer_that_repeats_the_closed_form_changes_nothing():
     assert two.colors == pytest.approx(one.colors, abs=0.02)
     assert np.mean(np.abs(two.colors - one.colors) > 1e-3) < 0.01
     assert (two.occluded == one.occluded).all()
+
+
+def test_one_hypothesis_leaves_no_room_for_the_plain_one_and_is_refused():
+    photo, disparity = square_before_wall()
+    rays = rays_of_photo(photo.pixels, disparity.values, 2.0, 0)
+    with (
+        ViewSynthesis(transformer=lambda ambiguous: ambiguous.features[..., SHARE], hypotheses=1) as synthesis,
+        pytest.raises(ValueError, match="1 hypotheses a ray"),
+    ):
+        synthesis.render(rays, OFFSET)
