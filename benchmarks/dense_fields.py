@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from benchmarks.provenance import made_by
 from benchmarks.refocus import read_views
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
-from iibr_core.depth.multi_view.agreement import estimate_all
 from iibr_core.depth.multi_view.estimate import estimate_coarse
+from iibr_core.depth.multi_view.every_view import estimate_all
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.generation.dense_field import GivenView, densify

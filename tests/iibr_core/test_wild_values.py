@@ -21,7 +21,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.multi_view import agreement, estimate, matching
+from iibr_core.depth.multi_view import agreement, estimate, every_view, matching
 from iibr_core.formats.images import oiio_reader, photo
 from iibr_core.formats.images.picture_kinds import KINDS
 from iibr_core.formats.images.picture_writers import write_picture
@@ -290,7 +290,7 @@ FINITE = {
     "inpainting.disparity_holes.say_filled": lambda v, _: disparity_holes.say_filled("map", v) and None,
     "depth.embedded.google.gdepth_estimate": lambda v, _: known_of(google.gdepth_estimate(gdepth_xmp(v))),
     "depth.multi_view.matching.luma_of": lambda v, _: matching.luma_of(image(v).astype(np.float16)),
-    "depth.multi_view.agreement.estimate_all": lambda v, _: agreement.estimate_all(pair(v), OFFSETS, (-1.0, 1.0)),
+    "depth.multi_view.every_view.estimate_all": lambda v, _: every_view.estimate_all(pair(v), OFFSETS, (-1.0, 1.0)),
     "depth.multi_view.agreement.reconcile": lambda v, _: agreement.reconcile(
         pair(v), [np.nan_to_num(depths(v)), depths(1.0)], OFFSETS
     ),

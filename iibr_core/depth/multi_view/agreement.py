@@ -1,4 +1,4 @@
-"""The disparity of every view of a light field: each estimated from all views, then held against the other maps.
+"""The disparity maps of all views of a light field, held against each other.
 
 A map is least sure where few other views see a place: there it mostly continues what stands in front. What no other map
 confirms, or more of them look through than confirm, is filled by what looks like it around.
@@ -12,33 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.multi_view.estimate import estimate_disparity
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
-from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress
+from iibr_core.types import FloatImage, StoredColors, ViewOffset
 
 AGREE_PX = 1.0
 """Two maps that place a point within so many pixels, seen from each other's view, agree."""
-
-
-def estimate_all(
-    views: Sequence[StoredColors],
-    offsets: Sequence[ViewOffset],
-    range_px: tuple[float, float],
-    should_stop: ShouldStop = never,
-    report_progress: ReportProgress = ignore_progress,
-) -> list[FloatImage]:
-    """The disparity (H, W) of each view, px per view step, within a range (`estimate_coarse` finds it), in agreement
-    with the others.
-
-    views: (H, W, 3) each, of equal size. offsets: their viewpoints. Raises InputError where these are all one,
-    Cancelled once should_stop is true.
-    """
-    maps = []
-    for index in range(len(views)):
-        report_progress(index, len(views), "finding disparity")
-        maps.append(estimate_disparity(views, offsets, index, range_px, should_stop))
-    return reconcile(views, maps, offsets, should_stop)
 
 
 def reconcile(

@@ -97,9 +97,19 @@ def estimate_disparity(
     values = _median(values, should_stop)
     if len(matched.textures) <= FEW_VIEWS:
         values = _fill_unseen(views[reference], values, _agrees(matched, values, disparities, should_stop), should_stop)
-    refined = refine_by_gradients(matched, values, should_stop)
-    result: FloatImage = np.clip(refined, low, high).astype(np.float32)
-    return result
+    return _refine(matched, values, range_px, should_stop)
+
+
+def refine_disparity(
+    views: Sequence[StoredColors],
+    offsets: Sequence[ViewOffset],
+    reference: int,
+    values: FloatImage,
+    range_px: tuple[float, float],
+    should_stop: ShouldStop = never,
+) -> FloatImage:
+    """The same from disparity (H, W) that is off by less than a pixel already: nothing is swept."""
+    return _refine(_matching_views(views, offsets, reference, 1, should_stop), values, range_px, should_stop)
 
 
 def sweep_bytes(size: tuple[int, int], range_px: tuple[float, float], reach: float) -> int:
@@ -121,6 +131,13 @@ def _matching_views(
     chosen = choose_views(list(offsets), reference)
     lumas = [luma_of(views[index], shrink) for index in chosen]
     return matching_views(lumas, [offsets[index] for index in chosen], should_stop)
+
+
+def _refine(
+    matched: MatchingViews, values: FloatImage, range_px: tuple[float, float], should_stop: ShouldStop
+) -> FloatImage:
+    refined: FloatImage = np.clip(refine_by_gradients(matched, values, should_stop), *range_px).astype(np.float32)
+    return refined
 
 
 def _agrees(

@@ -2,11 +2,8 @@
 
 import numpy as np
 
-from iibr_core.depth.multi_view.agreement import AGREE_PX, estimate_all, find_confirmed, reconcile
-from iibr_core.depth.multi_view.estimate import estimate_coarse
-from iibr_core.training.scenes.random_scene import random_scene
-from iibr_core.training.scenes.raycast import render
-from iibr_core.types import GridShape, ImageSize, ViewOffset
+from iibr_core.depth.multi_view.agreement import AGREE_PX, find_confirmed, reconcile
+from iibr_core.types import ViewOffset
 
 OFFSETS = [ViewOffset(0.0, -2.0), ViewOffset(0.0, 0.0), ViewOffset(1.0, 2.0)]
 
@@ -52,24 +49,3 @@ def test_maps_that_share_nothing_stay_as_they_are():
     maps = [np.full((8, 8), value, np.float32) for value in (-900.0, 0.0, 900.0)]
     kept = reconcile([np.zeros((8, 8, 3), np.uint8)] * 3, maps, OFFSETS)
     assert all((a == b).all() for a, b in zip(kept, maps))
-
-
-def test_views_without_any_texture_get_finite_maps():
-    views = [np.full((24, 32, 3), 90, np.uint8)] * 3
-    range_px = estimate_coarse(views, OFFSETS, 1).range_px
-    assert all(np.isfinite(values).all() for values in estimate_all(views, OFFSETS, range_px))
-
-
-def test_agreement_brings_estimated_maps_nearer_to_the_truth():
-    grid, size = GridShape(3, 3), ImageSize(96, 120)
-    offsets = [ViewOffset(2 * t, 2 * s) for t, s in (grid.offset(*at) for at in np.ndindex(*grid))]
-    scene = random_scene(np.random.default_rng(5), size, 2.0)
-    drawn = [render(scene, size, offset, samples=2) for offset in offsets]
-    views = [(255 * colors + 0.5).astype(np.uint8) for colors, _ in drawn]
-    told = []
-    maps = estimate_all(
-        views, offsets, estimate_coarse(views, offsets, 4).range_px, report_progress=lambda *now: told.append(now)
-    )
-    assert len(told) == 9
-    wrong = np.mean([np.abs(values - truth) > 0.25 for values, (_, truth) in zip(maps, drawn)])
-    assert wrong < 0.12

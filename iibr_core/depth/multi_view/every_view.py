@@ -1,0 +1,92 @@
+"""The disparity of every view of a light field.
+
+Matching a view costs far more than all the rest, and what stands between two matched views shows next to nothing that
+neither of them does. So every other view is matched, as on a chessboard; their maps are carried to those between, and
+refined there. In the end all maps are held against each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+
+import numpy as np
+
+from iibr_core.color import encoded_from_stored
+from iibr_core.depth.multi_view.agreement import reconcile
+from iibr_core.depth.multi_view.estimate import estimate_disparity, refine_disparity
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress, image_size
+
+CARRIED_FROM = 4
+"""So many maps at most, the nearest first, are carried to a view."""
+
+
+def estimate_all(
+    views: Sequence[StoredColors],
+    offsets: Sequence[ViewOffset],
+    range_px: tuple[float, float],
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+) -> list[FloatImage]:
+    """The disparity (H, W) of each view, px per view step, within a range (`estimate_coarse` finds it), in agreement
+    with the others.
+
+    views: (H, W, 3) each, of equal size. offsets: their viewpoints. Raises InputError where these are all one,
+    Cancelled once should_stop is true.
+    """
+    maps: dict[int, FloatImage] = {}
+    for index in matched_views(offsets):
+        report_progress(len(maps), len(views), "finding disparity")
+        maps[index] = estimate_disparity(views, offsets, index, range_px, should_stop)
+    matched = dict(maps)
+    for index in sorted(set(range(len(views))) - set(matched)):
+        report_progress(len(maps), len(views), "finding disparity")
+        values = _carry(matched, views, offsets, index, should_stop)
+        maps[index] = refine_disparity(views, offsets, index, values, range_px, should_stop)
+    return reconcile(views, [maps[index] for index in range(len(views))], offsets, should_stop)
+
+
+def matched_views(offsets: Sequence[ViewOffset]) -> list[int]:
+    """Which views are matched: all but every second one that has others on both sides, in its row or in its column."""
+    rows, columns = (sorted({offset[axis] for offset in offsets}) for axis in (0, 1))
+    matched = []
+    for index, (t, s) in enumerate(offsets):
+        row, column = rows.index(t), columns.index(s)
+        is_between = 0 < row < len(rows) - 1 or 0 < column < len(columns) - 1
+        if (row + column) % 2 == 0 or not is_between:
+            matched.append(index)
+    return matched
+
+
+def _carry(
+    maps: dict[int, FloatImage],
+    views: Sequence[StoredColors],
+    offsets: Sequence[ViewOffset],
+    index: int,
+    should_stop: ShouldStop,
+) -> FloatImage:
+    """The disparity (H, W) that maps of other views show in this one; what none of them shows takes what looks like
+    it around. Where they show nothing at all, the nearest map.
+    """
+    at, carried = offsets[index], np.full(image_size(views[index]), np.nan, np.float32)
+
+    def away(other: int) -> ViewOffset:
+        return ViewOffset(at.t - offsets[other].t, at.s - offsets[other].s)
+
+    nearest = sorted(maps, key=lambda other: hypot(*away(other)))[:CARRIED_FROM]
+    with ViewSynthesis(should_stop) as synthesis:
+        for other in nearest:
+            rays = rays_of_photo(_shown(views[other]), maps[other], max(map(abs, away(other))), 0, should_stop)
+            seen, _ = synthesis.render_seen(rays, away(other))
+            np.copyto(carried, seen.disparity, where=np.isnan(carried) & ~seen.occluded)
+    if np.isnan(carried).all():
+        return maps[nearest[0]]
+    return fill_disparity_by_color(_shown(views[index]), carried, should_stop)
+
+
+def _shown(colors: StoredColors) -> FloatImage:
+    """Colours (H, W, 3), sRGB-encoded and finite."""
+    return np.nan_to_num(encoded_from_stored(colors), posinf=1.0)
