@@ -298,6 +298,9 @@ FINITE = {
         [depths(v), depths(1.0)], OFFSETS, 0
     ),
     "depth.multi_view.estimate.estimate_coarse": lambda v, _: estimate.estimate_coarse(pair(v), OFFSETS, 0).values,
+    "depth.multi_view.estimate.refine_disparity": lambda v, _: estimate.refine_disparity(
+        pair(v), OFFSETS, 0, np.zeros_like(depths(0.5)), (-1.0, 1.0)
+    ),
     "depth.multi_view.estimate.estimate_disparity": lambda v, _: estimate.estimate_disparity(
         pair(v), OFFSETS, 0, (-1.0, 1.0)
     ),
@@ -506,6 +509,7 @@ READS_OR_TELLS = {
     "require_unchanged",
     "depth.models.package_models": "run_package",
     "depth.multi_view.estimate": "sweep_bytes",
+    "depth.multi_view.every_view": "matched_views",
     "depth.multi_view.matching": "choose_views",
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
