@@ -5,7 +5,9 @@
 Scenes are procedural ones, seen from eight cameras each: beside the photo's, before and behind it, turned, and with
 another lens. "warp": every pixel's colour lands on one pixel, the nearest wins; holes are filled from beside.
 "resampled": nine points a pixel tell the disparity, colours are looked up by Lanczos' kernel. Disparity is the truth.
-PSNR in dB (of the frame; of what the photo sees; of what it does not), the median over scenes; processor time a view.
+PSNR in dB (of the frame; of what the photo sees; of what it does not), the frame's gain over the warp of the same scene
+and pose, and the share of the frame's squared error that lies beyond the photo's frame; medians over scenes. Processor
+time a view.
 """
 
 from __future__ import annotations
@@ -44,8 +46,10 @@ POSES = {
 photo's.
 """
 
-Row = tuple[float, float, float, float]
-"""PSNR of the frame, of what is seen, of what is not; milliseconds of processor time."""
+Row = tuple[float, float, float, float, float, float]
+"""PSNR of the frame, its gain over the warp's, of what is seen, of what is not; share of the error that lies beyond the
+photo's frame; milliseconds of processor time.
+"""
 Table = dict[tuple[str, str], list[Row]]
 """Rows of all scenes, by pose and way."""
 
@@ -103,6 +107,16 @@ def truth(scene: RaycastScene, camera: Camera) -> tuple[FloatImage, FloatImage]:
     return colors, disparity / np.float32(camera.focal_px[0])
 
 
+def beyond_frame(disparity: FloatImage, photo_from_target: NDArray[np.float64], size: ImageSize) -> NDArray[np.bool_]:
+    """Which pixels of a view with this disparity (H, W) see what lies beyond the frame of a photo of a size."""
+    y, x = np.indices(disparity.shape)
+    source = photo_from_target @ np.stack([x, y, np.ones_like(x), disparity]).reshape(4, -1)
+    at_x, at_y = (source[:2] / source[2]).reshape(2, *disparity.shape)
+    return ~(
+        (abs(at_x - (size.width - 1) / 2) <= size.width / 2) & (abs(at_y - (size.height - 1) / 2) <= size.height / 2)
+    )
+
+
 def plain_warp(photo: FloatImage, disparity: FloatImage, matrix: NDArray[np.float64], size: ImageSize) -> FloatImage:
     """Every pixel's colour on the pixel where its middle lands, the nearest on top; holes as in the reference warp."""
     rows, columns = np.indices(disparity.shape)
@@ -131,9 +145,9 @@ def main() -> None:
     for _ in range(options.scenes):
         ray_set_ms.append(judge(random_scene(rng, size, float(rng.uniform(1, 3))), size, table))
     print(f"{made_by('benchmarks.free_views')}.\n")
-    print("| pose | way | frame dB | seen dB | unseen dB | ms of processor time |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    print(f"| all, once | ray set | | | | {np.median(ray_set_ms):.0f} |")
+    print("| pose | way | frame dB | gain dB | seen dB | unseen dB | error beyond the frame | ms of processor time |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print(f"| all, once | ray set | | | | | | {np.median(ray_set_ms):.0f} |")
     for (pose, way), rows in table.items():
         print(line(pose, way, rows))
     for way in ("warp", "resampled", "ours"):
@@ -142,8 +156,9 @@ def main() -> None:
 
 def line(pose: str, way: str, rows: list[Row]) -> str:
     """Of the table."""
-    frame, seen, unseen, ms = np.nanmedian(np.array(rows), axis=0)
-    return f"| {pose} | {way} | {frame:.2f} | {seen:.2f} | {unseen:.2f} | {ms:.0f} |"
+    frame, gain, seen, unseen, beyond, ms = np.nanmedian(np.array(rows), axis=0)
+    figures = f"{frame:.2f} | {gain:+.2f} | {seen:.2f} | {unseen:.2f} | {beyond:.0%} | {ms:.0f}"
+    return f"| {pose} | {way} | {figures} |"
 
 
 def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
@@ -158,8 +173,9 @@ def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
     ours = FreeViews(photo, inverse_depth, taken, list(cameras.values()))
     ray_set_ms = 1e3 * (time.process_time() - start)
     for name, camera in cameras.items():
-        true, _ = truth(scene, camera)
+        true, true_inverse = truth(scene, camera)
         matrix = target_from_photo(taken, camera, scale_px)
+        is_beyond = beyond_frame(true_inverse * np.float32(scale_px), np.linalg.inv(matrix), size)
         judged = reference_warp_to(photo, disparity, matrix, size)
         ways: dict[str, Callable[[], FloatImage]] = {
             "warp": partial(plain_warp, photo, disparity, matrix, size),
@@ -170,8 +186,11 @@ def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
             start = time.process_time()
             made = np.clip(make(), 0, 1)
             ms = 1e3 * (time.process_time() - start)
-            figures = (bounded_psnr(made, true, mask) for mask in (None, judged.visible, judged.hole))
-            table.setdefault((name, way), []).append((*figures, ms))
+            frame, seen, unseen = (bounded_psnr(made, true, mask) for mask in (None, judged.visible, judged.hole))
+            warped = frame if way == "warp" else table[name, "warp"][-1][0]
+            error = (made - true) ** 2
+            beyond = float(error[is_beyond].sum() / error.sum())
+            table.setdefault((name, way), []).append((frame, frame - warped, seen, unseen, beyond, ms))
     return ray_set_ms
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.background import continue_farthest
 from iibr_core.rendering.candidates import SAME_SURFACE_PX, SEALED_GAP_PX
 from iibr_core.rendering.joined_rays import BELOW, RIGHT
-from iibr_core.rendering.ray_set import CELL_PX, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, HIGHEST_LEVEL, RaySet
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
 from iibr_core.rendering.view_synthesis import RenderedView
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
@@ -81,7 +81,7 @@ def render_free_view(
         nearest, source = _draw(rays, drawing, landing, surface, (first, last), size.width)
         _, images, surfaces, _, edge_level = rays.arrays
         _resolve(
-            images, surfaces, edge_level, rays.photo_images, looking_up, frame, rays.farthest_views, surface,
+            images, surfaces, edge_level, rays.photo_images, looking_up, frame, rays.farthest_views,
             first, nearest, source, view.colors, view.disparity, view.occluded, view.inpainted,
         )  # fmt: skip
 
@@ -271,7 +271,7 @@ def _sample_after(position):
 
 @kernel
 def _resolve(
-    images, surfaces, edge_level, photo_images, inverses, frame, farthest_views, one_surface,
+    images, surfaces, edge_level, photo_images, inverses, frame, farthest_views,
     first_row, nearest, seen, colors, disparity, occluded, inpainted,
 ):  # fmt: skip
     """The target rows that the samples are of: colours, disparity, holes, and what the photo shows nothing of."""
@@ -297,12 +297,15 @@ def _resolve(
                 v, u = row * SAMPLES + sample // SAMPLES, x * SAMPLES + sample % SAMPLES
                 k, d = np.int64(seen[v, u]) - 1, np.float64(nearest[v, u])
                 m = inverses[k]
-                # How many pixels of the source a target pixel spans there.
-                w = m[8] * x + m[9] * y + m[10] + m[11] * d
-                at_x, at_y = (m[0] * x + m[1] * y + m[2] + m[3] * d) / w, (m[4] * x + m[5] * y + m[6] + m[7] * d) / w
+                # How many pixels of the source a target pixel spans there, and disparity moves the look-up by.
+                at_x, at_y, at_d, w = _project(m, x, y, d)
                 spans_x = max(abs(m[0] - at_x * m[8]), abs(m[1] - at_x * m[9])) / abs(w)
                 spans_y = max(abs(m[4] - at_y * m[8]), abs(m[5] - at_y * m[9])) / abs(w)
                 is_fine = max(spans_x, spans_y) > FINE_PX
+                moves = max(abs(m[3] - at_x * m[11]), abs(m[7] - at_y * m[11]), 1e-9)
+                one_surface = SAME_SURFACE_PX * abs(w) / moves
+                parallax = moves / max(abs(m[15] - at_d * m[11]), 1e-9)
+                limit = min(max(farthest_views / parallax, 1.0), HIGHEST_LEVEL - 1.0)
                 # The samples of its surface: their mean place and disparity lie on it.
                 count, total_d, total_x, total_y = 0, 0.0, 0.0, 0.0
                 for other in range(sample, SAMPLES**2):
@@ -317,17 +320,14 @@ def _resolve(
                         break
                 # Backward warp.
                 mean_d, target_x, target_y = total_d / count, x + total_x / count, y + total_y / count
-                w = m[8] * target_x + m[9] * target_y + m[10] + m[11] * mean_d
-                at_x = (m[0] * target_x + m[1] * target_y + m[2] + m[3] * mean_d) / w
-                at_y = (m[4] * target_x + m[5] * target_y + m[6] + m[7] * mean_d) / w
-                at_d = (m[12] * target_x + m[13] * target_y + m[14] + m[15] * mean_d) / w
+                at_x, at_y, at_d, _ = _project(m, target_x, target_y, mean_d)
                 at_x, at_y = min(max(at_x, -0.5), width - 0.5), min(max(at_y, -0.5), height - 0.5)
-                if edge_level[k, max(floor(at_y), 0), max(floor(at_x), 0)] <= 1:
+                if edge_level[k, max(floor(at_y), 0), max(floor(at_x), 0)] <= limit:
                     r, g, b = cubic(images, k, at_x, at_y)
                 elif k < photo_images:
-                    r, g, b = resample(images, surfaces, k, at_x, at_y, at_d, farthest_views)
+                    r, g, b = resample(images, surfaces, k, at_x, at_y, at_d, parallax)
                 else:
-                    r, g, b = resample_inpainted(images, surfaces, k, at_x, at_y, at_d, farthest_views)
+                    r, g, b = resample_inpainted(images, surfaces, k, at_x, at_y, at_d, parallax)
                 if count > most:
                     most, disparity[y, x] = count, mean_d
                     is_within = left - 0.5 <= at_x <= width - right - 0.5 and top - 0.5 <= at_y <= height - bottom - 0.5
