@@ -132,8 +132,7 @@ def _draw(
         # What the photo shows goes before what was made up beside it.
         ahead = surface if k >= rays.photo_images else 0.0
         _draw_rays(
-            disparity[k], coverage[k], joined, landing[k], matrix, k, rays.photo_images, ahead,
-            SEALED_GAP_PX / rays.farthest_views, first, nearest, source,
+            disparity[k], coverage[k], joined, landing[k], matrix, k, rays.photo_images, ahead, first, nearest, source
         )  # fmt: skip
     return nearest, source
 
@@ -176,9 +175,9 @@ def _land_cells(low, high, m, first, last, landing):
 
 @kernel
 def _draw_rays(
-    disparity, coverage, joined, landing, m, index, photo_images, ahead, one_surface, first_row, nearest, source,
+    disparity, coverage, joined, landing, m, index, photo_images, ahead, first_row, nearest, source
 ):  # fmt: skip
-    """Draw the rays of one image, seen from (t, s); see `_draw`. ahead: so much nearer than the photo's surface it must
+    """Draw the rays of one image; see `_draw`. ahead: so much nearer than the photo's surface it must
     be to hide it.
     """
     height, width = disparity.shape
@@ -192,12 +191,12 @@ def _draw_rays(
             is_drawn[x] = is_near and coverage[y, x] > 0
             any_drawn = any_drawn or is_drawn[x]
         if any_drawn:
-            _land_squares(disparity, joined, m, one_surface, y, corners, is_drawn)
+            _land_squares(disparity, joined, m, y, corners, is_drawn)
             _draw_squares(corners, is_drawn, coverage[y], index, photo_images, ahead, first_row, nearest, source)
 
 
 @kernel
-def _land_squares(disparity, joined, m, one_surface, y, corners, is_drawn):
+def _land_squares(disparity, joined, m, y, corners, is_drawn):
     """Where the corners of a row of pixels land: (X, Y, D) each; what reaches behind the camera is not drawn.
 
     A corner's disparity is the mean of those around it on the pixel's surface: where these agree, there are no cracks.
@@ -207,6 +206,10 @@ def _land_squares(disparity, joined, m, one_surface, y, corners, is_drawn):
         if not is_drawn[x]:
             continue
         here = disparity[y, x]
+        # Steps of disparity that open a gap as wide as may be sealed.
+        at_x, at_y, _, _ = _project(m, x, y, here)
+        wide = max(abs(m[0] - at_x * m[8]), abs(m[5] - at_y * m[9]), abs(m[1] - at_x * m[9]), abs(m[4] - at_y * m[8]))
+        one_surface = SEALED_GAP_PX * wide / max(abs(m[3] - at_x * m[11]), abs(m[7] - at_y * m[11]), 1e-9)
         for corner in range(4):
             v, u = y + CORNERS[corner, 0], x + CORNERS[corner, 1]
             has_row, has_column = 0 <= v < height, 0 <= u < width

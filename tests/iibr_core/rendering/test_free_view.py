@@ -45,13 +45,25 @@ def square_scene(height=40, width=48):
     return photo.pixels, disparity.values
 
 
-def drawn_slowly(disparity, matrix, size, one_surface):
+def sealed_step(matrix, x, y, d):
+    """The step of disparity that moves where a pixel lands by three quarters of the size it lands at."""
+
+    def landed(x, y, d):
+        place = matrix @ (x, y, 1.0, d)
+        return place[:2] / place[2]
+
+    here, little = landed(x, y, d), 1e-6
+    moved = np.abs(landed(x, y, d + little) - here).max()
+    return 0.75 * max(np.abs(landed(x + i, y + j, d) - here).max() for i, j in ((little, 0), (0, little))) / moved
+
+
+def drawn_slowly(disparity, matrix, size):
     """What `_draw` gives for one image: every sample asks every square of every pixel."""
     height, width = disparity.shape
     nearest = np.full((SAMPLES * size.height, SAMPLES * size.width), -np.inf)
     at = (np.arange(SAMPLES * max(size)) + 0.5) / SAMPLES - 0.5
     for y, x in np.ndindex(height, width):
-        corners = []
+        corners, one_surface = [], sealed_step(matrix, x, y, disparity[y, x])
         for j, i in CORNERS:
             # The pixels around the corner that steps below one_surface lead to from this one.
             alike, ways = {(y, x)}, [(y, x)]
@@ -88,7 +100,7 @@ def test_samples_see_what_a_slow_twin_sees(turn):
     flat = tuple(map(float, matrix.ravel()))
     landing = [free_view._landing(rays, 0, flat, lambda: False)]
     nearest, source = free_view._draw(rays, [flat], landing, 0.5, (0, 4), 5)
-    slow = drawn_slowly(rays.arrays[2][0], matrix, target.size, 0.75)
+    slow = drawn_slowly(rays.arrays[2][0], matrix, target.size)
     # Samples on the very side of a triangle belong to either.
     differ = ~np.isclose(nearest, slow, atol=1e-4)
     assert differ.mean() < 0.01
@@ -136,6 +148,15 @@ def test_depth_edges_are_looked_up_as_anything_where_the_camera_only_turns():
     differ = np.abs(flat.colors - square.colors).max(axis=2)[~(flat.inpainted | square.inpainted)] > 1e-3
     # Pixels at the edges are split in nine at most.
     assert differ.mean() < 0.05
+
+
+def test_a_rough_surface_stays_closed_before_a_camera_that_hardly_moves():
+    """Also in a ray set that is made for other cameras, which move far."""
+    rough = 0.7 + np.random.default_rng(0).uniform(-0.04, 0.04, (40, 48)).astype(np.float32)
+    rough[:, :5] = 0.2
+    taken, near, far = (camera(40, 48, place=(step, 0.0, 0.0)) for step in (0.0, 0.1, 1.0))
+    view = FreeViews(smooth_texture(40, 48), rough, taken, [near, far]).view(near)
+    assert not view.inpainted[5:35, 10:40].any()
 
 
 def test_half_way_to_a_wall_it_is_twice_as_large():
