@@ -84,7 +84,7 @@ SCENES = (
     GlossScene("grazed_sphere", 0.25, (-0.9, -0.2, 0.3), sphere((0, 0, -2.0), 0.7), WIDE, ROW, (7, BLUE_AND_BROWN)),
     GlossScene("near_cylinder", 0.5, (0.85, -0.1, -0.3), NEAR_CYLINDER, WIDE, ROW, (8, WOOD)),
     # not looked at while anything was fitted
-    GlossScene("table", 0.25, (0.1, -0.88, 0.46), plane((0, -0.2, -3.6), -60, 5), APART, FIELD, (9, WOOD)),
+    GlossScene("table", 0.25, (0.1, -0.94, 0.3), plane((0, -0.2, -3.6), -55, 5), APART, FIELD, (9, WOOD)),
     GlossScene("ball", 0.35, (0.5, -0.5, -0.7), sphere((0.1, 0, -3.6), 0.95), APART, FIELD, (10, GREEN_AND_RED)),
     GlossScene("post", 0.3, (-0.5, -0.1, -0.85), POST, APART, FIELD, (11, WOOD)),
 )

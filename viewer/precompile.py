@@ -13,6 +13,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 PART = (slice(150, 310), slice(200, 400))
 """Of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
+GLOSSY_PIXELS = 250_000
+"""So many that normals are smoothed, as those of large photos are."""
 
 
 def main() -> None:
@@ -43,6 +46,7 @@ def write_kernels(folder: Path) -> None:
         for source in _photos(Path(scratch)):
             _open(source)
         _look_around(source)
+        _find_gloss(source)
         _collect(kept, folder)
 
 
@@ -68,6 +72,21 @@ def _look_around(source: Source) -> None:
     camera = Camera(np.eye(3), np.zeros(3), size, (float(size.width),) * 2, (size.width / 2, size.height / 2), "")
     turned = steered(camera, 0.2, 0.2, 0.2)
     FreeViews(loaded.photo.pixels, inverse_depth_of(loaded.disparity.values, None), camera, [turned]).view(turned)
+
+
+def _find_gloss(source: Source) -> None:
+    """What the window waits for when a surface becomes glossy, with a light that is to be found in the photo, too."""
+    from iibr_core.rendering.gloss.settings import Gloss, GlossLight
+    from viewer.background.gloss import GlossRequest, answer
+    from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
+    from viewer.cli.demo import demo_photo
+    from viewer.model.state.optics import CENTRE
+
+    large = replace(source, path=str(demo_photo()), max_pixels=GLOSSY_PIXELS)
+    ready = next(results_of(SceneRequest(0, large), lambda: False, lambda: CENTRE))
+    assert isinstance(ready, SceneReady)
+    gloss = Gloss(light=GlossLight(color=(0.0, 0.0, 0.0)), photo_shines=True)
+    answer(GlossRequest(gloss, ready.scene, ready.centre))
 
 
 def _photos(scratch: Path) -> Iterator[Source]:

@@ -170,6 +170,8 @@ _batch = [
         ((".", "--to", "depth", "-o", "../new", "--workers", "0"), "--workers"),
         ((".", "--to", "depth", "-o", "../new", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "--scheduler"),
         ((".", "--to", "depth", "-o", "../new", "--literal"), "--grid"),
+        ((".", "--to", "depth", "-o", "../new", "--gloss", "missing"), "missing"),
+        ((".", "--to", "hci", "-o", "../new", "--gloss", "photo.png"), "photo.png"),
     )
 ]
 

@@ -58,14 +58,17 @@ DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
         ("generate", DEMO, "--max-pixels", 60000, "--grid", 3, "--out", "field", "--with-disparity"),
         ("generate", "scene.png", "--grid", 3, "--out", "field", "--quality", "exact"),
         ("screenshot", "unmapped.png", "--view", "1,1", "-o", "picture.png"),
+        ("screenshot", DEMO, "--max-pixels", 250000, "--gloss", "gloss.toml", "-o", "picture.png"),
     ],
-    ids=["screenshot", "generate", "exact", "guessed"],
+    ids=["screenshot", "generate", "exact", "guessed", "gloss"],
 )
 def test_the_first_run_compiles_nothing(site: Path, tmp_path: Path, words: tuple[object, ...]) -> None:
     write_scene(tmp_path)
     random = np.random.default_rng(0)
     write_image(tmp_path / "unmapped.png", random.integers(0, 255, (90, 120, 3), np.uint8))
-    places = [tmp_path / word if str(word).endswith(".png") or word == "field" else word for word in words]
+    (tmp_path / "gloss.toml").write_text("photo_shines = true\nlight.color = [0, 0, 0]")
+    made = ("field", "gloss.toml", "picture.png", "scene.png", "unmapped.png")
+    places = [tmp_path / word if word in made else word for word in words]
     run_in(site, "viewer", *places, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
     assert kernels_in(tmp_path / "kept") == []
 

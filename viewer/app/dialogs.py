@@ -15,6 +15,7 @@ UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 FILE_KINDS: dict[ChoiceOf, str] = {
     "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif avif mpo lif",
     "mask": "png jpg jpeg tif tiff bmp exr",
+    "surroundings": "exr hdr png jpg jpeg tif tiff",
     "map": "pfm exr npy png tif tiff",
 }
 """Endings of what is no folder."""
@@ -23,6 +24,7 @@ DIALOG_TITLES: dict[ChoiceOf, str] = {
     "photo": "Open a photo, a stereo photo or a quilt",
     "folder": "Open a folder of views",
     "mask": "Aperture image",
+    "surroundings": "Picture all around, equirectangular",
     "truth": "Ground truth: a folder of views",
     "map": "Open a disparity map for this photo",
     "model": "Open the folder of a depth model",

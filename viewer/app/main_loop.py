@@ -13,6 +13,7 @@ from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_look import FreeLook, FreePicture
 from viewer.app.gamepad import Gamepad, actions_from_gamepad
+from viewer.app.gloss_finder import GlossFinder
 from viewer.app.keys import actions_from_keys, read_keys
 from viewer.app.pointer import (
     NO_POINTER,
@@ -31,7 +32,6 @@ from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
 from viewer.background.comparison_worker import ComparisonWorker
-from viewer.background.gloss import GlossFound, GlossRequest, GlossWorker
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
@@ -131,8 +131,7 @@ class App:
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self.free_look = FreeLook(self._gl, self.scene_view, wake)
-        self._gloss = GlossWorker(wake)
-        self._gloss_asked: GlossRequest | None = None
+        self.gloss_finder = GlossFinder(self.scene_view, wake)
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, wake)
@@ -165,7 +164,7 @@ class App:
         self.do(*news)
         self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
         self.do(*self.scene_loader.preview_depth(self.state))
-        self._show_gloss()
+        self.do(*self.gloss_finder.advance(self.state))
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
         if picture and self.scene_view.report != self.state.report:
@@ -249,7 +248,7 @@ class App:
         self.window.hide()
         self.scene_loader.close()
         self._comparisons.close()
-        self._gloss.close()
+        self.gloss_finder.close()
         self._keep()
         self._sessions.close(self.state)
         self._side_effects.close()
@@ -333,20 +332,6 @@ class App:
         request = make_inspection_request(self.state, is_moving, before)
         if request != before:
             self._comparisons.want(request, self.inspection_view.inputs(request, self.state))
-
-    def _show_gloss(self) -> None:
-        """What it means for the scene is found out beside the window; until then it looks as before."""
-        while (result := self._gloss.next_result()) is not None:
-            if isinstance(result, GlossFound):
-                self.scene_view.take_gloss(result)
-                self._is_busy = True
-            else:
-                self.do(Notify(Notice(result.message, is_error=True)))
-        request = self.scene_view.gloss_request(self.state.optics.gloss)
-        asked = self._gloss_asked
-        if request is not None and (asked is None or not asked.is_for(request.gloss, request.centre)):
-            self._gloss_asked = request
-            self._gloss.submit(request)
 
     def _keep_recent(self) -> None:
         """At once: they are what one misses after a crash."""

@@ -31,7 +31,8 @@ def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     """What is read for what is open, for what is being opened, and to compare with."""
     sources = [about.source for about in (state, state.scene) if about is not None and about.source is not None]
     origin = state.scene.depth_origin if state.scene is not None else None
-    beside = (origin.file if origin is not None else None, state.inspection.truth and state.inspection.truth.path)
+    truth, gloss = state.inspection.truth, state.optics.gloss
+    beside = (origin and origin.file, truth and truth.path, gloss and gloss.environment)
     found = [path for source in sources for path in inputs_of(source)]
     return (*found, *(Path(os.path.expanduser(path)) for path in beside if path))
 

@@ -10,7 +10,7 @@ import typer
 from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
-from viewer.cli.lens_options import Aperture, Focus
+from viewer.cli.lens_options import Aperture, Focus, GlossFile
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import Force, Grid, Literal, require_memory, require_model
 from viewer.cli.scene_options import PhotoOptions
@@ -34,6 +34,7 @@ def batch(
     ] = None,
     focus: Focus = None,
     aperture: Aperture = None,
+    gloss: GlossFile = None,
     *,
     told: KindOptions,
     photo: PhotoOptions,
@@ -57,8 +58,12 @@ def batch(
     from viewer.app.batch.task import BatchSettings
 
     require_model(source.depth)
+    if gloss is not None:
+        from viewer.background.gloss import read_environment
+
+        read_environment(gloss)
     name = next(name for name, kind in EXPORTS.items() if kind is to)
-    settings = BatchSettings(name, source, photo.depth_strength, told.options(), focus, aperture)
+    settings = BatchSettings(name, source, photo.depth_strength, told.options(), focus, aperture, gloss)
     photos = photos_in(folders)
     if not photos:
         raise InputError(f"{' and '.join(map(str, folders))}: no photos there")

@@ -51,7 +51,7 @@ from viewer.model.state.inspection import (
 )
 from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import LOOPS, LoopKind
-from viewer.model.state.optics import ApplyPreset, ResetOptics
+from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetGloss
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.scene import source_beside, source_with_depth, source_with_map
@@ -251,6 +251,8 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
     match what:
         case "mask":
             return DoTask(ReadMaskTask(path))
+        case "surroundings":
+            return SetGloss(replace(state.optics.gloss or FIRST_GLOSS, environment=path))
         case "truth":
             return DoTask(ReadTruthTask(path))
         case "map" if state.source is not None:

@@ -12,7 +12,11 @@ import pytest
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape
 from tests.viewer.conftest import Driver
+from viewer.app.save_places import inputs_of_scene
+from viewer.model.actions import ShowPrompt
+from viewer.model.commands import action_for_path
 from viewer.model.state.optics import SetGloss
+from viewer.model.state.prompts import PathPrompt
 
 
 @pytest.fixture
@@ -61,10 +65,10 @@ def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer: 
 
 def test_dragging_the_light_finds_nothing_out_anew(viewer: Driver) -> None:
     make_glossy(viewer)
-    asked, gloss = viewer.app._gloss_asked, shown_gloss(viewer)
+    asked, gloss = viewer.app.gloss_finder.asked, shown_gloss(viewer)
     viewer.app.do(SetGloss(replace(gloss, roughness=0.1, light=replace(gloss.light, direction=(0.5, 0.1, -1)))))
     viewer.until_idle()
-    assert viewer.app._gloss_asked is asked
+    assert viewer.app.gloss_finder.asked is asked
 
 
 def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer: Driver) -> None:
@@ -91,3 +95,21 @@ def test_surroundings_that_are_not_there_are_told_and_nothing_is_lost(viewer: Dr
     viewer.until(lambda app: any("room.exr" in notice.text for notice in app.state.notices))
     viewer.app.do(SetGloss(None))
     viewer.until_idle()
+
+
+def test_surroundings_are_chosen_in_the_panel_and_taken_away_again(viewer: Driver, photo_path: Path) -> None:
+    make_glossy(viewer)
+    viewer.app.state = replace(viewer.app.state, has_dialogs=False)
+    shiny = viewer.image()
+    viewer.press("Surroundings…")
+    viewer.until(lambda app: app.state.prompt == PathPrompt("surroundings"))
+    viewer.app.do(ShowPrompt(None), action_for_path("surroundings", str(photo_path), viewer.app.state))
+    viewer.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
+    viewer.until_idle()
+    assert not np.array_equal(viewer.image(), shiny)
+    assert photo_path in inputs_of_scene(viewer.app.state)
+    viewer.press("None")
+    viewer.until(lambda app: not app.state.optics.gloss.environment)  # type: ignore[union-attr]
+    viewer.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
+    viewer.until_idle()
+    assert np.array_equal(viewer.image(), shiny)

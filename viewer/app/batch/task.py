@@ -11,6 +11,7 @@ from pathlib import Path
 
 from iibr_core.depth.sidecar import map_to_read
 from iibr_core.formats.files import open_binary
+from iibr_core.rendering.gloss.settings import Gloss
 from viewer.app.batch.archive import ArchivePhoto
 from viewer.model.export_kinds import EXPORTS, ExportKind
 from viewer.model.state.exporting import USUAL_OPTIONS, ExportOptions
@@ -22,8 +23,8 @@ MOST_READ_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class BatchSettings:
-    """How every photo is exported. kind: by name. source: for any photo, its path empty. focus, aperture: as `Optics`
-    has them, None for what the window shows.
+    """How every photo is exported. kind: by name. source: for any photo, its path empty. focus, aperture, gloss: as
+    `Optics` has them, None for what the window shows.
     """
 
     kind: str
@@ -32,6 +33,7 @@ class BatchSettings:
     options: ExportOptions = USUAL_OPTIONS
     focus: float | None = None
     aperture: float | None = None
+    gloss: Gloss | None = None
 
     @property
     def export_kind(self) -> ExportKind:
@@ -40,8 +42,13 @@ class BatchSettings:
 
     @cached_property
     def digest(self) -> bytes:
-        """Of all that says what is made of a photo: the settings, and this program's version."""
-        return hashlib.sha256(f"{version('iibr')} {self!r}".encode()).digest()
+        """Of all that says what is made of a photo: the settings, what is reflected in it, and this program's version.
+
+        Raises InputError where that cannot be read.
+        """
+        reflected = self.gloss.environment if self.gloss is not None else ""
+        content = _digest_of(Path(reflected)) if reflected else b""
+        return hashlib.sha256(f"{version('iibr')} {self!r}".encode() + content).digest()
 
 
 @dataclass(frozen=True)

@@ -82,13 +82,15 @@ def _export(task: PhotoTask) -> Path:
 
 def _open(task: PhotoTask, require_place: Callable[[Scene], None]) -> ExportSource:
     from viewer.app.exports.opening import open_drawn, open_undrawn
-    from viewer.model.state.optics import SetAperture, SetFocus
+    from viewer.model.state.optics import SetAperture, SetFocus, SetGloss
 
     settings = task.settings
     if not settings.export_kind.is_drawn:
-        return open_undrawn(task.source, settings.depth_strength, not settings.export_kind.layout, require_place)
+        needs_disparity = not settings.export_kind.layout
+        return open_undrawn(task.source, settings.depth_strength, needs_disparity, require_place, gloss=settings.gloss)
     lens: list[Action] = [] if settings.focus is None else [SetFocus(settings.focus)]
     lens += [] if settings.aperture is None else [SetAperture(settings.aperture)]
+    lens += [SetGloss(settings.gloss)]
     return open_drawn(_viewer(), task.source, settings.depth_strength, lens, require_place)
 
 

@@ -11,8 +11,9 @@ from viewer.model.layout import ScreenSize
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 
-ChoiceOf = Literal["photo", "folder", "mask", "truth", "map", "model"]
-"""map: a disparity map for the photo that is open; model: the folder of a depth model."""
+ChoiceOf = Literal["photo", "folder", "mask", "surroundings", "truth", "map", "model"]
+"""surroundings: what a glossy surface reflects; map: a disparity map for the photo that is open; model: the folder of a
+depth model."""
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,7 @@ PATH_WORDS = {
     "photo": "Open a photo",
     "folder": "Open a folder of views",
     "mask": "Image for the aperture; white lets light through",
+    "surroundings": "A picture all around (equirectangular), to be reflected",
     "truth": "Ground truth: a folder of views",
     "map": "A disparity map for this photo",
     "model": "The folder of a depth model",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import PurePath
 
 from imgui_bundle import imgui
 
@@ -16,12 +17,13 @@ from iibr_core.rendering.gloss.settings import (
     GlossSurface,
     Triple,
 )
-from viewer.model.actions import Action
+from viewer.model.actions import Action, DoTask
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGloss, SetGlossBrush
+from viewer.model.state.tasks import ChooseTask
 from viewer.ui.style import Palette, pack_color
-from viewer.ui.widgets import button, checkbox, choice, gap, slider, tooltip
+from viewer.ui.widgets import button, checkbox, choice, gap, quiet, slider, tooltip
 
 BALL_SIDE = 96.0
 BALL_RINGS = 24
@@ -35,7 +37,10 @@ ROUGH_TIP = "From a mirror to a dull sheen."
 REFLECTS_TIP = "How much of the light is reflected: 4 % for plastics and varnish, 50 % and more for metals."
 BALL_TIP = "Drag to move the light about the scene."
 BRIGHT_TIP = "× 1 makes white paper that faces the light as bright as the photo's white."
-SHOWN_TIP = "The photo shows this light's highlight already: it is found there, and runs over the surface."
+SHOWN_TIP = (
+    "The photo shows the light's highlight already: it runs over the surface. Without brightness, the light is found."
+)
+AROUND_TIP = "Choose a picture all around (equirectangular); the surface reflects it."
 MARK_TIP = "Drag over the picture to make more of it glossy (Esc puts the brush away)."
 ERASE_TIP = "Drag over the picture to leave parts of it as they are (Esc puts the brush away)."
 ONLY_TIP = "Nothing is glossy but what the brush marks."
@@ -55,6 +60,7 @@ def gloss_section(state: AppState, layout: Layout, palette: Palette) -> list[Act
     if surface is not None:
         edited = replace(edited, surface=surface)
     actions: list[Action] = [] if edited == gloss else [SetGloss(edited)]
+    actions += _surroundings(gloss, layout)
     return actions + _brush(state.gloss_brush, gloss, layout)
 
 
@@ -121,6 +127,19 @@ def _reflection(gloss: Gloss, layout: Layout) -> Gloss:
         return replace(gloss, reflectance=percent / 100)
     shines = checkbox("The photo shows it already", gloss.photo_shines, layout, SHOWN_TIP)
     return gloss if shines is None else replace(gloss, photo_shines=shines)
+
+
+def _surroundings(gloss: Gloss, layout: Layout) -> list[Action]:
+    """What is reflected beside the light: a picture's name, and the way to another or to none."""
+    if button("Surroundings…", layout, AROUND_TIP):
+        return [DoTask(ChooseTask("surroundings"))]
+    if not gloss.environment:
+        return []
+    imgui.same_line()
+    if button("None", layout, "Reflect the light alone."):
+        return [SetGloss(replace(gloss, environment=""))]
+    quiet(PurePath(gloss.environment).name)
+    return []
 
 
 def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.app.batch.archive import ArchivePhoto
 from viewer.app.batch.ledger import FAILURES, MANIFEST, Ledger, require_batch_place
@@ -93,8 +94,13 @@ def test_a_key_changes_with_photo_map_settings_and_name(tmp_path: Path) -> None:
         replace(SETTINGS, source=Source("", grid=GridShape(3, 3))),
         replace(SETTINGS, depth_strength=2.0),
         replace(SETTINGS, focus=0.0),
+        replace(SETTINGS, gloss=Gloss()),
     ):
         keys.append(key_of(settings, photo))
+    surroundings = tmp_path / "sky.exr"
+    for content in (b"day", b"night"):
+        surroundings.write_bytes(content)
+        keys.append(key_of(replace(SETTINGS, gloss=Gloss(environment=str(surroundings))), photo))
     keys.append(key_of(SETTINGS, ArchivePhoto(str(path), "sub/a")))
     (tmp_path / "a_disparity.pfm").write_bytes(b"map")
     keys.append(key_of(SETTINGS, photo))

@@ -1,0 +1,36 @@
+"""What a worker writes of one photo, as the settings say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.rendering.gloss.settings import Gloss, GlossLight
+from iibr_core.types import GridShape
+from viewer.app.batch.task import BatchSettings, PhotoTask
+from viewer.app.batch.work import export_photo
+from viewer.model.state.scene import Source
+
+GLOSS = Gloss(roughness=0.5, reflectance=0.5, light=GlossLight((0.0, 0.0, -1.0)))
+
+
+@pytest.mark.parametrize(("kind", "target"), [("hci", "made"), ("anaglyph", "made.png")])
+def test_gloss_is_in_what_is_made_of_views_and_in_what_is_drawn(
+    photo_path: Path, tmp_path: Path, kind: str, target: str
+) -> None:
+    pictures = []
+    for gloss in (None, GLOSS):
+        settings = replace(BatchSettings(kind, Source("", grid=GridShape(3, 3))), gloss=gloss)
+        out = tmp_path / str(gloss is None) / target
+        said = export_photo(PhotoTask(str(photo_path), str(out), "", settings))
+        assert not said.reason
+        made = Path(said.output)
+        files = sorted(made.glob("input_Cam*.png")) if made.is_dir() else [made]
+        pictures.append(np.stack([np.asarray(Image.open(path)) for path in files]).astype(int))
+    plain, shiny = pictures
+    assert (shiny - plain).min() >= -2
+    assert (shiny - plain).mean() > 5
