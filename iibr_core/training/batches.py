@@ -71,8 +71,16 @@ AS_RENDERED = RayChoice()
 
 
 def training_batch(step: int, seed: int, choice: RayChoice = AS_RENDERED) -> Batch:
-    """The batch of a step: one EPI, then ambiguous rays of VIEWS views, of one random scene."""
+    """The batch of a step: one EPI, then ambiguous rays of VIEWS views, of one random scene that has any."""
     rng = np.random.default_rng((seed, step))
+    while True:
+        batch = _scene_batch(rng, choice)
+        if batch is not None:
+            return batch
+
+
+def _scene_batch(rng: np.random.Generator, choice: RayChoice) -> Batch | None:
+    """None of a scene that leaves nothing to be decided."""
     radius = int(rng.choice([LIGHT_FIELD, STEREO], p=[0.75, 0.25]))
     largest = float(np.exp(rng.uniform(*np.log(PARALLAX_PX)))) / radius
     scene = random_scene(rng, SIZE, largest)
@@ -81,6 +89,8 @@ def training_batch(step: int, seed: int, choice: RayChoice = AS_RENDERED) -> Bat
     epi = _epi(scene, rays, radius, rng, choice)
     parts = list(epi or [])
     parts += [_sample_ambiguous(scene, rays, _random_offset(radius, rng), rng, choice) for _ in range(VIEWS)]
+    if not any(len(part.truth) for part in parts):
+        return None
     return _batch(parts, (1, EPI_VIEWS, EPI_WIDTH) if epi else None)
 
 

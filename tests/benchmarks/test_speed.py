@@ -5,12 +5,15 @@ from __future__ import annotations
 import io
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.prediction import fitted_scenes, judged_scenes
 from benchmarks.speed.figures import MeasuredVariant, SceneFigures, measure_scene
 from benchmarks.speed.measure import Cost, exponent, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
 from benchmarks.speed.plot import plot_panels
@@ -34,7 +37,8 @@ from benchmarks.speed.variants import (
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.generation.cost_model import CORES, NANOSECONDS, Workload
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.generation.plan import ScenePlan, plan_literal
+from iibr_core.types import FloatImage, Quality, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, view_of_square, write_grid
 
 SMALL = (
@@ -210,6 +214,36 @@ def test_a_choice_fails_that_is_slower_than_one_as_good(time, psnr_db, is_good_e
     behind, slower = front_targets([scene])
     assert (behind.is_met, slower.is_met) == (is_good_enough, is_fast_enough)
     assert scene.fastest_as_good(0.05).variant.name == ("balanced" if psnr_db > 30.05 else "fast")
+
+
+@pytest.mark.parametrize(("quality", "is_met"), [("fast", True), ("exact", False)])
+def test_a_plan_that_chose_exact_here_would_be_found_out(
+    quality: Quality, is_met: bool, scenes: list[BenchScene], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Errors as they are; times as the plan predicts them."""
+
+    def planned(*given: Any) -> ScenePlan:
+        return replace(plan_literal(*given), quality=quality)
+
+    monkeypatch.setattr("benchmarks.speed.figures.plan_literal", planned)
+    variants = [REFERENCE, Variant("exact", "exact")]
+    found = measure_scene(scenes[0], variants, 1, quiet)
+    field = whole_field(scenes[0])
+    costs = plan_literal(field.photo, field.disparity, field.grid).costs
+    seconds = {m.variant.name: costs.of(m.variant.quality).seconds for m in found.measured}
+    timed = tuple(replace(m, ratio=seconds[m.variant.name] / seconds["fast"]) for m in found.measured)
+    _, slower = front_targets([replace(found, measured=timed)])
+    assert found.planned == quality
+    assert slower.is_met == is_met
+
+
+def test_nothing_is_judged_that_constants_are_fitted_to(tmp_path: Path) -> None:
+    data = write_grid(tmp_path / "square", 5).parent
+    fitted, judged = list(fitted_scenes(data)), list(judged_scenes(data))
+    assert any(given.name.startswith("square") for given in fitted)
+    assert judged
+    pictures = {given.photo.pixels.tobytes() for given in fitted}
+    assert not any(given.photo.pixels.tobytes() in pictures for given in judged)
 
 
 def test_made_up_scenes_have_what_is_asked_for() -> None:

@@ -72,3 +72,9 @@ def test_other_rays_for_ablations_are_finite_and_whole_too(choice):
     assert all(torch.isfinite(tensor).all() for tensor in (batch.features, batch.colors, batch.truth))
     is_inpainted = batch.features[..., 8] > 0
     assert choice.inpainted or not is_inpainted.any()
+
+
+def test_a_scene_that_leaves_nothing_to_be_decided_is_passed_over():
+    step, photo_alone = 21, RayChoice(inpainted=False)
+    assert batches._scene_batch(np.random.default_rng((0, step)), photo_alone) is None
+    assert len(training_batch(step, 0, photo_alone).truth) > 0
