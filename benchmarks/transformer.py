@@ -19,7 +19,7 @@ from iibr_core.generation.cost_model import estimate_costs, measure_parallax
 from iibr_core.generation.light_field import transformer_for
 from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.occlusion import entropy, occlusion_mask
+from iibr_core.rendering.occlusion import LEAST_COVERED, covered_share, entropy
 from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training import degradation as faults
@@ -112,7 +112,7 @@ def masks() -> list[str]:
         ]
         lines.append(f"| {threshold} | " + " | ".join(cells) + " |")
     used = [precision_recall(mask, hidden) for _, _, mask, hidden in measured]
-    return [*lines, f"| in use (occlusion.py) | {used[0]} | | {used[1]} | |", ""]
+    return [*lines, f"| in use: less than {LEAST_COVERED:g} covered | {used[0]} | | {used[1]} | |", ""]
 
 
 def precision_recall(found: NDArray[np.bool_], true: NDArray[np.bool_]) -> str:
@@ -143,7 +143,7 @@ def mask_rays(degraded: bool) -> list[NDArray[np.float32]]:
         source_x, source_y = x + true * offset.s, y + true * offset.t
         inside = (source_x >= 0) & (source_x < MASK_SIZE[1]) & (source_y >= 0) & (source_y < MASK_SIZE[0])
         seen = is_visible_from(scene, x.ravel(), y.ravel(), true.ravel(), offset).reshape(MASK_SIZE)
-        parts.append((closed, learned, occlusion_mask(weights), ~(inside & seen)))
+        parts.append((closed, learned, covered_share(weights) < LEAST_COVERED, ~(inside & seen)))
     return [np.concatenate(part) for part in zip(*parts)]
 
 

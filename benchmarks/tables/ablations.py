@@ -52,8 +52,6 @@ JUDGED = tuple(
     for s in (-1, 1)
 )
 """Views of drawn scenes: the corners of the grid, and four that no ray was added from."""
-PAPERS_LEAST_COVERED = 0.09
-"""Covered so far, a ray has 99 % of the most entropy: the paper's threshold."""
 ABOUT_TRAINED = (
     f"Ray transformers, T, were trained by `benchmarks.tables.trained_variants`: {STEPS} steps each, as the shipped"
     " weights, all on the same scenes. *Trained again* lacks nothing: what a row differs from that one by less than it"
@@ -99,10 +97,10 @@ SWITCHES = (
     Switch("refinement leaves rims", swaps={"depth.refine.settle_rims": lambda _, values, *__: values}),
     Switch("mixed pixels stay whole", swaps={"rendering.view_synthesis.split_mixed_pixels": _do_not_split}),
     Switch("rims hide what is behind them", swaps={"rendering.view_synthesis.WHOLE": 0.0}),
-    Switch(
-        "occlusion: the paper's entropy", swaps={"rendering.occlusion.LEAST_COVERED": PAPERS_LEAST_COVERED}
+    *(
+        Switch(f"occluded: less than {share} covered (0.2)", swaps={"rendering.view_synthesis.LEAST_COVERED": share})
+        for share in (0.01, 0.5)
     ),
-    Switch("occlusion: lower entropy", swaps={"rendering.occlusion.LEAST_COVERED": 0.4}),
     Switch(
         "no canvas beyond the frame", swaps={"generation.view_maker.margins_beyond_frame": lambda *_: NO_MARGINS}
     ),

@@ -24,7 +24,7 @@ from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.hypothesis_colors import blend_hypotheses, bound_weights
 from iibr_core.rendering.hypothesis_features import describe_rays
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
-from iibr_core.rendering.occlusion import MOSTLY_COVERED, WHOLE, covered_share, entropy, occlusion_mask
+from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
 from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
 from iibr_core.rendering.undecided_rays import find_undecided_rays
@@ -299,7 +299,8 @@ class ViewSynthesis:
         candidates = find_candidates(rays, offset, (first - above, min(last + around, rays.size.height)), self._slots)
         raise_if_stopped(self._should_stop)
         weights = visibility_weights(candidates)
-        occluded, share = occlusion_mask(weights), covered_share(weights)
+        share = covered_share(weights)
+        occluded = share < LEAST_COVERED
         inner = slice(above, above + last - first), slice(left, right)
         raise_if_stopped(self._should_stop)
         wanted = np.zeros(occluded.shape, np.bool_)
@@ -310,7 +311,7 @@ class ViewSynthesis:
         raise_if_stopped(self._should_stop)
         undecided = None
         if self._transformer:
-            decided = occluded | (share < WHOLE)
+            decided = share < WHOLE
             decided[:, :left] = decided[:, right:] = True
             undecided = find_undecided_rays(
                 rays, candidates, weights, (disparity, source), (above, above + last - first), self._every,

@@ -28,7 +28,11 @@ from iibr_core.types import GridShape, ImageSize, ViewOffset
 
 SIZE, GRID = ImageSize(72, 96), GridShape(5, 5)
 JUDGED = (ViewOffset(-2.0, 2.0), ViewOffset(1.0, -1.0))
-UNCHANGED = ("6 candidates a ray (5)", "occlusion: the paper's entropy", "occlusion: lower entropy")
+UNCHANGED = (
+    "6 candidates a ray (5)",
+    "occluded: less than 0.01 covered (0.2)",
+    "occluded: less than 0.5 covered (0.2)",
+)
 """Few pixels have so many surfaces; rays covered in part are laid over what is behind, occluded or not."""
 
 

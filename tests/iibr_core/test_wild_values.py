@@ -386,7 +386,6 @@ FINITE = {
     "rendering.large_views.views_of_tile": lambda v, _: tile_views(v),
     "rendering.occlusion.covered_share": lambda v, _: occlusion.covered_share(np.nan_to_num(shares(v))),
     "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),
-    "rendering.occlusion.occlusion_mask": lambda v, _: occlusion.occlusion_mask(shares(v)),
     "generation.plan.plan_for_viewing": lambda v, _: [
         plan.plan_for_viewing(scene()[0], Disparity(depths(v), "wild")),
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(depth_strength=v)),

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.occlusion import LEAST_COVERED, covered_share, entropy, occlusion_mask
+from iibr_core.rendering.occlusion import covered_share, entropy
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import ViewOffset
 
@@ -77,10 +77,3 @@ def test_entropy_of_one_hot_uniform_and_nothing(slots):
     assert entropy(np.zeros((slots, 1, 1), np.float32))[0, 0] == pytest.approx(1, abs=1e-6)
     if slots > 1:
         assert entropy(np.full((slots, 1, 1), 1 / slots, np.float32))[0, 0] == pytest.approx(1, abs=1e-5)
-
-
-def test_mask_tells_uncovered_rays_from_shared_ones():
-    assert occlusion_mask(visibility_weights(one_ray([])))[0, 0]
-    assert occlusion_mask(visibility_weights(one_ray([(LEAST_COVERED / 2, 1.0)])))[0, 0]
-    assert not occlusion_mask(visibility_weights(one_ray([(LEAST_COVERED * 1.5, 1.0)])))[0, 0]
-    assert not occlusion_mask(visibility_weights(one_ray([(0.2, d) for d in range(5)])))[0, 0]
