@@ -17,10 +17,11 @@ from iibr_core.depth.editing.edits import (
     require_sound,
 )
 from iibr_core.depth.editing.smoothing import smooth_within_contours, texture_contrast
-from iibr_core.depth.editing.stroke_distance import Guide, Window, falloff, guide_of, measure_from, radius_px
+from iibr_core.depth.editing.stroke_distance import Window, falloff, measure_from
 from iibr_core.depth.editing.surface import surface_at
+from iibr_core.depth.editing.touched_colors import Guide, guide_of
 from iibr_core.runtime.jit import kernel
-from iibr_core.types import FloatImage, ImageSize
+from iibr_core.types import FloatImage
 
 MAPS_KEPT = 8
 """Of those before the last strokes: so many can be taken back at once."""
@@ -113,7 +114,7 @@ class DepthCanvas:
     def _target(self, stroke: Stroke, under: FloatImage) -> FloatImage | None:
         """The map that a stroke leads to, None where it moves what is there."""
         if stroke.tool == "smooth":
-            radius = radius_px(stroke, ImageSize(*under.shape))
+            radius = stroke.radius_px(under.shape[1])
             return smooth_within_contours(self._photo, under, radius, texture_contrast(self._photo))
         if stroke.tool in DEPTH_TOOLS:
             return np.full_like(under, _value_at(under, stroke.taken_from or stroke.points[0]))

@@ -48,6 +48,10 @@ class Stroke:
     strength: float
     taken_from: tuple[float, float] | None = None
 
+    def radius_px(self, width: int) -> float:
+        """The radius in pixels of a map so wide, at least one."""
+        return max(self.radius * width, 1.0)
+
 
 @dataclass(frozen=True)
 class DepthEdits:

@@ -8,16 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.editing.edits import Stroke
-from iibr_core.depth.editing.stroke_distance import (
-    CONTOUR_CONTRAST,
-    GUIDE_STEPS,
-    Guide,
-    radius_px,
-    stroke_colours,
-    unlikeness,
-)
+from iibr_core.depth.editing.stroke_distance import CONTOUR_CONTRAST
+from iibr_core.depth.editing.touched_colors import GUIDE_STEPS, Guide, stroke_colours, unlikeness
 from iibr_core.runtime.jit import kernel
-from iibr_core.types import FloatImage, ImageSize
+from iibr_core.types import FloatImage
 
 BASE_PX = 2
 """What lies so far before and behind a pixel tells whether it is on an edge, also where that is blurred."""
@@ -58,7 +52,7 @@ def surface_at(
         _grow(parts, clearance)
     for _ in range(EDGE_PX):
         _share_edges(guide, disparity, step, parts.copy(), parts)
-    _fill_holes(parts, pi * radius_px(stroke, ImageSize(height, width)) ** 2)
+    _fill_holes(parts, pi * stroke.radius_px(width) ** 2)
     return _is_surface(parts)
 
 

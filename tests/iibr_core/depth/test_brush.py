@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from dataclasses import replace
-from math import floor, hypot
+from math import ceil, floor, hypot
 
 import numpy as np
 import pytest
@@ -14,14 +14,16 @@ from hypothesis import strategies as st
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
 from iibr_core.depth.editing.smoothing import smooth_within_contours
-from iibr_core.depth.editing.stroke_distance import (
-    CONTOUR_CONTRAST,
+from iibr_core.depth.editing.stroke_distance import CONTOUR_CONTRAST, falloff, stroke_distance
+from iibr_core.depth.editing.touched_colors import (
+    CUBES,
     GUIDE_STEPS,
     LIKENESS,
-    falloff,
+    UNSEEN,
     guide_of,
+    mark_unlike,
     stroke_colours,
-    stroke_distance,
+    unlikeness,
 )
 from iibr_core.types import InputError
 
@@ -47,15 +49,27 @@ def dab(
 
 
 def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
-    """Dijkstra over all pixels from the one under the dab's middle."""
+    """Point by point, Dijkstra over all pixels from those under the way to it."""
+    distance = np.ones(photo.shape[:2])
+    for index in range(len(stroke.points)):
+        slow_step(photo, stroke, index, distance)
+    return distance
+
+
+def slow_step(photo: np.ndarray, stroke: Stroke, index: int, distance: np.ndarray) -> None:
     height, width = photo.shape[:2]
-    (x, y), radius = stroke.points[0], stroke.radius * width
-    column, row = floor(x * width), floor(y * height)
-    distance = np.ones((height, width))
-    distance[row, column] = hypot(column - (x * width - 0.5), row - (y * height - 0.5)) / radius
-    waiting = [(distance[row, column], row, column)]
+    ends = [np.array((x * width - 0.5, y * height - 0.5)) for x, y in stroke.points[max(index - 1, 0) : index + 1]]
+    radius, waiting = stroke.radius * width, []
+    for share in np.linspace(0, 1, max(ceil(2 * np.hypot(*(ends[-1] - ends[0]))), 1) + 1):
+        x, y = ends[0] + share * (ends[-1] - ends[0])
+        row, column = floor(y + 0.5), floor(x + 0.5)
+        seed = hypot(column - x, row - y) / radius
+        if seed < distance[row, column]:
+            distance[row, column] = seed
+            waiting.append((seed, row, column))
+    heapq.heapify(waiting)
     guide = guide_of(photo)
-    photo, colors = guide[1:-1, 1:-1] / GUIDE_STEPS, stroke_colours(guide, stroke, 0).T / GUIDE_STEPS
+    photo, colors = guide[1:-1, 1:-1] / GUIDE_STEPS, stroke_colours(guide, stroke, index).T / GUIDE_STEPS
     away = np.linalg.norm(photo[:, :, None] - colors, axis=3).min(axis=2)
     unlike = np.maximum(away - LIKENESS, 0)  # of blocks of 5 x 5: there are no specks but at the window's border
     while waiting:
@@ -72,16 +86,34 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
                 if way < distance[other]:
                     distance[other] = way
                     heapq.heappush(waiting, (way, *other))
-    return distance
 
 
-@settings(max_examples=20)
-@given(st.integers(0, 1000), st.floats(0.05, 0.25), st.floats(0.1, 0.9), st.floats(0.1, 0.9))
-def test_distances_are_shortest_ways(seed: int, radius: float, x: float, y: float) -> None:
+@settings(max_examples=30)
+@given(
+    st.integers(0, 1000),
+    st.floats(0.05, 0.25),
+    st.lists(st.tuples(st.floats(0.1, 0.9), st.floats(0.1, 0.9)), min_size=1, max_size=4),
+)
+def test_distances_are_shortest_ways(seed: int, radius: float, points: list[tuple[float, float]]) -> None:
     rng = np.random.default_rng(seed)
     photo = rng.uniform(0, 0.4, (HEIGHT // 5, WIDTH // 5, 3)).repeat(5, 0).repeat(5, 1).astype(np.float32)
-    stroke = dab(x=x, y=y, radius=radius)
+    stroke = replace(dab(radius=radius), points=tuple(points))
     np.testing.assert_allclose(stroke_distance(guide_of(photo), stroke), slow_distance(photo, stroke), atol=1e-5)
+
+
+@pytest.mark.parametrize(("least", "most", "colors"), [(0.0, 1.0, 30), (-2.0, 20.0, 30), (0.3, 0.5, 1), (0.0, 1.0, 0)])
+def test_cubes_of_colours_tell_of_a_pixel_what_its_own_colour_does(least: float, most: float, colors: int) -> None:
+    rng = np.random.default_rng(colors)
+    photo = rng.uniform(least, most, (HEIGHT, WIDTH, 3)).astype(np.float32)
+    photo[::2] = photo[0, 0]  # the same cube, again and again
+    guide, chosen = guide_of(photo), rng.integers(0, HEIGHT * WIDTH, colors)
+    touched = np.ascontiguousarray(guide[1:-1, 1:-1].reshape(-1, 3)[chosen].T, np.int32) + np.int32(40)
+    marks, cubes = np.full((HEIGHT + 2, WIDTH + 2), 7, np.uint8), np.full(CUBES, UNSEEN)
+    for y in range(1, HEIGHT + 1):
+        mark_unlike(guide, touched, cubes, y, 1, WIDTH + 1, marks)
+    wanted = [[unlikeness(*guide[y, x], touched) > 0 for x in range(1, WIDTH + 1)] for y in range(1, HEIGHT + 1)]
+    np.testing.assert_array_equal(marks[1:-1, 1:-1], wanted)
+    assert (marks[[0, -1]] == 7).all()
 
 
 @pytest.mark.parametrize(("tool", "sign"), [("nearer", 1), ("farther", -1)])

@@ -8,8 +8,8 @@ from scipy import ndimage
 
 from iibr_core.depth.editing import surface
 from iibr_core.depth.editing.edits import Stroke
-from iibr_core.depth.editing.stroke_distance import guide_of
 from iibr_core.depth.editing.surface import EDGE, SPACE, SURFACE, surface_at
+from iibr_core.depth.editing.touched_colors import guide_of
 
 HEIGHT, WIDTH = 60, 80
 
