@@ -7,7 +7,16 @@ from collections.abc import Callable
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.jobs import Failed, ProgressReport
 from viewer.background.read_ahead import PhotoAhead, PhotosAhead, photos_within_budget
-from viewer.background.scene_worker import PhotosFound, SceneReady, SceneRequest, SceneResult, SceneWorker, ViewReady
+from viewer.background.scene_worker import (
+    PhotosFound,
+    SceneReady,
+    SceneRequest,
+    SceneResult,
+    SceneWorker,
+    Sketched,
+    SketchWorker,
+    ViewReady,
+)
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
@@ -37,8 +46,9 @@ class SceneLoader:
         self._inspection_view = inspection_view
         self._set_title = set_title
         self._worker = SceneWorker(wake)
+        self._sketches = SketchWorker(wake)
         self._preview = DepthPreview(scene_view)
-        self._submitted = self._sketched = 0
+        self._submitted = self._to_sketch = self._sketched = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
 
@@ -53,6 +63,8 @@ class SceneLoader:
     def take_results(self, state: AppState) -> list[Action]:
         """The worker's results, as actions; the one place where they arrive."""
         actions: list[Action] = []
+        while (sketch := self._sketches.next_result()) is not None:
+            actions += self._take_sketch(sketch, state)
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._take(result, state)
         return actions
@@ -71,14 +83,21 @@ class SceneLoader:
     def advance(self, state: AppState) -> None:
         """Ask for what the state wants now, if that is news, and for what is likely to be wanted next."""
         self._cancel(state)
-        if state.generation != self._submitted and state.source is not None and state.stroke is None:
+        is_wanted = state.generation not in (self._submitted, state.stopped)
+        if is_wanted and state.source is not None and state.stroke is None:
             self._load(state, state.source)  # with a stroke under way it will be another one
         self._read_ahead(state)
 
     def close(self) -> None:
         """Stop making and reading."""
         self._worker.close()
+        self._sketches.close()
         self.ahead.close()
+
+    def _take_sketch(self, sketch: Sketched, state: AppState) -> list[Action]:
+        self._sketched = sketch.generation
+        is_news = self._scene_view.generation != sketch.generation == state.generation
+        return self._take(sketch.ready, state) if is_news and sketch.ready is not None else []
 
     def _take(self, result: SceneResult, state: AppState) -> list[Action]:
         match result:
@@ -108,6 +127,7 @@ class SceneLoader:
         """What the user stopped, and what is wanted no more."""
         if state.stopped == state.generation != self._stopped:
             self._worker.cancel()
+            self._sketches.cancel()
             self._stopped = state.stopped
         if self._scene_view.generation == state.generation < self._submitted:
             self._worker.cancel()  # another file was being read, and will not be opened: what is here is whole
@@ -117,9 +137,8 @@ class SceneLoader:
         """A new generation is a new job. The photo is read again only if another one was opened."""
         scene = state.scene
         loaded = self._scene_view.loaded if scene and scene.source is source else None
-        if loaded is None and self.ahead.is_reading(source):
-            self._sketch(state, source)
-            return  # it is nearly there
+        if loaded is None and (self._awaits_sketch(state, source) or self.ahead.is_reading(source)):
+            return
         ahead = self.ahead.take(source, state.depth_strength) if loaded is None else None
         if loaded is None:
             self._keep_left(state)
@@ -129,11 +148,17 @@ class SceneLoader:
             SceneRequest(state.generation, source, state.depth_strength, loaded, self._depth_settings, plan=plan)
         )
 
-    def _sketch(self, state: AppState, source: Source) -> None:
-        """Have the photo shown in small while it is being read anyway."""
-        if self._sketched != state.generation:
-            self._sketched = state.generation
-            self._worker.submit(SceneRequest(self._sketched, source, state.depth_strength, is_sketch=True))
+    def _awaits_sketch(self, state: AppState, source: Source) -> bool:
+        """Whether the photo is still being made ready to be shown in small. That comes first, and has the processor for
+        itself; it is not made where all of the photo was read before.
+        """
+        if self.ahead.has(source):
+            return False
+        if self._to_sketch != state.generation:
+            self._to_sketch = state.generation
+            self._worker.cancel()
+            self._sketches.submit(SceneRequest(state.generation, source, state.depth_strength))
+        return self._sketched != state.generation and not self._sketches.is_lost
 
     def _keep_left(self, state: AppState) -> None:
         """The photo that is left may be gone back to."""

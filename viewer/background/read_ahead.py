@@ -88,6 +88,11 @@ class PhotosAhead:
         self._take_results()
         return self._reading == source and not self._thread.is_lost
 
+    def has(self, source: Source) -> bool:
+        """Whether it is here to be taken."""
+        self._take_results()
+        return source in self._ready
+
     def close(self) -> None:
         """Stop reading."""
         self._thread.close()

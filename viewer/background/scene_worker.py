@@ -18,6 +18,7 @@ from iibr_core.formats.files import is_folder
 from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.light_field_job import median_of_middle, showings_of_light_field
@@ -41,8 +42,8 @@ from viewer.model.state.scene import Progress, Scene, Source
 class SceneRequest:
     """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says.
 
-    plan: of what is loaded, where it is made already. takes_drafts: the photo may come as a sketch first, and views
-    twice, so that there is something to look at soon; else each comes once, final. is_sketch: no more than the sketch.
+    plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something
+    to look at soon; else each comes once, final.
     """
 
     generation: int
@@ -52,7 +53,6 @@ class SceneRequest:
     depth_settings: DepthSettings | None = None
     takes_drafts: bool = True
     plan: ScenePlan | None = None
-    is_sketch: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,14 @@ class SceneReady:
     scene: Scene
     loaded: LoadedPhoto | None
     centre: ViewUpdate
+
+
+@dataclass(frozen=True, eq=False)
+class Sketched:
+    """The scene in small, None where there is no need of that or no way to it."""
+
+    generation: int
+    ready: SceneReady | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +119,16 @@ class SceneWorker(JobThread[SceneRequest, SceneResult]):
         return results_of(job.request, job.should_stop, lambda: self.eye, report_progress)
 
 
+class SketchWorker(JobThread[SceneRequest, Sketched]):
+    """Has photos shown in small before they are read: one answer a request. In a thread of its own, as the scene's may
+    take its time to stop.
+    """
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when a result was posted."""
+        super().__init__("iibr-sketch", wake, _sketch, lambda request, message: Sketched(request.generation, None))
+
+
 def _failure(request: SceneRequest, message: str) -> Failed[int]:
     return Failed(request.generation, message)
 
@@ -133,6 +151,24 @@ def results_of(
             yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
     finally:
         give_back_memory()
+
+
+def _sketch(job: Job[SceneRequest, Sketched]) -> Iterator[Sketched]:
+    yield sketch_of(job.request, job.should_stop)
+
+
+def sketch_of(request: SceneRequest, should_stop: ShouldStop = never) -> Sketched:
+    """A large photo in small; nothing where it cannot be read so: reading all of it will tell why."""
+    path = Path(request.source.path)
+    with suppress(InputError):
+        loaded = None if is_light_field(path) else sketch_photo(request.source, should_stop)
+        if loaded is not None:
+            plan = make_plan(request.source, loaded, request.depth_strength)
+            scene = scene_of_photo(request.source, loaded, plan)
+            scene = replace(scene, notes=(), depth_origin=None, depth_source="being looked for", is_sketch=True)
+            ready = SceneReady(request.generation, scene, None, _centre_view(loaded, plan))
+            return Sketched(request.generation, ready)
+    return Sketched(request.generation, None)
 
 
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:
@@ -178,10 +214,6 @@ def _results_of_photo(
     report_progress: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
-    if request.loaded is None and request.takes_drafts:
-        yield from _sketch(request, should_stop)
-    if request.is_sketch:
-        return
     depth_settings = request.depth_settings or DepthSettings(source.depth.refine)
     loaded = (
         load_photo(source, should_stop, report_progress, depth_settings)
@@ -206,18 +238,6 @@ def _results_of_photo(
     yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
     if not should_stop():
         prepare_brush()
-
-
-def _sketch(request: SceneRequest, should_stop: Callable[[], bool]) -> Iterator[SceneReady]:
-    """A large photo in small; nothing where it cannot be read so: reading all of it will tell why."""
-    with suppress(InputError):
-        loaded = sketch_photo(request.source, should_stop)
-        if loaded is None:
-            return
-        plan = make_plan(request.source, loaded, request.depth_strength)
-        scene = scene_of_photo(request.source, loaded, plan)
-        scene = replace(scene, notes=(), depth_origin=None, depth_source="being looked for", is_sketch=True)
-        yield SceneReady(request.generation, scene, None, _centre_view(loaded, plan))
 
 
 def _centre_view(loaded: LoadedPhoto, plan: ScenePlan) -> ViewUpdate:

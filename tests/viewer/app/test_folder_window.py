@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,9 @@ from imgui_bundle import imgui
 from iibr_core.types import GridShape
 from tests.viewer.background.test_scene_worker import write_large_jpeg
 from tests.viewer.conftest import Driver, write_scene
+from viewer.background import scene_worker
+from viewer.model.actions import OpenPath
+from viewer.model.state.scene import Source
 
 Opener = Callable[..., Driver]
 
@@ -60,6 +64,25 @@ def test_a_large_photo_is_there_in_small_before_it_is_read(open_window: Opener, 
     driver.until_idle()
     assert driver.app.scene_view.loaded is not None
     assert driver.app.state.progress.is_complete
+
+
+def test_the_next_photo_is_there_in_small_before_the_one_before_stops(
+    open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_stop, real = threading.Event(), scene_worker.results_of
+
+    def stopping_late(request: scene_worker.SceneRequest, *others: object) -> Iterator[object]:
+        yield from real(request, *others)  # type: ignore[arg-type]
+        if request.generation == 1:
+            may_stop.wait()
+
+    monkeypatch.setattr(scene_worker, "results_of", stopping_late)
+    driver = open_window(write_scene(tmp_path, "before"), grid=GridShape(3, 3))
+    driver.until(lambda app: app.state.progress.is_complete)
+    driver.app.do(OpenPath(Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3))))
+    driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
+    may_stop.set()
+    driver.until(lambda app: not app.state.scene.is_sketch)
 
 
 def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:

@@ -26,6 +26,7 @@ from viewer.background.scene_worker import (
     SceneWorker,
     ViewReady,
     results_of,
+    sketch_of,
 )
 from viewer.model.state.optics import CENTRE
 from viewer.model.state.scene import Progress, Source
@@ -97,12 +98,12 @@ def write_large_jpeg(folder: Path) -> Path:
     return folder / "large.jpg"
 
 
-def test_a_large_jpeg_comes_as_a_sketch_first(tmp_path: Path) -> None:
-    source = Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3))
-    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)
-    sketch, whole = next(results), next(results)
-    assert isinstance(sketch, SceneReady)
+def test_a_large_jpeg_has_a_sketch(tmp_path: Path) -> None:
+    request = SceneRequest(1, Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3)))
+    sketch = sketch_of(request).ready
+    whole = next(results_of(request, lambda: False, lambda: CENTRE))
     assert isinstance(whole, SceneReady)
+    assert sketch is not None
     assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
     assert sketch.scene.is_sketch
     assert sketch.loaded is None
@@ -110,8 +111,6 @@ def test_a_large_jpeg_comes_as_a_sketch_first(tmp_path: Path) -> None:
     assert sketch.scene.name == whole.scene.name
     assert (whole.scene.size, whole.scene.is_sketch) == ((1600, 1200), False)
     assert whole.loaded is not None
-    only = results_of(SceneRequest(1, source, is_sketch=True), lambda: False, lambda: CENTRE)
-    assert [result.scene.is_sketch for result in only if isinstance(result, SceneReady)] == [True]
 
 
 @pytest.mark.parametrize("changes", [{"max_pixels": 10_000}, {"is_literal": True}], ids=str)
@@ -120,9 +119,10 @@ def test_what_is_read_in_no_time_or_taken_literally_has_no_sketch(tmp_path: Path
     assert sketch_photo(source) is None
 
 
-def test_a_cut_jpeg_fails_as_it_did_without_a_sketch(tmp_path: Path) -> None:
+def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) -> None:
     path = write_large_jpeg(tmp_path)
     path.write_bytes(path.read_bytes()[:20_000])
+    assert sketch_of(SceneRequest(1, Source(str(path)))).ready is None
     with pytest.raises(InputError, match=r"large\.jpg"):
         list(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
 
