@@ -6,8 +6,8 @@ and what it costs.
 
 The photo shows the surface matt, and roughness, reflectance and light are given; or it shows the highlight, and they
 are given but for the light's strength; or it shows the highlight and no light is known. Each against the same views
-without gloss. No photo that shows its highlight comes to more than the matt one does, but by chance: the rest is
-resampling, and what the photo does not see.
+without gloss. Where the matt photo's views come to hardly more, a photo that shows its highlight has no more to gain:
+the rest is resampling, and what the photo does not see.
 
 Slope: px that the highlight runs over its surface per view step. Bend: px per view step squared, judged where it comes
 to more than a pixel at the outermost view.

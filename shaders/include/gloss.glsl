@@ -1,4 +1,5 @@
-// A glossy surface under a far, round light: iibr_core/rendering/gloss, for whatever view is drawn.
+// A glossy surface under a far, round light: iibr_core/rendering/gloss, for whatever view is drawn. Needs view_size_px,
+// farthest and nearest, as in field.glsl.
 #ifdef GLOSS
 const float PI = 3.14159265359;
 
@@ -6,7 +7,7 @@ uniform sampler2D gloss_surface;      // of the photo: normal's x and y, share o
 uniform float gloss_focal;            // px
 uniform float gloss_infinity;         // disparity of what is infinitely far
 uniform float gloss_least_nearness;   // disparity above that counts as at least so much
-uniform vec2 eye;                     // its offset (s, t), view steps
+uniform vec2 eye;                     // its offset (s, t), view steps; of an EPI the first view's
 uniform vec3 gloss_light;             // towards it
 uniform vec3 gloss_radiance;
 uniform vec3 gloss_lobe;              // squared width, squared sine of the light's radius, reflectance
@@ -16,6 +17,10 @@ uniform bool gloss_has_reflected;
 uniform sampler2D gloss_reflected;    // of the photo: linear light that it shows reflected
 uniform bool gloss_has_virtual;       // what is reflected is seen elsewhere from elsewhere
 uniform sampler2D gloss_virtual;      // its virtual disparity, two by two
+
+bool is_in_photo(vec2 at) {
+    return all(lessThanEqual(abs(at - 0.5), vec2(0.5)));
+}
 
 float schlick(float cosine) {
     return gloss_lobe.z + (1.0 - gloss_lobe.z) * pow(1.0 - clamp(cosine, 0.0, 1.0), 5.0);
@@ -39,7 +44,7 @@ vec3 glossy(vec3 light, vec2 at, vec2 view, float depth, vec2 ray) {
     vec4 surface = textureLod(gloss_surface, place, 0.0);
     // Another surface is seen there, or nothing.
     float apart = abs(surface.w - disparity) * length(view);
-    if (surface.z <= 0.0 || apart > 1.0 || in_picture(place) < 1.0) return light;
+    if (surface.z <= 0.0 || apart > 1.0 || !is_in_photo(place)) return light;
     vec3 normal = vec3(surface.xy, -sqrt(max(1.0 - dot(surface.xy, surface.xy), 0.0)));
     float nearness = max(disparity - gloss_infinity, gloss_least_nearness);
     vec3 to_eye = normalize(vec3(ray - (place - 0.5) * view_size_px / nearness, -gloss_focal / nearness));
@@ -51,7 +56,7 @@ vec3 glossy(vec3 light, vec2 at, vec2 view, float depth, vec2 ray) {
             vec4 virtual_disparity = textureLod(gloss_virtual, from, 0.0);
             from = seen + vec2(dot(virtual_disparity.xy, ray), dot(virtual_disparity.zw, ray)) / view_size_px;
         }
-        if (in_picture(from) == 1.0) light += textureLod(gloss_reflected, from, 0.0).rgb;
+        if (is_in_photo(from)) light += textureLod(gloss_reflected, from, 0.0).rgb;
     }
     float n_v = dot(normal, to_eye);
     if (gloss_has_surroundings && n_v > 0.0) {

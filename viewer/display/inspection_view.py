@@ -189,8 +189,8 @@ class InspectionView:
         for name, rect, line in lines:
             if rect is not None:
                 size_px = layout.in_pixels(rect).size
-                draw = partial(self._passes.draw_epi, field, line, size_px, base.exposure)
-                names[name] = self._once(name, (base, line, size_px), draw)
+                draw = partial(self._passes.draw_epi, field, line, size_px, base.exposure, state.optics.gloss)
+                names[name] = self._once(name, (base, line, size_px, state.optics.gloss), draw)
         return names
 
     def _sheet(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, srgb_from_linear
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import SRGB, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
@@ -74,10 +75,14 @@ class InspectionPasses:
             texture.release()
         self._textures.clear()
 
-    def draw_epi(self, field: LightFieldTexture, line: Line, size_px: ScreenSize, exposure: float) -> int:
-        """One line of the picture in every view of a row or column. size_px: (width, height)."""
+    def draw_epi(
+        self, field: LightFieldTexture, line: Line, size_px: ScreenSize, exposure: float, gloss: Gloss | None = None
+    ) -> int:
+        """One line of the picture in every view of a row or column. size_px: (width, height). gloss: seen in it."""
         name, switches = ("upright", ("UPRIGHT",)) if line.is_upright else ("across", ())
-        program, quad = self._programs.get("epi.frag", switches + _converting(field))
+        is_glossy = gloss is not None and field.gloss is not None
+        switches += (*_converting(field), *(("GLOSS",) if is_glossy else ()))
+        program, quad = self._programs.get("epi.frag", switches)
         places = [(row, line.view) for row in range(field.grid.rows)]
         if not line.is_upright:
             places = [(line.view, column) for column in range(field.grid.columns)]
@@ -85,6 +90,10 @@ class InspectionPasses:
         self._use_colors(program, field, exposure)
         program.set_uniforms(layers=layers + [-1] * (MAX_VIEWS - len(layers)), view_count=len(layers), line=line.at)
         program.set_uniforms(span=line.span)
+        if gloss is not None and field.gloss is not None:
+            first, (far, near) = field.grid.offset(*places[0]), field.range_px
+            field.gloss.use(program, gloss, (first.s, first.t))
+            program.set_uniforms(view_size_px=(field.width, field.height), nearest=near, farthest=far)
         texture = self._use_image(name, size_px)
         quad.render(moderngl.TRIANGLES, vertices=3)
         return texture

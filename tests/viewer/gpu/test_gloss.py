@@ -12,7 +12,9 @@ from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.gloss.shading import GlossMaps, make_gloss_maps, shade
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import rms
+from viewer.gpu.inspection_passes import InspectionPasses, Line
 from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
 
 GRID = GridShape(3, 3)
@@ -114,6 +116,27 @@ def test_without_gloss_the_maps_change_nothing(renderer: Renderer) -> None:
     renderer.render(Optics(), (WIDTH, HEIGHT))
     assert np.array_equal(renderer.read_image(), before)
     assert len(renderer.programs) == programs, "no shader with gloss is even compiled"
+
+
+@pytest.mark.parametrize("is_upright", [False, True])
+@pytest.mark.parametrize("gloss", [LIT, MIRROR, MOVING], ids=["lit", "mirror", "moving"])
+def test_an_epi_shows_every_views_gloss(renderer: Renderer, gloss: Gloss, is_upright: bool) -> None:
+    flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), photo_with(spot=gloss.photo_shines)
+    maps = maps_of(gloss, photo, flat)
+    open_flat(renderer, photo, flat)
+    renderer.set_gloss(maps)
+    assert renderer.field is not None
+    passes = InspectionPasses(renderer.ctx, renderer.programs)
+    place, long, count = (34, WIDTH, GRID.columns) if not is_upright else (50, HEIGHT, GRID.rows)
+    line = Line(1, (place + 0.5) / (WIDTH if is_upright else HEIGHT), is_upright)
+    passes.draw_epi(renderer.field, line, ScreenSize(*((count, long) if is_upright else (long, count))), 1.0, gloss)
+    drawn = passes.read("upright" if is_upright else "across")[..., :3]
+    passes.release()
+    for index in range(count):
+        offset = GRID.offset(*((index, 1) if is_upright else (1, index)))
+        view = shaded(maps, np.roll(photo, (-round(2 * offset.t), -round(2 * offset.s)), (0, 1)), offset)
+        seen, expected = (drawn[:, index], view[:, place]) if is_upright else (drawn[index], view[place])
+        assert np.abs(seen.astype(int) - expected)[4:-4].max() <= 3
 
 
 def test_nothing_marked_is_nothing_drawn(renderer: Renderer) -> None:

@@ -95,6 +95,22 @@ def test_mirrors_and_dull_surfaces_of_any_size_are_finite(roughness, shape, shin
         assert np.isfinite(shaded(maps, (1.5, -100.0), photo=photo)).all()
 
 
+@pytest.mark.parametrize("roughness", [0.0, 0.2, 1.0])
+def test_a_plane_seen_edge_on_shows_no_more_than_light_and_surroundings_have(roughness):
+    """Grazing, everything is a mirror: what is reflected comes in the paint's place, never beside it."""
+    grazing = 1.45
+    disparity, normal = plane((0, -np.sin(grazing), -np.cos(grazing)))
+    towards = np.array([0, -np.sin(0.2), np.cos(0.2)])
+    gloss = Gloss(roughness=roughness, light=GlossLight(tuple(towards), (0.002, 0.002, 0.002), radius_deg=3.0))
+    around = np.full((8, 16, 3), 0.6, np.float32)
+    normals = np.broadcast_to(normal, (*SIZE, 3)).copy()
+    maps = make_gloss_maps(gloss, GREY, disparity, GEOMETRY, around, normals)
+    light = linear_from_srgb(shaded(maps, (0, 1)))
+    assert light.min() >= linear_from_srgb(GREY).min() - 1e-4
+    assert light.max() <= max(0.6, *gloss.light.radiance) + 1e-3
+    assert light.max() > 0.3
+
+
 def test_without_parallax_nothing_depends_on_the_viewpoint():
     flat = np.zeros(SIZE, np.float32)
     maps = make_gloss_maps(GLOSS, GREY, flat, SceneGeometry(90.0, 0.0))
