@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.depth.crumbs import fill_crumbs
 from iibr_core.depth.rim_sides import RIM_PX, choose_sides, step_distance
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
@@ -29,6 +30,8 @@ MOST_CLEAR_FELLOWS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_FELLOWS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
+CRUMB_EDGES = 2.0
+"""Times the least edge: what stands off by less is a surface's noise."""
 CROWD_PX = 5
 CROWDED = 0.3
 """Where steps are at so large a share of the pixels within CROWD_PX, as in meshes, a lone value may be a wire's."""
@@ -45,8 +48,9 @@ def settle_rims(
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
-    unknown and filled anew; then pixels of rims change sides where the colours say so. An exact map, which has neither
-    such disparities nor unknown ones in its rims, comes back as it is. Raises Cancelled once should_stop is true.
+    unknown and filled anew; then pixels of rims change sides where the colours say so, and crumbs that are left are
+    filled. An exact map, which has neither such disparities nor unknown ones in its rims, comes back as it is. Raises
+    Cancelled once should_stop is true.
     """
     colors, size = np.ascontiguousarray(photo, np.float32), image_size(values)
     between, rim = np.zeros(values.shape, np.bool_), step_distance(values, least_edge) < RIM_PX
@@ -56,7 +60,8 @@ def settle_rims(
         values = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
     elif np.count_nonzero(unknown & rim) <= least:
         return values
-    return choose_sides(colors, values, between | unknown, least_edge, should_stop)
+    values = choose_sides(colors, values, between | unknown, least_edge, should_stop)
+    return fill_crumbs(colors, values, CRUMB_EDGES * least_edge, should_stop)
 
 
 @kernel
