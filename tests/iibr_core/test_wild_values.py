@@ -16,7 +16,7 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import edge_blur, pictorial_cues, refine, rim_sides, rims, scaling, search
+from iibr_core.depth import crumbs, edge_blur, pictorial_cues, refine, rim_sides, rims, scaling, search
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
@@ -309,6 +309,10 @@ FINITE = {
     ),
     "depth.edge_blur.extent": lambda v, _: edge_blur.extent(np.nan_to_num(depths(v))),
     "depth.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(image(0.5), np.nan_to_num(depths(v))),
+    "depth.crumbs.fill_crumbs": lambda v, _: [
+        crumbs.fill_crumbs(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
+        crumbs.fill_crumbs(image(v), np.where(np.eye(*SIZE), np.float32(9), depths(1.0)), 0.5, never),
+    ],
     "depth.rims.settle_rims": lambda v, _: [
         rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),
         rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
