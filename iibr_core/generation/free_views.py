@@ -16,14 +16,24 @@ from numpy.typing import NDArray
 from iibr_core.formats.cameras import infinity_of
 from iibr_core.generation.outer_views import AROUND_PX, farthest_views, outer_views
 from iibr_core.generation.relief import measure_relief
-from iibr_core.generation.update_loop import complete_ray_set
+from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.free_view import render_free_view, target_from_photo
 from iibr_core.rendering.view_synthesis import RenderedView, rays_of_photo
 from iibr_core.runtime.tiling import ShouldStop, never
-from iibr_core.types import Camera, FloatImage, ImageSize, InputError, Margins, ViewOffset, image_size
+from iibr_core.types import (
+    Camera,
+    FloatImage,
+    ImageSize,
+    InputError,
+    Margins,
+    ReportProgress,
+    ViewOffset,
+    ignore_progress,
+    image_size,
+)
 
 FARTHEST_STEPS = 4.0
 """To the border of what cameras look through on the photo's plane: the length of a view step follows from it."""
@@ -91,7 +101,10 @@ def reach_of(photo: Camera, cameras: Sequence[Camera], depths: tuple[float, floa
 
 
 class FreeViews:
-    """Makes views of one photo for cameras that are known from the start; each when it is asked for."""
+    """Makes views of one photo for cameras that are known from the start; each when it is asked for.
+
+    scale_px: the disparity of its views times the distance from their cameras' planes.
+    """
 
     def __init__(
         self,
@@ -100,30 +113,35 @@ class FreeViews:
         camera: Camera,
         cameras: Sequence[Camera],
         should_stop: ShouldStop = never,
-        inpainter: Inpainter = fill_background,
+        inpainter: Inpainter | None = fill_background,
+        report_progress: ReportProgress = ignore_progress,
     ) -> None:
         """photo: (H, W, 3) sRGB-encoded, taken by `camera`, which is of its size. inverse_depth: (H, W), positive, 1 /
-        distance from the camera's plane. cameras: all that will be asked for. inpainter: fills what they disocclude.
+        distance from the camera's plane. cameras: all that will be asked for. inpainter: fills what they disocclude,
+        for all views alike; None leaves that to each view, which is a draft then.
 
         Raises InputError for a camera that sees nothing of the photo, Cancelled once should_stop is true.
         """
         reach = reach_of(camera, cameras, depths_of(inverse_depth))
         self._should_stop, self._margins = should_stop, reach.margins
-        self._scale_px = camera.focal_px[0] * reach.step
-        disparity = inverse_depth * np.float32(self._scale_px)
+        self.scale_px = camera.focal_px[0] * reach.step
+        disparity = inverse_depth * np.float32(self.scale_px)
         colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, should_stop)
         x, y = camera.centre_px
         centre_px = x + reach.margins.left, y + reach.margins.top
         self._camera = replace(camera, size=image_size(disparity), centre_px=centre_px)
-        self._rays = rays_of_photo(colors, disparity, farthest_views(reach.outer), len(reach.outer), should_stop)
-        complete_ray_set(self._rays, reach.outer, should_stop, inpainter)
+        outer = reach.outer if inpainter is not None else ()
+        self._rays = rays_of_photo(colors, disparity, farthest_views(reach.outer), len(outer), should_stop)
+        completing = render_outer_views(self._rays, outer, should_stop, inpainter or fill_background)
+        for done, _ in enumerate(completing, 1):
+            report_progress(done, len(outer), "what cameras may see beside the photo's surfaces")
 
     def view(self, camera: Camera, should_stop: ShouldStop | None = None) -> RenderedView:
-        """What a camera sees; its disparity is proportional to 1 / its distance from that camera's plane.
+        """What a camera sees; see `scale_px` for its disparity.
 
         should_stop: None for that of the ray set.
         """
-        matrix = target_from_photo(self._camera, camera, self._scale_px)
+        matrix = target_from_photo(self._camera, camera, self.scale_px)
         return render_free_view(self._rays, matrix, camera.size, self._margins, should_stop or self._should_stop)
 
 

@@ -1,141 +1,153 @@
-"""What a camera sees that left the plane of the views, drawn in the background; it stands in the picture's place.
+"""What a camera sees that left the plane of the views: a picture with its disparity, made in the background.
 
-One picture at a time: the next is what is wanted when the one before is there, so that a moving camera is seen to move.
+The renderer shows it in place of the field, so that aperture, focus, viewpoint and zoom go on as before. A draft comes
+first, from a small copy of the photo; what the photo hides is made up for the whole one, once, while nothing moves.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.runtime.tiling import Cancelled
-from iibr_core.types import Camera, ImageSize
+from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.display.scene_view import SceneView
-from viewer.gpu.context import GLContext
-from viewer.gpu.inspection_passes import InspectionPasses
+from viewer.gpu.refocus.frame_budget import stretch_image
 from viewer.model.actions import Action, Notify
-from viewer.model.free_camera import FORWARD_LIMITS, MOST_ASIDE, FreeCamera, Poses
-from viewer.model.layout import Rect, ScreenSize
-from viewer.model.state.app_state import AppState, Picture
+from viewer.model.free_camera import FORWARD_LIMITS, MOST_ASIDE, CameraProgress, FreeCamera, Poses
+from viewer.model.layout import ScreenSize
+from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:
     from iibr_core.generation.free_views import FreeViews
 
-PREPARING = "Making ready to look around: this takes a moment, once for each photo."
+DRAFT_PIXELS = 40_000
+"""Of the photo's copy that drafts are made of: they are there within a tenth of a second."""
 
 
 @dataclass(frozen=True)
-class FreePicture:
-    """What is to be drawn: of which photo, by which camera, how large, and what part of it."""
+class FreeRequest:
+    """What is to be drawn: of which photo, with the disparity of its centre view, by which camera."""
 
     loaded: LoadedPhoto
+    centre: ViewUpdate
     poses: Poses | None
     camera: FreeCamera
-    size_px: ScreenSize
-    part: Rect
 
 
 @dataclass(frozen=True, eq=False)
-class FreePixels:
-    """A picture, drawn: (height, width, 3), sRGB-encoded."""
+class FreeView:
+    """The view of a request's camera, as one of the scene's."""
 
-    picture: FreePicture
-    pixels: NDArray[np.uint8]
+    request: FreeRequest
+    view: ViewUpdate
+    is_draft: bool
+
+
+FreeResult = FreeView | CameraProgress | Failed[FreeRequest]
 
 
 @dataclass(frozen=True, eq=False)
 class _Ready:
-    """Views of a photo that are ready to be made. nearest: its distance, in the unit of the poses."""
+    """Views of a request's photo that are ready to be made. camera: the photo's; nearest: its distance, in the unit of
+    the poses. inverse_depths, disparities: of the farthest and the nearest, one by the other.
+    """
 
-    loaded: LoadedPhoto
-    poses: Poses | None
+    request: FreeRequest
     views: FreeViews
     camera: Camera
     others: tuple[Camera, ...]
     nearest: float
+    inverse_depths: tuple[float, float]
+    disparities: tuple[float, float]
+
+    def is_for(self, request: FreeRequest) -> bool:
+        """Whether another camera is all that this asks for."""
+        return replace(request, camera=self.request.camera) == self.request
 
 
 class FreeLook:
-    """Everything is called from the one GL thread. shown: what `texture` shows, pixels: of it; None without."""
+    """Everything is called from the one GL thread. shown: whose view, no draft, stands in the picture's place."""
 
-    def __init__(self, gl: GLContext, scene_view: SceneView, wake: Callable[[], None]) -> None:
-        """wake: called, in the drawing thread, when a picture is drawn."""
-        self.shown: FreePicture | None = None
-        self.pixels: NDArray[np.uint8] | None = None
+    def __init__(self, scene_view: SceneView, wake: Callable[[], None]) -> None:
+        """wake: called, in the drawing thread, when a view is made."""
+        self.shown: FreeRequest | None = None
         self._scene_view = scene_view
-        self._passes = InspectionPasses(gl.ctx, scene_view.renderer.programs)
-        self._worker: JobThread[FreePicture, FreePixels | Failed[FreePicture]] = JobThread(
-            "iibr-free", wake, self._draw, Failed
-        )
-        self._asked: FreePicture | None = None
-        self._refused: FreePicture | None = None
-        self._texture = 0
-        self._ready: _Ready | None = None
+        self._worker: JobThread[FreeRequest, FreeResult] = JobThread("iibr-free", wake, self._draw, Failed)
+        self._asked: FreeRequest | None = None
+        self._may_interrupt = True
+        self._ready: dict[bool, _Ready] = {}
 
-    def texture(self, state: AppState) -> int | None:
-        """GL name of what the free camera sees (rows bottom-up); None where there is none, or nothing yet."""
-        is_current = self.shown is not None and self.shown.loaded is self._scene_view.loaded
-        return self._texture if is_current and state.free_camera is not None else None
-
-    def advance(self, picture: Picture | None, state: AppState) -> list[Action]:
-        """Have drawn what is wanted, and say what went wrong."""
-        camera, loaded = state.free_camera, self._scene_view.loaded
-        if picture is None or camera is None or loaded is None:
-            if self._asked is not None:
-                self._worker.cancel()
-            self._asked = self._refused = self.shown = self.pixels = None
-            return []
+    def advance(self, state: AppState) -> list[Action]:
+        """Have drawn what is wanted, show what is there, and say what went wrong."""
+        camera, loaded, centre = state.free_camera, self._scene_view.loaded, self._scene_view.centre
+        if camera is None or loaded is None or centre is None or state.shows_before:
+            return self._leave()
         actions = self._take()
-        wanted = FreePicture(loaded, state.poses, camera, picture.size_px, picture.part)
-        if self._asked is None and wanted not in (self.shown, self._refused):
-            self._asked = wanted
+        wanted = FreeRequest(loaded, centre, state.poses, camera)
+        # A camera that goes on moving is seen to move: a draft at least of each request.
+        if wanted != self._asked and self._may_interrupt:
+            self._asked, self._may_interrupt = wanted, False
             self._worker.submit(wanted)
-            if self._ready is None or self._ready.loaded is not loaded:
-                actions.append(Notify(Notice(PREPARING)))
         return actions
 
     def close(self) -> None:
-        """Stop drawing and free the texture."""
+        """Stop drawing."""
         self._worker.close()
-        self._passes.release()
+
+    def _leave(self) -> list[Action]:
+        if self._asked is None:
+            return []
+        self._worker.cancel()
+        self._scene_view.stand_in(None)
+        self._asked, self.shown, self._may_interrupt = None, None, True
+        return [CameraProgress(None)]
 
     def _take(self) -> list[Action]:
-        result = self._worker.next_result()
-        match result:
-            case FreePixels(picture, pixels):
-                self._asked, self.shown, self.pixels = None, picture, pixels
-                self._texture = self._passes.show("free", np.ascontiguousarray(pixels[::-1]))
-            case Failed(picture, message):
-                self._asked, self._refused = None, picture
-                return [Notify(Notice(message, is_error=True))]
-        return []
+        actions: list[Action] = []
+        while (result := self._worker.next_result()) is not None:
+            match result:
+                case FreeView(request, view, is_draft):
+                    self._scene_view.stand_in(view)
+                    self.shown, self._may_interrupt = None if is_draft else request, True
+                case CameraProgress():
+                    actions.append(result)
+                case Failed(_, message):
+                    self._may_interrupt = True
+                    actions += [CameraProgress(None), Notify(Notice(message, is_error=True))]
+        return actions
 
-    def _draw(self, job: Job[FreePicture, FreePixels | Failed[FreePicture]]) -> Iterator[FreePixels]:
+    def _draw(self, job: Job[FreeRequest, FreeResult]) -> Iterator[FreeResult]:
         """In the drawing thread. What a photo's views are made of is kept: the next picture is then drawn at once."""
-        from iibr_core.color import bytes_from_encoded
-
         with suppress(Cancelled):
-            picture, ready = job.request, self._ready
-            if ready is None or ready.loaded is not picture.loaded or ready.poses is not picture.poses:
-                ready = self._ready = _make_ready(picture, job.should_stop)
-            view = ready.views.view(_camera_of(picture, ready), job.should_stop)
-            yield FreePixels(picture, bytes_from_encoded(view.colors))
+            has_draft = math.prod(job.request.loaded.photo.size) > DRAFT_PIXELS
+            for is_draft in (True, False) if has_draft else (False,):
+                ready = self._ready.get(is_draft)
+                if ready is None or not ready.is_for(job.request):
+                    ready = self._ready[is_draft] = _make_ready(job, is_draft)
+                yield FreeView(job.request, _view(job, ready), is_draft)
+            yield CameraProgress(None)
 
 
-def _make_ready(picture: FreePicture, should_stop: Callable[[], bool]) -> _Ready:
-    """Raises InputError for poses that see nothing of the photo, Cancelled once should_stop is true."""
+def _make_ready(job: Job[FreeRequest, FreeResult], is_draft: bool) -> _Ready:
+    """Raises InputError for poses that see nothing of the photo, Cancelled once the job should stop."""
     from iibr_core.color import photo_in_srgb
     from iibr_core.generation.free_views import FreeViews, depths_of, fitted_cameras, inverse_depth_of, steered
+    from iibr_core.generation.relief import measure_relief
+    from iibr_core.inpainting.background import fill_background
 
-    photo, poses = photo_in_srgb(picture.loaded.photo), picture.poses
+    request = job.request
+    photo, poses, disparity = photo_in_srgb(request.loaded.photo), request.poses, request.centre.disparity
+    assert disparity is not None
     if poses is None:
         centre_px = (photo.size.width - 1) / 2, (photo.size.height - 1) / 2
         camera = Camera(np.eye(3), np.zeros(3), photo.size, (photo.focal_px,) * 2, centre_px, photo.name)
@@ -143,23 +155,60 @@ def _make_ready(picture: FreePicture, should_stop: Callable[[], bool]) -> _Ready
     else:
         others = tuple(fitted_cameras(poses.cameras, poses.given, photo.size))
         camera = others[poses.given]
-    inverse_depth = inverse_depth_of(picture.loaded.disparity.values, camera.depth_range)
-    nearest = depths_of(inverse_depth)[0]
+    inverse_depth = inverse_depth_of(disparity, camera.depth_range)
+    (nearest, farthest), relief = depths_of(inverse_depth), measure_relief(disparity)
+    colors = photo.pixels
+    if is_draft:
+        size = _draft_size(photo.size)
+        colors, inverse_depth, camera = _sampled(colors, size), _sampled(inverse_depth, size), camera.resized(size)
     asides = (-MOST_ASIDE, MOST_ASIDE)
     ways = [(right, down, forward * nearest) for right in asides for down in asides for forward in FORWARD_LIMITS]
     cameras = (*others, *(steered(camera, *way) for way in ways))
-    views = FreeViews(photo.pixels, inverse_depth, camera, cameras, should_stop)
-    return _Ready(picture.loaded, poses, views, camera, others, nearest)
+    views = FreeViews(
+        colors,
+        inverse_depth,
+        camera,
+        cameras,
+        job.should_stop,
+        None if is_draft else fill_background,
+        lambda done, total, doing: job.post(CameraProgress(done / total)),
+    )
+    inverse_depths, disparities = (1 / farthest, 1 / nearest), (relief.low, relief.high)
+    return _Ready(request, views, camera, others, nearest, inverse_depths, disparities)
 
 
-def _camera_of(picture: FreePicture, ready: _Ready) -> Camera:
-    """With pictures just as large as the part of the window's."""
+def _view(job: Job[FreeRequest, FreeResult], ready: _Ready) -> ViewUpdate:
+    """What the camera sees, with the size and the disparities of the scene's views."""
     from iibr_core.generation.free_views import steered
+    from iibr_core.generation.stored_views import encode_for_storage
 
-    free, part, size = picture.camera, picture.part, picture.size_px
-    camera = ready.camera if free.pose is None else ready.others[free.pose]
+    free, centre = job.request.camera, job.request.centre
+    camera = ready.camera if free.pose is None else ready.others[free.pose].resized(ready.camera.size)
     camera = steered(camera, free.right, free.down, free.forward * ready.nearest)
-    whole = camera.resized(ImageSize(max(round(size.height / part.height), 1), max(round(size.width / part.width), 1)))
-    x, y = whole.centre_px
-    centre_px = x - part.x * whole.size.width, y - part.y * whole.size.height
-    return replace(whole, size=ImageSize(size.height, size.width), centre_px=centre_px)
+    seen = ready.views.view(camera, job.should_stop)
+    far, near = ready.inverse_depths
+    low, high = ready.disparities
+    px = (high - low) / (near - far) if near > far else 0.0
+    longer = camera.focal_px[0] / ready.camera.focal_px[0]
+    disparity = longer * (low + px * (seen.disparity / ready.views.scale_px - far))
+    size = ImageSize(*centre.colors.shape[:2])
+    is_hdr = job.request.loaded.photo.is_hdr
+    colors = encode_for_storage(seen.colors, is_hdr, never)
+    if camera.size != size:
+        shown_px = ScreenSize(size.width, size.height)
+        colors = _sampled(colors, size) if is_hdr else stretch_image(colors.astype(np.uint8, copy=False), shown_px)
+        disparity = _sampled(disparity, size)
+    return replace(centre, colors=colors, disparity=disparity.astype(np.float32))
+
+
+def _draft_size(size: ImageSize) -> ImageSize:
+    smaller = math.sqrt(DRAFT_PIXELS / math.prod(size))
+    return ImageSize(*(max(round(smaller * side), 1) for side in size))
+
+
+def _sampled(image: NDArray[Any], size: ImageSize) -> NDArray[Any]:
+    """An image (H, W, ...) at another size: of each pixel there the one that lies where it does."""
+    rows, columns = (
+        ((np.arange(there) + 0.5) * (here / there)).astype(int) for there, here in zip(size, image_size(image))
+    )
+    return np.ascontiguousarray(image[rows][:, columns])

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
 from viewer.model.actions import Action, SetFullscreen, ShowBefore, ShowPrompt
-from viewer.model.commands import BY_NAME, COMMANDS, Chord
+from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command
+from viewer.model.free_camera import LeaveCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke, SetBrush
 from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
@@ -44,6 +45,8 @@ def _escape_actions(state: AppState) -> list[Action]:
     """
     if state.prompt is not None:
         return [ShowPrompt(None)]
+    if state.free_camera is not None and state.stroke is None:
+        return [LeaveCamera()]
     if state.stroke is not None:
         return [DropStroke()]
     if state.inspection.shows_grid:
@@ -82,7 +85,16 @@ def read_keys(used_space: bool = False) -> Keys:
 
     down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
     right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
-    commands = tuple(command.name for command in COMMANDS if any(map(is_struck, command.chords)))
+
+    def strikes(command: Command) -> int:
+        """Of its keys in this frame: a long frame holds several of those that are held."""
+        struck = [chord for chord in command.chords if is_struck(chord)]
+        if not struck or not command.is_held:
+            return len(struck[:1])
+        key = getattr(imgui.Key, struck[0].key)
+        return imgui.get_key_pressed_amount(key, io.key_repeat_delay, io.key_repeat_rate)
+
+    commands = tuple(command.name for command in COMMANDS for _ in range(strikes(command)))
     # A drop-down that is open takes Esc for itself.
     is_menu_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
     is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False)) and not is_menu_open

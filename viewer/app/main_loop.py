@@ -11,7 +11,7 @@ from pathlib import Path
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
-from viewer.app.free_look import FreeLook, FreePicture
+from viewer.app.free_look import FreeLook
 from viewer.app.gamepad import Gamepad, actions_from_gamepad
 from viewer.app.gloss_finder import GlossFinder
 from viewer.app.keys import actions_from_keys, read_keys
@@ -92,7 +92,7 @@ EMPTY = AppState()
 @dataclass(frozen=True)
 class Frame:
     """Everything the window shows: picture and what inspection adds, panels (as a digest), where they lie, their look,
-    repairs asked for. sharp: GL name of what stands in the picture's place, None without; free: of which camera.
+    repairs asked for. sharp: GL name of what stands in the picture's place, None without.
     """
 
     picture: Picture | None
@@ -102,7 +102,6 @@ class Frame:
     look: Look
     damages: int
     sharp: int | None = None
-    free: FreePicture | None = None
 
 
 class App:
@@ -130,7 +129,7 @@ class App:
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
-        self.free_look = FreeLook(self._gl, self.scene_view, wake)
+        self.free_look = FreeLook(self.scene_view, wake)
         self.gloss_finder = GlossFinder(self.scene_view, wake)
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
@@ -175,28 +174,16 @@ class App:
         actions = gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
-        free = self.free_look.texture(self.state) if picture else None
-        texture = free or sharp or (self.scene_view.texture if picture else None)
+        texture = sharp or (self.scene_view.texture if picture else None)
         actions += build_screen(self.state, layout, texture, textures, thumbnails)
         actions += self._input(pointer, layout)
-        self._show(
-            Frame(
-                picture,
-                textures,
-                self._ui.end(),
-                layout,
-                look,
-                self.window.damages,
-                sharp,
-                self.free_look.shown if free else None,
-            )
-        )
+        self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
         self.do(*self._side_effects.draw(SAVE_BUDGET_S))
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
-        self.do(*self.free_look.advance(picture, self.state))
+        self.do(*self.free_look.advance(self.state))
         self._is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self.scene_loader.advance(self.state)
         self._keep_recent()

@@ -255,7 +255,9 @@ class PictureSaver:
 def _full_picture(scene_view: SceneView, state: AppState, size: ScreenSize) -> FullPicture | None:
     """The picture of this state at a size that shows more of the photo than its views do; None where it does not."""
     scene, loaded = state.scene, scene_view.loaded
-    if scene is None or scene.plan is None or loaded is None or not is_full(scene, state.optics, size):
+    if scene is None or scene.plan is None or loaded is None or state.free_camera is not None:
+        return None
+    if not is_full(scene, state.optics, size):
         return None
     return FullPicture(scene, scene.plan, loaded, state.optics, size)
 

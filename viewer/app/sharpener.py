@@ -95,6 +95,8 @@ class Sharpener:
         scene, loaded = state.scene, self._scene_view.loaded
         if scene is None or scene.plan is None or loaded is None or scene.own_size is None or state.zoom is None:
             return None
+        if state.free_camera is not None:
+            return None
         is_finer = picture.size_px.width / picture.part.width > scene.width
         if not is_finer or loaded is self._refused or not is_full(scene, picture.optics, scene.own_size):
             return None

@@ -52,8 +52,8 @@ PREVIEW_GRID = GridShape(1, 1)
 class SceneView:
     """Holds the renderer and the views of the scene that is shown.
 
-    generation: whose views these are. previews: of edited depth, and of gloss, shown so far. views_uploaded: so far,
-    those that came twice counted twice. pictures_drawn: how often the picture was drawn.
+    generation: whose views these are. previews: of edited depth, gloss, free cameras, shown so far. views_uploaded: so
+    far, those that came twice counted twice. pictures_drawn: how often the picture was drawn.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -66,6 +66,7 @@ class SceneView:
         self.previews = 0
         self._scene: Scene | None = None
         self._centre: ViewUpdate | None = None
+        self._stand_in: ViewUpdate | None = None
         self._gloss: GlossFound | None = None
         self._is_preview = False
         self._waiting: deque[ViewUpdate] = deque()
@@ -87,6 +88,7 @@ class SceneView:
         Its first view is shown in a field of its own until the second comes: making room for all takes a while.
         """
         scene = ready.scene
+        self.stand_in(None)
         known, self._gloss = self._gloss, None
         try:
             self._open_field(scene, PREVIEW_GRID)
@@ -119,6 +121,13 @@ class SceneView:
         self.renderer.upload_view(0, 0, centre.colors, disparity)
         self._disparities = {CENTRE: disparity}
         self.previews += 1
+
+    def stand_in(self, view: ViewUpdate | None) -> None:
+        """Show this view, which has a disparity, in place of the scene's, through the same lens; None: those again."""
+        if view is not None or self._stand_in is not None:
+            self._stand_in = view
+            self.renderer.stand_in(view)
+            self.previews += 1
 
     def gloss_request(self, gloss: Gloss | None) -> GlossRequest | None:
         """What is to be found out before this gloss can be shown on the scene; None where nothing is."""
@@ -195,6 +204,8 @@ class SceneView:
 
     def pick(self, eye: ViewOffset, x_px: float, y_px: float) -> float | None:
         """Disparity seen at a pixel of the picture; None where the scene has none."""
+        if self._stand_in is not None and self._stand_in.disparity is not None:
+            return pick_disparity({CENTRE: self._stand_in.disparity}, eye, x_px, y_px)
         return pick_disparity(self._disparities, eye, x_px, y_px)
 
     def draw(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:

@@ -107,11 +107,14 @@ class Chord:
 
 @dataclass(frozen=True)
 class Command:
-    """One thing that can be done. action: of the state in which it was asked for."""
+    """One thing that can be done. action: of the state in which it was asked for. is_held: it goes on while its keys
+    are held, as often in a second however long a frame takes.
+    """
 
     name: str
     action: Callable[[AppState], Action]
     chords: tuple[Chord, ...] = ()
+    is_held: bool = False
 
 
 def _always(action: Action) -> Callable[[AppState], Action]:
@@ -180,12 +183,12 @@ COMMANDS: tuple[Command, ...] = (
     *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
     Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
-    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),)),
-    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),)),
-    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),)),
-    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),)),
-    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),)),
-    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),)),
+    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),), True),
+    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),), True),
+    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),), True),
+    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),), True),
+    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),), True),
+    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),), True),
     Command("Next pose", _always(StepPose(1)), (Chord("n"),)),
     Command("Previous pose", _always(StepPose(-1)), (Chord("n", shift=True),)),
     Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),

@@ -49,7 +49,19 @@ class StepPose:
     steps: int
 
 
-FreeCameraAction = MoveCamera | StepPose
+@dataclass(frozen=True)
+class LeaveCamera:
+    """Back to the plane of the views."""
+
+
+@dataclass(frozen=True)
+class CameraProgress:
+    """How much is done of what a photo's free views are made of; None when it is there."""
+
+    done: float | None
+
+
+FreeCameraAction = MoveCamera | StepPose | LeaveCamera | CameraProgress
 
 
 def moved(camera: FreeCamera, action: MoveCamera) -> FreeCamera:

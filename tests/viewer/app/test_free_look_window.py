@@ -9,9 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import Camera, GridShape, ImageSize
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver
+from viewer.model.actions import DoTask
 from viewer.model.free_camera import FreeCamera, Poses
+from viewer.model.state.optics import SetAperture, SetFocus
+from viewer.model.state.tasks import SaveTask
 
 Opener = Callable[..., Driver]
 
@@ -27,9 +31,7 @@ def seen(viewer: Driver) -> np.ndarray:
     """What the free camera sees, once that is shown."""
     viewer.until(lambda app: app.free_look.shown is not None and app.free_look.shown.camera == app.state.free_camera)
     viewer.until_idle()
-    pixels = viewer.app.free_look.pixels
-    assert pixels is not None
-    return pixels.astype(int)
+    return viewer.image().astype(int)
 
 
 def red_places(pixels: np.ndarray) -> np.ndarray:
@@ -55,6 +57,24 @@ def test_looking_right_moves_everything_to_the_left(viewer: Driver) -> None:
     viewer.send("key", "w", "key", "s", "key", "shift+d", "key", "shift+d")
     viewer.until(lambda app: app.state.free_camera is not None and app.state.free_camera.right == pytest.approx(0.1))
     assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.45, abs=0.02)
+
+
+def test_the_lens_blurs_what_it_sees_and_a_saved_picture_shows_that(viewer: Driver, tmp_path: Path) -> None:
+    viewer.send("key", "w")
+    viewer.until(lambda app: app.state.free_camera is not None)
+    viewer.app.do(SetAperture(0.0))
+    sharp = seen(viewer)
+    viewer.app.do(SetAperture(3.0), SetFocus(0.0))
+    blurred = seen(viewer)
+    assert np.abs(blurred - sharp).mean() > 1.0
+    path = tmp_path / "seen.png"
+    viewer.app.do(DoTask(SaveTask(str(path), (blurred.shape[1], blurred.shape[0]))))
+    viewer.until(lambda app: path.exists() and app.state.saving is None)
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.free_camera is None and app.free_look.shown is None)
+    viewer.until_idle()
+    saved, beside = 255 * read_photo(path).pixels, viewer.image()
+    assert np.abs(saved - blurred).mean() < np.abs(saved - beside).mean() / 4
 
 
 def test_poses_are_stepped_through_and_what_sees_nothing_is_told(viewer: Driver) -> None:

@@ -11,11 +11,23 @@ import pytest
 from iibr_core.types import Camera, ImageSize
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.actions import OpenPath, ReturnHome
-from viewer.model.free_camera import FORWARD_LIMITS, MOST_ASIDE, FreeCamera, MoveCamera, Poses, StepPose
+from viewer.app.keys import Keys, actions_from_keys
+from viewer.model.actions import Action, AskToSave, OpenPath, ReturnHome
+from viewer.model.free_camera import (
+    FORWARD_LIMITS,
+    MOST_ASIDE,
+    CameraProgress,
+    FreeCamera,
+    LeaveCamera,
+    MoveCamera,
+    Poses,
+    StepPose,
+)
+from viewer.model.layout import ScreenSize
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import CENTRE, MoveEye, ResetOptics
+from viewer.model.state.optics import CENTRE, MoveEye, ResetOptics, SetAperture, SetFocus
+from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.scene import Source
 
 
@@ -67,11 +79,39 @@ def test_a_light_field_from_disk_cannot_be_looked_around_in() -> None:
     assert "open a photo" in told.notices[-1].text
 
 
-@pytest.mark.parametrize("action", [MoveEye(CENTRE), ResetOptics(), ReturnHome(), OpenPath(Source("b.png"))])
-def test_what_moves_the_lens_goes_back_to_the_views(action: object) -> None:
+@pytest.mark.parametrize("action", [LeaveCamera(), ResetOptics(), ReturnHome(), OpenPath(Source("b.png"))])
+def test_what_goes_back_to_the_views(action: Action) -> None:
     state = reduce(opened(), MoveCamera(forward=0.1))
     assert state.free_camera is not None
-    assert reduce(state, action).free_camera is None  # type: ignore[arg-type]
+    assert reduce(state, action).free_camera is None
+
+
+@pytest.mark.parametrize("action", [MoveEye(CENTRE), SetAperture(2.0), SetFocus(0.5)])
+def test_it_looks_through_the_same_lens(action: Action) -> None:
+    state = reduce(reduce(opened(), MoveCamera(forward=0.1)), action)
+    assert state.free_camera == FreeCamera(forward=0.1)
+    assert state.optics == reduce(opened(), action).optics
+
+
+def test_esc_goes_back_to_the_views() -> None:
+    state = reduce(opened(), MoveCamera(forward=0.1))
+    assert actions_from_keys(Keys(is_escape=True), state) == [LeaveCamera()]
+
+
+def test_how_far_it_is_lasts_until_it_is_there() -> None:
+    state = reduce(opened(), CameraProgress(0.25))
+    assert state.free_progress == 0.25
+    assert reduce(state, CameraProgress(None)).free_progress is None
+
+
+def test_its_picture_is_saved_at_the_size_of_the_views() -> None:
+    state = opened()
+    assert state.scene is not None
+    state = replace(state, scene=replace(state.scene, own_size=ScreenSize(4000, 3000)))
+    for camera, size in ((None, ScreenSize(4000, 3000)), (FreeCamera(forward=0.1), state.scene.size)):
+        prompt = reduce(replace(state, free_camera=camera), AskToSave("picture")).prompt
+        assert isinstance(prompt, SavePrompt)
+        assert prompt.size_px == size
 
 
 def test_another_photo_has_no_poses() -> None:

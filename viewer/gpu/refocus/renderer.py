@@ -15,7 +15,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.gloss_textures import GlossTextures
 from viewer.gpu.light_field_texture import LightFieldTexture
@@ -61,6 +61,7 @@ class Renderer:
         self.ctx = gl.ctx
         self.prefilter = prefilter
         self.field: LightFieldTexture | None = None
+        self._stand_in: LightFieldTexture | None = None
         self.report = DrawReport()
         self.note = ""
         self.passes_shown = 0
@@ -110,16 +111,32 @@ class Renderer:
 
     def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Add or replace one view; see LightFieldTexture.upload."""
-        field = self._open_field()
+        field = self._loaded_field()
         if 0 <= row < field.grid.rows and 0 <= column < field.grid.columns and field.present[row, column]:
             self._stop_picture()
         field.upload(row, column, colors, disparity)
         if not self.is_renewing:
             self._accumulation = None
 
+    def stand_in(self, view: ViewUpdate | None) -> None:
+        """Draw this view alone in place of the field, whose grid and size it has; None: the field again.
+
+        It has a disparity, and its colours are sRGB's.
+        """
+        self._stop_picture()
+        if self._stand_in is not None:
+            self._stand_in.release()
+            self._stand_in = None
+        if view is not None:
+            field = self._loaded_field()
+            size = field.grid, field.width, field.height
+            self._stand_in = LightFieldTexture(self.ctx, *size, field.hdr, with_disparity=True, stride=max(field.grid))
+            self._stand_in.upload(view.row, view.column, view.colors, view.disparity)
+        self._accumulation = None
+
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """What gloss means for the field, for optics that have one; None where it means nothing."""
-        field = self._open_field()
+        field = self._loaded_field()
         self._stop_picture()
         if field.gloss is not None:
             field.gloss.release()
@@ -308,15 +325,20 @@ class Renderer:
             targets.release()
         self._targets.clear()
         self._shown = None
-        if self.field is not None:
-            self.field.release()
-            self.field = None
+        for field in (self.field, self._stand_in):
+            if field is not None:
+                field.release()
+        self.field = self._stand_in = None
 
     def _current(self) -> ProgressiveAccumulation:
         assert self._accumulation is not None, "render first"
         return self._accumulation
 
     def _open_field(self) -> LightFieldTexture:
+        """What is drawn."""
+        return self._stand_in or self._loaded_field()
+
+    def _loaded_field(self) -> LightFieldTexture:
         if self.field is None:
             raise ValueError("no light field is open")
         return self.field

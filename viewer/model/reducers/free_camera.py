@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from viewer.model.free_camera import FreeCamera, FreeCameraAction, MoveCamera, StepPose, moved, stepped
+from viewer.model.free_camera import (
+    CameraProgress,
+    FreeCamera,
+    FreeCameraAction,
+    LeaveCamera,
+    MoveCamera,
+    StepPose,
+    moved,
+    stepped,
+)
 from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -14,7 +23,11 @@ NO_POSES = "There are no poses: the photo was opened without any."
 
 
 def reduce_free_camera(state: AppState, action: FreeCameraAction) -> AppState:
-    """The state after one of these actions; whatever moves the lens goes back to the views (`root.reduce`)."""
+    """The state after one of these actions. The lens is the free camera's, too."""
+    if isinstance(action, LeaveCamera):
+        return replace(state, free_camera=None)
+    if isinstance(action, CameraProgress):
+        return replace(state, free_progress=action.done)
     if state.scene is None:
         return state
     if state.scene.plan is None:

@@ -96,7 +96,7 @@ def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
     if isinstance(action, LensAction):
         state = replace(state, shows_before=False) if state.shows_before else state
-        state = replace(state, free_camera=None) if state.free_camera is not None else state
+        state = replace(state, free_camera=None) if isinstance(action, ResetOptics) else state
         state = replace(state, prompt=None) if state.prompt == "welcome" else state  # who moves has understood
         moves = isinstance(action, MoveEye | SetDolly | ResetOptics)
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
@@ -183,7 +183,8 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, prompt=PathPrompt(what))
         case AskToSave(what) if state.scene is not None and (what == "picture" or state.scene.plan is not None):
             scene = state.scene
-            size = scene.own_size if scene.own_size is not None and state.optics.dolly == 0 else scene.size
+            is_full = scene.own_size is not None and state.optics.dolly == 0 and state.free_camera is None
+            size = scene.own_size if is_full and scene.own_size is not None else scene.size
             return replace(state, prompt=SavePrompt(_path_beside(state, what), size, what=what))
         case PictureDrawn(report):
             return replace(state, report=report)

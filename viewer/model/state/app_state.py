@@ -78,7 +78,8 @@ class AppState:
 
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
-    zoom: None where the whole picture is seen. free_camera: None on the plane of the views; poses: of a file, for it.
+    zoom: None where the whole picture is seen. free_camera: None on the plane of the views; poses: of a file, for it;
+    free_progress: how much is done of what its views are made of, None when that is there.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
     file has them. saving, exporting: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this
     scene what is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs:
@@ -112,6 +113,7 @@ class AppState:
     inspection: Inspection = field(default_factory=Inspection)
     zoom: Zoom | None = None
     free_camera: FreeCamera | None = None
+    free_progress: float | None = None
     poses: Poses | None = None
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)

@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from viewer.model.actions import Action, DismissNotice, DismissNotices, DoTask, TakeSettings
 from viewer.model.commands import BY_NAME
+from viewer.model.free_camera import LeaveCamera
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import CancelExportTask, Exporting
@@ -31,7 +32,8 @@ _FLAGS = (
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
     """Build the newest notice; what was pressed comes back as actions."""
-    if not (state.notices or state.saving or state.exporting or state.downloading):
+    is_looking = state.free_progress is not None
+    if not (state.notices or state.saving or state.exporting or state.downloading or is_looking):
         return []
     margin = MARGIN * layout.ui_scale
     right, bottom = layout.panel.x - margin, layout.window.height - margin
@@ -49,6 +51,8 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
     imgui.begin("notices", None, _FLAGS)
     actions = _saving(state.saving, layout) if state.saving is not None else []
+    if state.free_progress is not None:
+        actions += _looking(state.free_progress, layout)
     if state.exporting is not None:
         actions += _exporting(state.exporting, layout)
     if state.downloading is not None:
@@ -78,6 +82,16 @@ def _saving(saving: Saving, layout: Layout) -> list[Action]:
         imgui.same_line()
     imgui.align_text_to_frame_padding()
     imgui.text_wrapped(saving_text(saving))
+    return actions
+
+
+def _looking(done: float, layout: Layout) -> list[Action]:
+    """A bar, and a button that goes back to the views."""
+    imgui.progress_bar(done, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+    actions: list[Action] = [LeaveCamera()] if imgui.button("Cancel##looking") else []
+    imgui.same_line()
+    imgui.align_text_to_frame_padding()
+    imgui.text_wrapped("Drawing what the photo hides")
     return actions
 
 
