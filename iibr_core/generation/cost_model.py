@@ -43,7 +43,7 @@ CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
 """Of one pixel of the band of rows in the making: its candidates and weights; hypotheses and features if ambiguous."""
 DRAFT_BYTES, UNDECIDED_BYTES = 8, 68
 """Of one pixel of a draft: the view as it is stored; of one that the transformer is still to be asked for, more."""
-NUMBER_BYTES, HOLE_BYTES = 4, 148
+NUMBER_BYTES, HOLE_BYTES = 5, 160
 """Of one pixel of a view while its holes are filled; of one in a hole, more: what surrounds it in all directions."""
 
 

@@ -9,29 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import chain
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, rims_of_holes
 from iibr_core.inpainting.protocol import Inpainter
+from iibr_core.inpainting.rim_lines import find_lines
+from iibr_core.inpainting.rim_texture import mirror_texture
 from iibr_core.runtime.jit import kernel, nearest_pixel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, never, raise_if_stopped
+from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
-DIRECTIONS = np.array(
-    [
-        (1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1),
-        (2, 1), (-2, 1), (2, -1), (-2, -1), (1, 2), (-1, 2), (1, -2), (-1, -2),
-    ]
-)  # fmt: skip
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
 AGREE_PX = 2
 """Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
 SURFACE_PX = 2.0
 """Surfaces that part by less than this are one."""
-MOST_PIECE_PIXELS = 1 << 15
-"""Hole pixels that are filled between two questions whether to stop."""
+ALONG_LINES, LINE_POWER, ANGLE_POWER = 30.0, 2, 16
+"""A seed counts this many times more, times its line's strength and the cosine of the angle off it to these powers."""
 HIDDEN_PX = 0.5
 """Something hides a surface if it lands at least this far from it."""
 
@@ -48,9 +46,10 @@ def fill_background(
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
     photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
-    there, weighted by 1 / distance. The colour is their mean, smoother the farther away they are: who can tell which of
-    them goes on. The disparity is that of one surface, the one with the most weight: a mean of several would lie on
-    none. A view that is all hole stays as it is. Raises Cancelled once should_stop is true.
+    there, weighted by 1 / distance, more along the lines that run there. The colour is their mean, smoother the farther
+    away they are, and gets their surface's fine texture. The disparity is that of one surface, the one with the most
+    weight: a mean of several would lie on none. A view that is all hole stays as it is. Raises Cancelled once
+    should_stop is true.
     """
     _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), should_stop, threads)
 
@@ -82,11 +81,13 @@ def _fill_view(
     threads: int,
 ) -> None:
     """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
-    pixels = _hole_pixels(hole, should_stop, threads)
-    known = _nearest_known(hole, pixels, should_stop, threads)
+    one_surface = SURFACE_PX / max(parallax, 1e-9)
+    pixels = flat_indices(hole, should_stop, threads)
+    known = nearest_known(hole, pixels, should_stop, threads)
+    rims, number = rims_of_holes(known, image_size(hole), should_stop, threads)
+    lines = np.empty((len(rims), 2), np.float32)
     reach = np.empty(len(pixels), np.float32)
     changed = np.empty((len(pixels), 3), np.float32)
-    parts = [slice(first, first + MOST_PIECE_PIXELS) for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
 
     def smooth(step_px: int) -> Callable[[slice], None]:
         return lambda part: _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part])
@@ -97,14 +98,26 @@ def _fill_view(
 
     steps: list[Callable[[slice], None]] = [
         lambda part: _fill(
-            colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, parallax, reach[part]
+            colors, disparity, pixels[part], known[part], number, lines,
+            photo_disparity, offset.s, offset.t, one_surface, reach[part],
         ),
         lambda part: _agree(disparity, hole, pixels[part], changed[part]),
         lambda part: _write_disparity(changed[part], pixels[part], disparity),
         *chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX),
-    ]
+        lambda part: mirror_texture(colors, disparity, hole, pixels[part], known[part], one_surface, changed[part]),
+        lambda part: _add_texture(changed[part], pixels[part], colors),
+    ]  # fmt: skip
+    in_pieces(
+        lambda part: find_lines(colors, disparity, hole, rims[part], one_surface, lines[part]),
+        _pieces(len(rims)), should_stop, threads,
+    )  # fmt: skip
     for step in steps:
-        in_pieces(step, parts, should_stop, threads)
+        in_pieces(step, _pieces(len(pixels)), should_stop, threads)
+
+
+def _pieces(count: int) -> list[slice]:
+    """So many pixels in pieces of MOST_PIECE_PIXELS."""
+    return [slice(first, first + MOST_PIECE_PIXELS) for first in range(0, count, MOST_PIECE_PIXELS)]
 
 
 def background_inpainter() -> Inpainter:
@@ -112,71 +125,15 @@ def background_inpainter() -> Inpainter:
     return fill_background
 
 
-def _hole_pixels(hole: NDArray[np.bool_], should_stop: ShouldStop, threads: int) -> NDArray[np.int64]:
-    """Flat indices (N,) of the hole pixels, ascending."""
-    size = image_size(hole)
-
-    def band(first: int, last: int) -> NDArray[np.int64]:
-        return first * size.width + np.flatnonzero(hole[first:last])
-
-    return np.concatenate(in_bands(band, size, should_stop, threads))
-
-
-def _nearest_known(
-    hole: NDArray[np.bool_], pixels: NDArray[np.int64], should_stop: ShouldStop, threads: int
-) -> NDArray[np.int64]:
-    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none."""
-    raise_if_stopped(should_stop)
-    number = np.empty(hole.shape, np.int32)
-    _number(pixels, number)
-    known = np.empty((len(pixels), len(DIRECTIONS)), np.int64)
-
-    def look(k: int) -> None:
-        _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known[:, k])
-
-    in_pieces(look, range(len(DIRECTIONS)), should_stop, threads)
-    return known
-
-
 @kernel
-def _number(pixels, number):
-    """Tell each hole pixel which one it is."""
-    width = number.shape[1]
-    for i in range(len(pixels)):
-        number[pixels[i] // width, pixels[i] % width] = i
-
-
-@kernel
-def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):
-    """What `_nearest_known` returns, for one direction.
-
-    pixels: flat indices of the hole pixels, ascending. Holes pass on what the next pixel in that direction found, so
-    the cost does not depend on the holes' size.
-    """
-    height, width = hole.shape
-    total = len(pixels)
-    # In the order in which the next pixel in that direction, if a hole, comes first.
-    downwards = step_y < 0 or (step_y == 0 and step_x < 0)
-    for n in range(total):
-        i = n if downwards else total - 1 - n
-        # The neighbour: off the frame, a hole that passes on what it found, or known.
-        y, x = pixels[i] // width + step_y, pixels[i] % width + step_x
-        known[i] = -1
-        if not (0 <= x < width and 0 <= y < height):
-            continue
-        if hole[y, x]:
-            known[i] = known[number[y, x]]
-            continue
-        known[i] = y * width + x
-
-
-@kernel
-def _fill(colors, disparity, pixels, known, photo_disparity, s, t, parallax, reach):
+def _fill(
+    colors, disparity, pixels, known, number, lines, photo_disparity, s, t, one_surface, reach,
+):  # fmt: skip
     """What `fill_background` says; and how far away the nearest known pixel is, reach (N,)."""
     height, width = disparity.shape
     directions = known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
-    one_surface = SURFACE_PX / parallax
+    hidden = one_surface * HIDDEN_PX / SURFACE_PX
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         nearest, farthest = np.inf, np.inf
@@ -195,11 +152,12 @@ def _fill(colors, disparity, pixels, known, photo_disparity, s, t, parallax, rea
             # ... something nearer must hide it by HIDDEN_PX, or it must be off the frame.
             column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
             inside = 0 <= column < width and 0 <= row < height
-            if not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX:
-                weight[k] = 1.0 / distance
+            likely = _along_line(lines, number[known_y, known_x], known_y - y, known_x - x) / distance
+            if not inside or photo_disparity[row, column] - d > hidden:
+                weight[k] = likely
                 any_possible = True
             else:
-                weight[k] = -1.0 / distance
+                weight[k] = -likely
         reach[i] = nearest
         # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
         for k in range(directions):
@@ -231,6 +189,20 @@ def _fill(colors, disparity, pixels, known, photo_disparity, s, t, parallax, rea
                 sum_d += w * surface[k]
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
         disparity[y, x] = sum_d / most
+
+
+@kernel
+def _along_line(lines, rim, down, across):
+    """How much more a rim counts for the pixel from which it lies (down, across): see ALONG_LINES."""
+    squared = float(down * down + across * across)
+    line_cos, line_sin = lines[rim, 0], lines[rim, 1]
+    strength = sqrt(line_cos * line_cos + line_sin * line_sin)
+    if strength == 0.0:
+        return 1.0
+    # cos(2 angle), the angle between the line and the way to here.
+    double = (line_cos * (across * across - down * down) + line_sin * 2.0 * across * down) / (strength * squared)
+    squared_cos = max(0.5 + 0.5 * double, 0.0)
+    return 1.0 + ALONG_LINES * strength**LINE_POWER * squared_cos ** (ANGLE_POWER // 2)
 
 
 @kernel
@@ -280,6 +252,15 @@ def _write_colors(smoothed, pixels, colors):
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = smoothed[i, 0], smoothed[i, 1], smoothed[i, 2]
+
+
+@kernel
+def _add_texture(texture, pixels, colors):
+    width = colors.shape[1]
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        for c in range(3):
+            colors[y, x, c] = max(colors[y, x, c] + texture[i, c], 0.0)
 
 
 @kernel

@@ -3,13 +3,60 @@ import pytest
 
 from iibr_core.inpainting.background import (
     AGREE_PX,
-    DIRECTIONS,
+    ALONG_LINES,
+    ANGLE_POWER,
     HIDDEN_PX,
+    LINE_POWER,
     SMOOTH_STEPS_PX,
     SURFACE_PX,
     fill_background,
 )
+from iibr_core.inpainting.nearest_known import DIRECTIONS
+from iibr_core.inpainting.rim_lines import NOISE, REACH_PX
+from iibr_core.inpainting.rim_texture import BINOMIAL, MOST_TEXTURE, NEARER, TEXTURE_SHARE, TRIES
 from iibr_core.types import ViewOffset
+
+
+def own_surface(disparity, hole, pixel, one_surface):
+    return ~hole & (np.abs(disparity - disparity[pixel]) <= one_surface)
+
+
+def line_slowly(colors, own, pixel):
+    """(cos 2a, sin 2a) of the way a line runs at a pixel, of length 1 if nothing else does."""
+    tensor = np.zeros((2, 2))
+    for v, u in np.ndindex(own.shape[0] - 1, own.shape[1] - 1):
+        if max(abs(v - pixel[0]), abs(u - pixel[1])) <= REACH_PX and own[v : v + 2, u : u + 2].all():
+            square = colors[v : v + 2, u : u + 2].astype(float)
+            steps = np.stack([np.diff(square, axis=1).mean((0, 1)), np.diff(square, axis=0).mean((0, 1))])
+            tensor += steps @ steps.T
+    (least, most), axes = np.linalg.eigh(tensor)
+    angle = np.arctan2(axes[1, 0], axes[0, 0])
+    strength = (most - least) / (least + most + 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2)
+    return strength * np.array([np.cos(2 * angle), np.sin(2 * angle)])
+
+
+def along_line(line, way):
+    """How much more a seed in this direction (x, y) counts."""
+    angle = np.arctan2(way[1], way[0]) - np.arctan2(line[1], line[0]) / 2
+    return 1 + ALONG_LINES * np.hypot(*line) ** LINE_POWER * np.cos(angle) ** ANGLE_POWER
+
+
+def texture_slowly(colors, disparity, hole, y, x, seen, one_surface):
+    own = ~hole & (np.abs(disparity - disparity[y, x]) <= one_surface)
+    seen = [(u, v) for u, v in seen if own[v, u]]
+    if not seen:
+        return 0.0
+    u, v = min(seen, key=lambda p: (p[0] - x) ** 2 + (p[1] - y) ** 2)
+    for n in range(TRIES):
+        far = 1 + NEARER**n
+        row, column = int(np.floor(y + far * (v - y) + 0.5)), int(np.floor(x + far * (u - x) + 0.5))
+        if 0 <= row < hole.shape[0] and 0 <= column < hole.shape[1] and own[row, column]:
+            weights = np.zeros((hole.shape[0] + 4, hole.shape[1] + 4))
+            weights[row : row + 5, column : column + 5] = np.outer(BINOMIAL, BINOMIAL)
+            weights = weights[2:-2, 2:-2] * own
+            mean = (weights[..., None] * colors).sum((0, 1)) / weights.sum()
+            return np.clip(TEXTURE_SHARE * (colors[row, column] - mean), -MOST_TEXTURE, MOST_TEXTURE)
+    return 0.0
 
 
 def agree_slowly(disparity, hole):
@@ -35,9 +82,11 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     height, width = hole.shape
     t, s = offset
     parallax = max(abs(s), abs(t))
+    one_surface = SURFACE_PX / parallax
     filled_colors, filled_disparity, reach = colors.copy(), disparity.copy(), np.full(hole.shape, np.inf)
+    seen_from = {}
     for y, x in np.argwhere(hole):
-        seen = []
+        seen = seen_from[y, x] = []
         for i, j in DIRECTIONS:
             path = [(x + n * i, y + n * j) for n in range(1, max(height, width) + 1)]
             path = [(u, v) for u, v in path if 0 <= u < width and 0 <= v < height and not hole[v, u]]
@@ -53,15 +102,21 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
         chosen = [p for p in seen if possible(*p)] or [(u, v) for u, v in seen if disparity[v, u] <= farthest]
         if chosen:
             reach[y, x] = min(np.hypot(u - x, v - y) for u, v in seen)
-            w = np.array([1 / np.hypot(u - x, v - y) for u, v in chosen])
+            lines = [line_slowly(colors, own_surface(disparity, hole, (v, u), one_surface), (v, u)) for u, v in chosen]
+            w = [1 / np.hypot(u - x, v - y) for u, v in chosen]
+            w *= np.array([along_line(line, (u - x, v - y)) for line, (u, v) in zip(lines, chosen)])
             d = np.array([disparity[v, u] for u, v in chosen])
             filled_colors[y, x] = sum(k * colors[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
-            alike = np.abs(d[:, None] - d) <= SURFACE_PX / parallax
+            alike = np.abs(d[:, None] - d) <= one_surface
             mine = alike[max(range(len(d)), key=lambda k: (round((alike[k] * w).sum(), 9), -d[k]))]
             filled_disparity[y, x] = (w * d)[mine].sum() / w[mine].sum()
     for step in SMOOTH_STEPS_PX:
         filled_colors = smooth_slowly(filled_colors, hole, reach, step)
-    return filled_colors, agree_slowly(filled_disparity, hole)
+    agreed = agree_slowly(filled_disparity, hole)
+    texture = {at: texture_slowly(colors, agreed, hole, *at, seen, one_surface) for at, seen in seen_from.items()}
+    for at, added in texture.items():
+        filled_colors[at] = np.maximum(filled_colors[at] + added, 0)
+    return filled_colors, agreed
 
 
 def test_agrees_with_a_slow_twin():
@@ -122,3 +177,32 @@ def test_a_view_that_is_all_hole_stays_and_stays_finite():
     fill_background(colors, disparity, np.ones((5, 6), bool), disparity, ViewOffset(50, 50))
     assert colors.max() == 0
     assert np.isfinite(disparity).all()
+
+
+def test_a_line_goes_on_straight():
+    disparity = np.full((60, 90), 12.0, np.float32)
+    y, x = np.indices((60, 90))
+    truth = np.exp(-(((y - 5 - x / 2) / 4) ** 2))[..., None].repeat(3, axis=2).astype(np.float32)
+    hole = x >= 78
+    colors = np.where(hole[..., None], np.float32(0.5), truth)
+    fill_background(colors, disparity, hole, disparity, ViewOffset(0, 1))
+    found, expected = colors[:, 83, 0], truth[:, 83, 0]
+    assert abs(found.argmax() - expected.argmax()) <= 1
+    assert found.max() > 0.5
+    assert found[expected < 0.01].max() < 0.2
+
+
+def test_holes_get_the_texture_of_what_lies_behind_and_none_where_that_is_smooth():
+    disparity = np.zeros((40, 60), np.float32)
+    photo_disparity = disparity.copy()
+    disparity[:, 20:30] = photo_disparity[:, 30:40] = 10.0
+    hole = np.zeros((40, 60), bool)
+    hole[:, 30:40] = True
+    smooth = np.full((40, 60, 3), 0.4, np.float32)
+    rough = smooth + np.random.default_rng(1).uniform(-0.05, 0.05, smooth.shape).astype(np.float32)
+    rough[:, 20:30] = np.random.default_rng(2).uniform(0, 1, (40, 10, 3))
+    truth = np.abs(np.diff(rough[:, 42:], axis=1)).mean()
+    for colors in (smooth, rough):
+        fill_background(colors, disparity, hole, photo_disparity, ViewOffset(0, 1))
+    assert smooth[hole] == pytest.approx(0.4, abs=1e-5)
+    assert 0.7 * truth < np.abs(np.diff(rough[:, 31:39], axis=1)).mean() < 1.2 * truth

@@ -1,0 +1,101 @@
+"""What is known around holes: the nearest known pixel in each of sixteen directions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, raise_if_stopped
+from iibr_core.types import ImageSize, image_size
+
+DIRECTIONS = np.array(
+    [
+        (1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1),
+        (2, 1), (-2, 1), (2, -1), (-2, -1), (1, 2), (-1, 2), (1, -2), (-1, -2),
+    ]
+)  # fmt: skip
+MOST_PIECE_PIXELS = 1 << 15
+"""Hole pixels that are filled between two questions whether to stop."""
+
+
+def flat_indices(mask: NDArray[np.bool_], should_stop: ShouldStop, threads: int) -> NDArray[np.int64]:
+    """(N,): of the pixels where mask (H, W) is True, ascending."""
+    size = image_size(mask)
+
+    def band(first: int, last: int) -> NDArray[np.int64]:
+        return first * size.width + np.flatnonzero(mask[first:last])
+
+    return np.concatenate(in_bands(band, size, should_stop, threads))
+
+
+def nearest_known(
+    hole: NDArray[np.bool_], pixels: NDArray[np.int64], should_stop: ShouldStop, threads: int
+) -> NDArray[np.int64]:
+    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none."""
+    raise_if_stopped(should_stop)
+    number = np.empty(hole.shape, np.int32)
+    _number(pixels, number)
+    known = np.empty((len(pixels), len(DIRECTIONS)), np.int64)
+
+    def look(k: int) -> None:
+        _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known[:, k])
+
+    in_pieces(look, range(len(DIRECTIONS)), should_stop, threads)
+    return known
+
+
+def rims_of_holes(
+    known: NDArray[np.int64], size: ImageSize, should_stop: ShouldStop, threads: int
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """The flat indices (M,) that occur in known (N, 16), ascending, and the number (H, W) of each among them, which
+    means nothing elsewhere.
+    """
+    is_rim, number = np.zeros(size, np.bool_), np.empty(size, np.int32)
+    parts = range(0, len(known), MOST_PIECE_PIXELS)
+    in_pieces(lambda first: _mark(known[first : first + MOST_PIECE_PIXELS], is_rim), parts, should_stop, threads)
+    rims = flat_indices(is_rim, should_stop, threads)
+    raise_if_stopped(should_stop)
+    _number(rims, number)
+    return rims, number
+
+
+@kernel
+def _number(pixels, number):
+    """Tell each of these pixels which one it is."""
+    width = number.shape[1]
+    for i in range(len(pixels)):
+        number[pixels[i] // width, pixels[i] % width] = i
+
+
+@kernel
+def _mark(known, is_rim):
+    width = is_rim.shape[1]
+    for i in range(len(known)):
+        for pixel in known[i]:
+            if pixel >= 0:
+                is_rim[pixel // width, pixel % width] = True
+
+
+@kernel
+def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):
+    """What `_nearest_known` returns, for one direction.
+
+    pixels: flat indices of the hole pixels, ascending. Holes pass on what the next pixel in that direction found, so
+    the cost does not depend on the holes' size.
+    """
+    height, width = hole.shape
+    total = len(pixels)
+    # In the order in which the next pixel in that direction, if a hole, comes first.
+    downwards = step_y < 0 or (step_y == 0 and step_x < 0)
+    for n in range(total):
+        i = n if downwards else total - 1 - n
+        # The neighbour: off the frame, a hole that passes on what it found, or known.
+        y, x = pixels[i] // width + step_y, pixels[i] % width + step_x
+        known[i] = -1
+        if not (0 <= x < width and 0 <= y < height):
+            continue
+        if hole[y, x]:
+            known[i] = known[number[y, x]]
+            continue
+        known[i] = y * width + x

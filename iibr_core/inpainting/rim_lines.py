@@ -1,0 +1,41 @@
+"""Which way lines run where they meet a hole: they go on straight (coherence transport, Bornemann & Maerz, 2007)."""
+
+from __future__ import annotations
+
+from iibr_core.runtime.jit import kernel
+
+REACH_PX = 3
+"""Lines are told from 7 x 7 pixels."""
+NOISE = 0.01
+"""Steps between neighbouring pixels, standard deviation, that make no line."""
+
+
+@kernel
+def find_lines(colors, disparity, hole, rims, one_surface, lines):
+    """Write lines (M, 2) at the rims, flat indices (M,): (cos 2a, sin 2a), a the angle at which colours change the
+    least; as long as they change across that line only, 0 where no way differs from others. Only what is known of a
+    rim's own surface counts: disparities that differ by one_surface at most.
+    """
+    height, width = hole.shape
+    for i in range(len(rims)):
+        y, x = rims[i] // width, rims[i] % width
+        d = disparity[y, x]
+        # The structure tensor, summed over colours.
+        xx = xy = yy = 0.0
+        for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height - 1)):
+            for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width - 1)):
+                is_own = True
+                for j in range(2):
+                    for k in range(2):
+                        is_own &= not hole[v + j, u + k] and abs(disparity[v + j, u + k] - d) <= one_surface
+                if not is_own:
+                    continue
+                for c in range(3):
+                    # Steps along both diagonals of 2 x 2 pixels: unlike those to the right and below, of one place.
+                    falling = colors[v + 1, u + 1, c] - colors[v, u, c]
+                    rising = colors[v, u + 1, c] - colors[v + 1, u, c]
+                    across, down = 0.5 * (falling + rising), 0.5 * (falling - rising)
+                    xx, xy, yy = xx + across * across, xy + across * down, yy + down * down
+        # Its eigenvalues differ by sqrt((xx - yy)^2 + 4 xy^2); the line runs across the larger one's direction.
+        noise = 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2
+        lines[i, 0], lines[i, 1] = (yy - xx) / (xx + yy + noise), -2.0 * xy / (xx + yy + noise)
