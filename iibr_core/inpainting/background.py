@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import chain
-from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, rims_of_holes
 from iibr_core.inpainting.protocol import Inpainter
-from iibr_core.inpainting.rim_lines import find_lines
+from iibr_core.inpainting.rim_lines import find_lines, line_weight
 from iibr_core.inpainting.rim_texture import mirror_texture
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
@@ -28,8 +27,8 @@ AGREE_PX = 2
 """Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
 SURFACE_PX = 2.0
 """Surfaces that part by less than this are one."""
-ALONG_LINES, LINE_POWER, ANGLE_POWER = 30.0, 2, 16
-"""A seed counts this many times more, times its line's strength and the cosine of the angle off it to these powers."""
+ALONG_LINES = 30.0
+"""A seed counts so many times more along a line, see `line_weight`."""
 HIDDEN_PX = 0.5
 """Something hides a surface if it lands at least this far from it."""
 
@@ -152,7 +151,9 @@ def _fill(
             # ... something nearer must hide it by HIDDEN_PX, or it must be off the frame.
             column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
             inside = 0 <= column < width and 0 <= row < height
-            likely = _along_line(lines, number[known_y, known_x], known_y - y, known_x - x) / distance
+            rim = number[known_y, known_x]
+            along = line_weight(lines[rim, 0], lines[rim, 1], known_y - y, known_x - x)
+            likely = (1.0 + ALONG_LINES * along) / distance
             if not inside or photo_disparity[row, column] - d > hidden:
                 weight[k] = likely
                 any_possible = True
@@ -189,20 +190,6 @@ def _fill(
                 sum_d += w * surface[k]
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
         disparity[y, x] = sum_d / most
-
-
-@kernel
-def _along_line(lines, rim, down, across):
-    """How much more a rim counts for the pixel from which it lies (down, across): see ALONG_LINES."""
-    squared = float(down * down + across * across)
-    line_cos, line_sin = lines[rim, 0], lines[rim, 1]
-    strength = sqrt(line_cos * line_cos + line_sin * line_sin)
-    if strength == 0.0:
-        return 1.0
-    # cos(2 angle), the angle between the line and the way to here.
-    double = (line_cos * (across * across - down * down) + line_sin * 2.0 * across * down) / (strength * squared)
-    squared_cos = max(0.5 + 0.5 * double, 0.0)
-    return 1.0 + ALONG_LINES * strength**LINE_POWER * squared_cos ** (ANGLE_POWER // 2)
 
 
 @kernel

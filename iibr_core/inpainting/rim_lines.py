@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from iibr_core.runtime.jit import kernel
 
 REACH_PX = 3
 """Lines are told from 7 x 7 pixels."""
+STRENGTH_POWER, ANGLE_POWER = 2, 16
+"""Lines count by their strength, and by the cosine of the angle off them, to these powers."""
 NOISE = 0.01
 """Steps between neighbouring pixels, standard deviation, that make no line."""
 
@@ -39,3 +43,15 @@ def find_lines(colors, disparity, hole, rims, one_surface, lines):
         # Its eigenvalues differ by sqrt((xx - yy)^2 + 4 xy^2); the line runs across the larger one's direction.
         noise = 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2
         lines[i, 0], lines[i, 1] = (yy - xx) / (xx + yy + noise), -2.0 * xy / (xx + yy + noise)
+
+
+@kernel
+def line_weight(line_cos, line_sin, down, across):
+    """How well the way (down, across) runs along one of those lines, 0 to 1."""
+    strength = sqrt(line_cos * line_cos + line_sin * line_sin)
+    if strength == 0.0:
+        return 0.0
+    # cos(2 angle), the angle between the line and the way.
+    squared = float(down * down + across * across)
+    double = (line_cos * (across * across - down * down) + line_sin * 2.0 * across * down) / (strength * squared)
+    return strength**STRENGTH_POWER * max(0.5 + 0.5 * double, 0.0) ** (ANGLE_POWER // 2)

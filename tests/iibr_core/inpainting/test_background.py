@@ -4,15 +4,13 @@ import pytest
 from iibr_core.inpainting.background import (
     AGREE_PX,
     ALONG_LINES,
-    ANGLE_POWER,
     HIDDEN_PX,
-    LINE_POWER,
     SMOOTH_STEPS_PX,
     SURFACE_PX,
     fill_background,
 )
 from iibr_core.inpainting.nearest_known import DIRECTIONS
-from iibr_core.inpainting.rim_lines import NOISE, REACH_PX
+from iibr_core.inpainting.rim_lines import ANGLE_POWER, NOISE, REACH_PX, STRENGTH_POWER
 from iibr_core.inpainting.rim_texture import BINOMIAL, MOST_TEXTURE, NEARER, TEXTURE_SHARE, TRIES
 from iibr_core.types import ViewOffset
 
@@ -36,9 +34,9 @@ def line_slowly(colors, own, pixel):
 
 
 def along_line(line, way):
-    """How much more a seed in this direction (x, y) counts."""
+    """How well a way (x, y) runs along it."""
     angle = np.arctan2(way[1], way[0]) - np.arctan2(line[1], line[0]) / 2
-    return 1 + ALONG_LINES * np.hypot(*line) ** LINE_POWER * np.cos(angle) ** ANGLE_POWER
+    return np.hypot(*line) ** STRENGTH_POWER * np.cos(angle) ** ANGLE_POWER
 
 
 def texture_slowly(colors, disparity, hole, y, x, seen, one_surface):
@@ -104,7 +102,7 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
             reach[y, x] = min(np.hypot(u - x, v - y) for u, v in seen)
             lines = [line_slowly(colors, own_surface(disparity, hole, (v, u), one_surface), (v, u)) for u, v in chosen]
             w = [1 / np.hypot(u - x, v - y) for u, v in chosen]
-            w *= np.array([along_line(line, (u - x, v - y)) for line, (u, v) in zip(lines, chosen)])
+            w *= np.array([1 + ALONG_LINES * along_line(line, (u - x, v - y)) for line, (u, v) in zip(lines, chosen)])
             d = np.array([disparity[v, u] for u, v in chosen])
             filled_colors[y, x] = sum(k * colors[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
             alike = np.abs(d[:, None] - d) <= one_surface

@@ -5,10 +5,11 @@ import pytest
 
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
 from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.inpainting.beyond_frame import SPREAD, TEXTURE_PX, TEXTURE_SHARE, _level, extend_beyond_frame
+from iibr_core.inpainting.beyond_frame import PLACES, SLANT, TEXTURE_PX, TEXTURE_SHARE, _level, extend_beyond_frame
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
+from tests.iibr_core.inpainting.test_background import along_line, line_slowly
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(24, 36)
@@ -17,6 +18,11 @@ MARGINS = Margins(2, 5, 3, 4)
 
 def noise(height, width):
     return np.random.default_rng(3).random((height, width, 3), np.float32)
+
+
+def mean_at(means, level, place):
+    k = int(level)
+    return means[k][place] * (k + 1 - level) + means[k + 1][place] * (level - k)
 
 
 def extend_slowly(colors, disparity, margins):
@@ -28,6 +34,8 @@ def extend_slowly(colors, disparity, margins):
     for k in range(12):
         last = means[-1]
         means.append(last / 2 + np.roll(last, 2**k, 0) / 4 + np.roll(last, -(2**k), 0) / 4)
+    own = np.ones(disparity.shape, bool)
+    lines = [line_slowly(colors, own, at) for at in places]
     kernel = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]) / 256
     around = np.pad(colors, ((2, 2), (2, 2), (0, 0)), "edge").astype(np.float64)
     grown = np.empty((*margins.around(SIZE), 3))
@@ -39,12 +47,18 @@ def extend_slowly(colors, disparity, margins):
         if not away:
             grown[row, column] = colors[y, x]
             continue
-        level = SPREAD + np.log2(away)
-        k, place = int(level), places.index((y, x))
-        mean = means[k][place] * (k + 1 - level) + means[k + 1][place] * (level - k)
+        place = places.index((y, x))
+        mean = mean_at(means, _level(away), place)
         v, u = 2 * y - row + margins.top, 2 * x - column + margins.left
         detail = colors[v, u] - np.einsum("ij,ijc->c", kernel, around[v : v + 5, u : u + 5])
-        grown[row, column] = np.maximum(mean + TEXTURE_SHARE * away / (away + TEXTURE_PX) * detail, 0)
+        colour = np.maximum(mean + TEXTURE_SHARE * away / (away + TEXTURE_PX) * detail, 0)
+        total, step = 1.0, SLANT * away / PLACES
+        for j in range(-PLACES, PLACES + 1):
+            n = int(np.floor(place + j * step + 0.5)) % len(places)
+            way = column - margins.left - places[n][1], row - margins.top - places[n][0]
+            weight = along_line(lines[n], way) * away / np.hypot(*way)
+            total, colour = total + weight, colour + weight * mean_at(means, _level(step), n)
+        grown[row, column] = colour / total
     return grown, surfaces
 
 
@@ -69,6 +83,17 @@ def test_tiny_photos_of_one_colour_go_on_in_it(size):
     colors = np.full((*size, 3), 0.25, np.float32)
     grown, _ = extend_beyond_frame(colors, np.zeros(size, np.float32), Margins(7, 1, 2, 3))
     np.testing.assert_allclose(grown, 0.25, atol=1e-6)
+
+
+def test_a_line_that_leaves_the_frame_goes_on_straight():
+    y, x = np.indices((60, 80))
+    bar = lambda y, x: np.exp(-(((x - y / 2 - 25) / 3) ** 2))  # noqa: E731
+    colors = bar(y, x)[..., None].repeat(3, axis=2).astype(np.float32)
+    grown, _ = extend_beyond_frame(colors, np.zeros((60, 80), np.float32), Margins(12, 12, 12, 12))
+    for row in (4, 80):
+        expected = bar(row - 12, np.arange(104) - 12)
+        assert abs(int(grown[row, :, 0].argmax()) - int(expected.argmax())) <= 1
+        assert grown[row, :, 0].max() > 0.35
 
 
 def test_means_widen_with_the_distance():
