@@ -152,7 +152,7 @@ class SceneLoader:
         """Whether the photo is still being made ready to be shown in small. That comes first, and has the processor for
         itself; it is not made where all of the photo was read before.
         """
-        if self.ahead.has(source):
+        if source in self.ahead.ready:
             return False
         if self._to_sketch != state.generation:
             self._to_sketch = state.generation

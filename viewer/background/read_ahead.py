@@ -57,6 +57,7 @@ class PhotosAhead:
     @property
     def ready(self) -> tuple[Source, ...]:
         """What is here to be taken."""
+        self._take_results()
         return tuple(self._ready)
 
     def want(self, sources: Sequence[Source], depth_strength: float) -> None:
@@ -87,11 +88,6 @@ class PhotosAhead:
         """Whether it is under way."""
         self._take_results()
         return self._reading == source and not self._thread.is_lost
-
-    def has(self, source: Source) -> bool:
-        """Whether it is here to be taken."""
-        self._take_results()
-        return source in self._ready
 
     def close(self) -> None:
         """Stop reading."""
