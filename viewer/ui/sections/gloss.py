@@ -56,11 +56,11 @@ def gloss_section(state: AppState, layout: Layout, palette: Palette) -> list[Act
         return []
     light = _light(gloss.light, layout, palette)
     edited = replace(gloss, light=light) if light is not None else _reflection(gloss, layout)
+    actions = _surroundings(gloss, layout)
     surface = _surface(gloss.surface, layout)
     if surface is not None:
         edited = replace(edited, surface=surface)
-    actions: list[Action] = [] if edited == gloss else [SetGloss(edited)]
-    actions += _surroundings(gloss, layout)
+    actions += [] if edited == gloss else [SetGloss(edited)]
     return actions + _brush(state.gloss_brush, gloss, layout)
 
 
