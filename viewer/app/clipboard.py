@@ -14,6 +14,7 @@ from urllib.parse import unquote, urlsplit
 
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
+from viewer.model.state.saving import PASTED_FOLDER
 
 MOST_KEPT = 20
 """Pasted pictures; older ones go."""
@@ -54,7 +55,7 @@ def paste_picture(text: str) -> Pasted:
     text: of the clipboard, "" without. Raises InputError where there is nothing to open, or a program is lacking.
     """
     path = _path_in(text)
-    return Pasted(path) if path is not None else _paste_pixels(_cache_folder() / "pasted")
+    return Pasted(path) if path is not None else _paste_pixels(_cache_folder() / PASTED_FOLDER)
 
 
 def _paste_pixels(folder: Path) -> Pasted:

@@ -27,12 +27,16 @@ class Keys:
 
 
 def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
-    """What the keys ask for. Esc closes what is open in the window first."""
+    """What the keys ask for. Esc closes what is open in the window first. What is typed before a prompt has taken the
+    keyboard is meant for it.
+    """
     actions: list[Action] = []
     if keys.is_escape:
         actions += _escape_actions(state)
-    actions += [BY_NAME[name].action(state) for name in keys.commands]
-    if any(keys.arrows):
+    is_typing = state.prompt is not None and not isinstance(state.prompt, str)
+    commands = [BY_NAME[name] for name in keys.commands]
+    actions += [command.action(state) for command in commands if not is_typing or command.chords[0].ctrl]
+    if any(keys.arrows) and not is_typing:
         eye = state.optics.eye
         step = ARROW_STEP_VIEWS
         actions.append(MoveEye(ViewOffset(eye.t + step * keys.arrows.t, eye.s + step * keys.arrows.s)))

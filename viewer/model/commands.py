@@ -29,6 +29,7 @@ from viewer.model.actions import (
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
+    ToggleSection,
     Undo,
 )
 from viewer.model.free_camera import MoveCamera, StepPose
@@ -52,6 +53,7 @@ from viewer.model.state.inspection import (
 from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import LOOPS, LoopKind
 from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetGloss
+from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.scene import source_beside, source_with_depth, source_with_map
@@ -215,6 +217,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Stop making views", _always(StopWork())),
     Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
     Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),
+    *(Command(f"Section: {section}", _always(ToggleSection(section))) for section in SECTIONS),
     Command("Full screen", lambda s: SetFullscreen(not s.is_fullscreen), (Chord("f11"),)),
     Command("Hide or show the panel", lambda s: HidePanel(not s.hides_panel), (Chord("tab"),)),
     Command("Before and after", lambda s: ShowBefore(not s.shows_before), (Chord("backslash"),)),

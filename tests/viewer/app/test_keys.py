@@ -9,12 +9,13 @@ import pytest
 
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model.actions import Action, SetFullscreen, ShowPrompt, Undo
+from viewer.model.actions import Action, AskToSave, SetFullscreen, ShowPrompt, Undo
 from viewer.model.commands import BY_NAME
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
 from viewer.model.state.optics import MoveEye, ResetOptics
+from viewer.model.state.prompts import PalettePrompt
 from viewer.model.state.scene import Scene, Source
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
@@ -41,6 +42,13 @@ def test_keys() -> None:
 )
 def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], closes: Action) -> None:
     assert actions_from_keys(Keys(is_escape=True), functools.reduce(reduce, opens, STATE)) == [closes]
+
+
+def test_what_is_typed_too_early_is_no_command() -> None:
+    """The palette comes up, and has the keyboard a frame later."""
+    keys = Keys(arrows=ViewOffset(1, 0), commands=("Keep this state to compare", "Save the picture…"))
+    assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [AskToSave()]
+    assert len(actions_from_keys(keys, replace(STATE, prompt="welcome"))) == 3
 
 
 def test_arrows() -> None:

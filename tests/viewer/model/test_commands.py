@@ -9,12 +9,15 @@ from imgui_bundle import imgui
 
 from iibr_core.types import ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
+from viewer.model.actions import AskToSave
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.optics import MoveEye
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
+from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ChooseTask
 
 
@@ -71,3 +74,13 @@ def test_recent_files_come_first_in_the_list_but_for_the_open_one() -> None:
     assert opened is not None
     assert opened.path == "/a/one.jpg"
     assert [command.name for command in commands_matching("two", recent_commands(state))] == ["Open two.jpg"]
+
+
+def test_nothing_is_proposed_to_be_put_among_pasted_pictures() -> None:
+    """They lie in a cache that is emptied."""
+    pasted = Source("/home/a/.cache/iibr/clipboard/pasted/pasted-1.png")
+    state = state_with(replace(scene_of(source=pasted), name="pasted-1"))
+    saved, exported = (reduce(state, action).prompt for action in (AskToSave(), AskToExport()))
+    assert isinstance(saved, SavePrompt)
+    assert isinstance(exported, ExportPrompt)
+    assert (saved.path, exported.path) == ("~/pasted-1-iibr.png", "~/pasted-1-quilt.png")

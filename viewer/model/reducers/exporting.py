@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import PurePath
 
 from viewer.model.export_kinds import EXPORTS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
+from viewer.model.state.saving import path_beside
 
 FIRST_KIND = next(iter(EXPORTS))
 
@@ -24,4 +24,4 @@ def export_path_beside(state: AppState, kind: str) -> str:
     assert state.source is not None
     assert state.scene is not None
     ending = EXPORTS[kind].endings[0] if EXPORTS[kind].endings else ""
-    return str(PurePath(state.source.path).parent / f"{state.scene.name}-{kind}{ending}")
+    return path_beside(state.source.path, f"{state.scene.name}-{kind}{ending}")

@@ -83,7 +83,7 @@ from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, 
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import SECTIONS, Preferences
 from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
-from viewer.model.state.saving import SavedSettings, SavingChanged
+from viewer.model.state.saving import SavedSettings, SavingChanged, path_beside
 from viewer.model.state.scene import Progress
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
@@ -353,8 +353,8 @@ def _path_beside(state: AppState, what: Saved) -> str:
     """
     assert state.source is not None
     assert state.scene is not None
-    path, origin = PurePath(state.source.path), state.scene.depth_origin
+    origin = state.scene.depth_origin
     ending = "-iibr.png" if what == "picture" else "_disparity.pfm"
     if what == "map" and origin is not None and origin.kind == "file":
         ending = "-edited.pfm"
-    return str(path.parent / f"{state.scene.name}{ending}")
+    return path_beside(state.source.path, f"{state.scene.name}{ending}")

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
 from viewer.model.state.scene import Source
+
+PASTED_FOLDER = "pasted"
+"""Where pasted pictures lie for a while: nothing else is to be put there."""
+
+
+def path_beside(path: str, name: str) -> str:
+    """Where a file of this name is saved that is made of the photo at path: beside it, of a pasted one at home."""
+    folder = PurePath(path).parent
+    return str((PurePath("~") if folder.name == PASTED_FOLDER else folder) / name)
 
 
 @dataclass(frozen=True)

@@ -78,9 +78,11 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
         return []
     usual = HELP_WIDTH if prompt == "help" else MODELS_WIDTH if isinstance(prompt, ModelsPrompt) else PROMPT_WIDTH
     width = min(usual * layout.ui_scale, layout.window.width)
-    down = 0.0 if prompt == "welcome" else 0.5
-    middle = imgui.ImVec2(max(layout.panel.x, width) / 2, down * layout.window.height)
-    imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, down))
+    middle = imgui.ImVec2(max(layout.panel.x, width) / 2, layout.window.height / 2)
+    if prompt == "welcome":  # in a corner: in the middle are faces
+        imgui.set_next_window_pos(imgui.ImVec2(0, 0))
+    else:
+        imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
     imgui.begin(f"prompt {type(prompt).__name__}", None, _FLAGS)
     # A field that is typed in takes Esc for itself; one Esc is to close all of it.
