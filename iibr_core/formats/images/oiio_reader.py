@@ -4,6 +4,7 @@ whole or an error.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -134,7 +135,7 @@ class PictureRows:
             rows = source.read_scanlines(top, bottom, spec.z, *channels)
         message = complaint_of(source)
         if rows is None or (message and HARMLESS_MESSAGE not in message):
-            reason = reason_of(message)
+            reason = _reason(message, self._path)
             raise InputError(f"{self._path}: damaged or cut off ({reason}); get the whole file again")
         return np.asarray(rows).reshape(last - first, self.size.width, self._channel_count)
 
@@ -170,7 +171,7 @@ def _open(path: Path) -> Any:
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(oiio_name(path), hints)
     if source is None:
-        raise InputError(f"{path}: cannot be read as a picture ({reason_of(complaint_of(oiio))})")
+        raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint_of(oiio), path)})")
     spec = source.spec()
     if spec.width * spec.height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {spec.width}x{spec.height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
@@ -222,6 +223,11 @@ def text_attribute(spec: Any, name: str) -> str:
         return str(spec.get_string_attribute(name))
     except UnicodeDecodeError:
         return ""
+
+
+def _reason(complaint: str, path: Path) -> str:
+    """What of a complaint is to be told: some of its writers repeat the file's name."""
+    return reason_of(re.sub(rf' \("?{re.escape(str(path))}"?\)', "", complaint))
 
 
 def complaint_of(teller: Any) -> str:

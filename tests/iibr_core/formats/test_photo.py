@@ -301,15 +301,16 @@ def test_missing_folder_empty_or_no_picture(tmp_path):
         assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.95])
 @pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.tif", "a.exr", "a.webp"])
 def test_truncated_files(tmp_path, name, share, capfd):
     pixels = RNG.integers(0, 256, (64, 64, 3), dtype=np.uint8)
     path = save(tmp_path / name, pixels)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(len(whole) * share)])
-    with pytest.raises(InputError, match=rf"{name}: (damaged|cannot be read)"):
+    with pytest.raises(InputError, match=rf"{name}: (damaged|cannot be read)") as caught:
         read_photo(path)
+    assert str(caught.value).count(name) == 1
     assert capfd.readouterr().err == ""
 
 
