@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from iibr_core.types import ViewOffset
@@ -68,9 +69,9 @@ def _escape_actions(state: AppState) -> list[Action]:
     return [SetFullscreen(False)] if state.is_fullscreen else []
 
 
-def read_keys(used_space: bool = False) -> Keys:
+def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys:
     """The keys of this ImGui frame; none while a text field has them. used_space: the mouse was dragged with Space
-    held: no more comes of it. That is known only when Space is let go.
+    held: no more comes of it. That is known only when Space is let go. struck: what was held, see `Window`.
     """
     from imgui_bundle import imgui
 
@@ -81,8 +82,10 @@ def read_keys(used_space: bool = False) -> Keys:
     def pressed(key: imgui.Key) -> bool:
         return imgui.is_key_pressed(key)
 
+    held_now = bool(io.key_ctrl or io.key_super), bool(io.key_shift)
+
     def is_struck(chord: Chord) -> bool:
-        holds = bool(io.key_ctrl or io.key_super) == chord.ctrl and bool(io.key_shift) == chord.shift
+        holds = struck.get(chord.key.lstrip("_"), held_now) == (chord.ctrl, chord.shift)
         if chord.key == "space":
             return holds and imgui.is_key_released(imgui.Key.space) and not used_space
         return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key))

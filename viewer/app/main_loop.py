@@ -306,7 +306,7 @@ class App:
         pick = partial(self.scene_view.pick, self.state.optics.eye)
         actions = actions_from_pointer(pointer, layout, self.state, pick)
         actions += actions_from_hover(pointer, layout, self.state, pick)
-        actions += actions_from_keys(read_keys(pointer.used_space), self.state)
+        actions += actions_from_keys(read_keys(pointer.used_space, self.window.struck), self.state)
         actions += gesture_end(pointer)
         return [*actions, Quit()] if self.window.take_closing() else actions
 

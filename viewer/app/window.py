@@ -28,7 +28,8 @@ def wake() -> None:
 class Window:
     """A window with an OpenGL 3.3 core context.
 
-    handle: GLFW's window. damages: how often the system asked for a redraw.
+    handle: GLFW's window. damages: how often the system asked for a redraw. struck: by what is written on a key, what
+    was held down when it was pressed last: (Ctrl or Super, Shift).
     """
 
     def __init__(self, title: str, place: tuple[int, int, int, int] | None = None, is_maximized: bool = False) -> None:
@@ -48,6 +49,8 @@ class Window:
         self.damages = 0
         self._place_before = (0, 0, *WINDOW_SIZE)
         self._dropped: list[str] = []
+        self.struck: dict[str, tuple[bool, bool]] = {}
+        glfw.set_key_callback(self.handle, self._on_key)  # ImGui's own calls it
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
         glfw.make_context_current(self.handle)
@@ -132,6 +135,13 @@ class Window:
     def on_drop(self, _: Any, paths: Any) -> None:
         """GLFW calls this when files are dropped."""
         self._dropped.extend(paths)
+
+    def _on_key(self, _: Any, key: int, scancode: int, action: int, modifiers: int) -> None:
+        """GLFW calls this in the order of events; ImGui tells but what is held at a frame's end."""
+        name = glfw.get_key_name(key, scancode) if action == glfw.PRESS else None
+        if name:
+            is_ctrl, is_shift = modifiers & (glfw.MOD_CONTROL | glfw.MOD_SUPER), modifiers & glfw.MOD_SHIFT
+            self.struck[name.lower()] = bool(is_ctrl), bool(is_shift)
 
     @property
     def pointer(self) -> tuple[float, float]:

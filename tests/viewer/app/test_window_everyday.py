@@ -17,6 +17,7 @@ from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
 from viewer.model.saved_settings import ATTRIBUTE, read_settings
 from viewer.model.state.app_state import AppState
+from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.optics import MoveEye, Optics, SetAperture
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
 from viewer.model.state.scene import Source
@@ -177,6 +178,22 @@ def test_a_prompt_comes_up_at_once_not_at_the_next_move(viewer: Driver) -> None:
     while viewer.app.wait_s == 0:
         viewer.app.step()
     assert viewer.app.frames_shown > shown
+
+
+def test_ctrl_counts_where_it_was_held_when_the_key_was_pressed(viewer: Driver) -> None:
+    """However much happens within a frame."""
+    viewer.send("keydown", "ctrl")
+    viewer.until(lambda app: imgui.get_io().key_ctrl)
+    viewer.send("keydown", "e", "keyup", "ctrl", "keyup", "e")
+    viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
+    assert not viewer.app.state.inspection.shows_epis
+    viewer.app.do(ShowPrompt(None))
+    viewer.until_idle()
+    viewer.send("keydown", "ctrl")
+    viewer.until(lambda app: imgui.get_io().key_ctrl)
+    viewer.send("keyup", "ctrl", "keydown", "e", "keyup", "e")
+    viewer.until(lambda app: app.state.inspection.shows_epis)
+    assert viewer.app.state.prompt is None
 
 
 def test_the_palette_runs_what_was_typed(viewer: Driver) -> None:
