@@ -95,14 +95,15 @@ def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys
 
     def strikes(command: Command) -> int:
         """Of its keys in this frame: a long frame holds several of those that are held."""
-        struck = [chord for chord in command.chords if is_struck(chord)]
-        if not struck or not command.is_held:
-            return len(struck[:1])
-        key = getattr(imgui.Key, struck[0].key)
+        chords = [chord for chord in command.chords if is_struck(chord)]
+        if not chords or not command.is_held:
+            return len(chords[:1])
+        key = getattr(imgui.Key, chords[0].key)
         return imgui.get_key_pressed_amount(key, io.key_repeat_delay, io.key_repeat_rate)
 
     commands = tuple(command.name for command in COMMANDS for _ in range(strikes(command)))
-    # A drop-down that is open takes Esc for itself.
-    is_menu_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
-    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False)) and not is_menu_open
+    is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False))
+    if is_escape and imgui.is_popup_open("", imgui.PopupFlags_.any_popup):  # a drop-down, and nothing under it
+        imgui.internal.close_popup_to_level(0, True)
+        is_escape = False
     return Keys(ViewOffset(float(down), float(right)), is_escape, commands)

@@ -15,6 +15,7 @@ from tests.viewer.conftest import SMALL_WINDOW, Driver
 from viewer.app.window_slot import STEP
 from viewer.model.actions import AskToSave, Notify, OpenPath, ShowPrompt, StopWork
 from viewer.model.commands import COMMANDS
+from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 from viewer.model.state.scene import Source
@@ -62,6 +63,23 @@ def test_up_stays_at_the_first_command_and_typing_begins_there_again(viewer: Dri
     viewer.send("key", "Up")
     viewer.until_idle()
     assert viewer.app.state.prompt == PalettePrompt("text", 0)
+
+
+def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer: Driver) -> None:
+    viewer.app.do(AskToExport())
+    viewer.until_idle()
+    viewer.press("##kind", "prompt ExportPrompt")
+    viewer.until(lambda app: is_menu_open())
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: not is_menu_open())
+    viewer.until_idle()
+    assert isinstance(viewer.app.state.prompt, ExportPrompt)
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.prompt is None)
+
+
+def is_menu_open() -> bool:
+    return bool(imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
 
 
 def test_tab_goes_on_from_the_name_to_the_width(viewer: Driver, tmp_path: Path) -> None:
