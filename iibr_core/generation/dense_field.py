@@ -8,15 +8,17 @@ much of a ray theirs cover. What none of them shows is inpainted once, and joins
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
+from iibr_core.generation.light_field import nearest_first
 from iibr_core.generation.memory_model import MOST_COMPLETING
 from iibr_core.generation.stored_views import encode_for_storage
 from iibr_core.inpainting.background import fill_background
@@ -89,8 +91,10 @@ def densify(
     dense: GridShape,
     should_stop: ShouldStop = never,
     inpainter: Inpainter = fill_background,
+    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
 ) -> Generator[ViewUpdate, None, None]:
-    """Every view of the dense grid once: those given as they are, then those between them.
+    """Every view of the dense grid once: the centre, those given as they are, then those between them, the nearest to
+    `nearest_to()` first.
 
     given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Once should_stop is
     true it ends. Raises InputError as `require_steps` does, ValueError where views differ in size or are missing.
@@ -100,7 +104,7 @@ def densify(
     if places != set(np.ndindex(*sparse)) or len({view.disparity.shape for view in given}) != 1:
         raise ValueError(f"{len(given)} views do not fill a grid of {sparse} or differ in size")
     with suppress(Cancelled):
-        yield from _generate_views(given, steps, sparse, dense, should_stop, inpainter)
+        yield from _generate_views(given, steps, sparse, dense, should_stop, inpainter, nearest_to)
 
 
 def _generate_views(
@@ -110,15 +114,12 @@ def _generate_views(
     dense: GridShape,
     should_stop: ShouldStop,
     inpainter: Inpainter,
+    nearest_to: Callable[[], ViewOffset],
 ) -> Iterator[ViewUpdate]:
     is_hdr = given[0].colors.dtype != np.uint8
-    for view in given:
-        shown = np.zeros(view.disparity.shape, np.bool_)
-        yield ViewUpdate(view.row * steps, view.column * steps, view.colors, view.disparity / np.float32(steps), shown)
-    places = {(view.row * steps, view.column * steps) for view in given}
+    places = {(view.row * steps, view.column * steps): view for view in given}
     remaining = [dense.offset(*at) for at in np.ndindex(*dense) if at not in places]
-    if not remaining:
-        return
+    completing = [offset for offset in _completing_views(sparse, dense, steps) if offset in remaining]
     with ViewSynthesis(should_stop) as synthesis:
         views = _ViewsBetween(synthesis, given, steps, dense, should_stop, inpainter)
 
@@ -126,10 +127,17 @@ def _generate_views(
             (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, should_stop, 1)
             return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
 
-        for offset in _completing_views(sparse, dense, steps):
-            remaining.remove(offset)
+        if dense.centre not in places:
+            yield update(completing[0], views.complete(completing[0]))
+        for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
+            shown = np.zeros(view.disparity.shape, np.bool_)
+            yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), shown)
+        for offset in completing[dense.centre not in places :]:
             yield update(offset, views.complete(offset))
-        yield from synthesis.side_by_side(lambda offset: update(offset, views.make(offset)), remaining)
+        remaining = [offset for offset in remaining if offset not in completing]
+        yield from synthesis.side_by_side(
+            lambda offset: update(offset, views.make(offset)), nearest_first(remaining, nearest_to)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,13 +230,14 @@ class _ViewsBetween:
 
 def _completing_views(sparse: GridShape, dense: GridShape, steps: int) -> list[ViewOffset]:
     """In the midst of given views, so as far from them as a view can be: those of the corners of the grid and of its
-    middle. Together they see nearly all that none of the given views does.
+    middle. Together they see nearly all that none of the given views does. The centre comes first, given or not.
     """
     rows, columns = (
-        sorted({first * steps + (steps // 2 if views > 1 else 0) for first in (0, (views - 1) // 2, max(views - 2, 0))})
+        {first * steps + ((steps + 1) // 2 if views > 1 else 0) for first in (0, (views - 1) // 2, max(views - 2, 0))}
         for views in sparse
     )
-    return [dense.offset(*at) for at in product(rows, columns)]
+    places = sorted({*product(rows, columns), dense.centre})
+    return sorted((dense.offset(*at) for at in places), key=lambda offset: hypot(*offset))
 
 
 def _between(origin: ViewOffset, offset: ViewOffset) -> ViewOffset:

@@ -109,14 +109,14 @@ def _generate_views(
         def start(offset: ViewOffset) -> Draft:
             return views.draft(offset) if room > 0 else Draft(views.make(offset), [])
 
-        for draft in synthesis.side_by_side(start, _nearest_first(inner, nearest_to)):
+        for draft in synthesis.side_by_side(start, nearest_first(inner, nearest_to)):
             if draft.undecided:
                 room -= draft.nbytes
                 v, u = draft.update.row, draft.update.column
                 unfinished[grid.offset(v, u)] = partial(views.finish, draft)
             yield draft.update
         yield from synthesis.side_by_side(
-            lambda offset: unfinished.pop(offset)(), _nearest_first(list(unfinished), nearest_to)
+            lambda offset: unfinished.pop(offset)(), nearest_first(list(unfinished), nearest_to)
         )
 
 
@@ -156,7 +156,7 @@ def transformer_for(quality: Quality) -> Callable[[AmbiguousRays], FloatImage] |
         raise InputError(f"{error}; use --quality fast, or train them anew with `iibr train`") from error
 
 
-def _nearest_first(remaining: list[ViewOffset], nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewOffset]:
+def nearest_first(remaining: list[ViewOffset], nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewOffset]:
     """Each time the view nearest to where the user looks then; the first of equals. It is taken out of the list."""
     while remaining:
         nearest = min(remaining, key=partial(_square_distance, nearest_to()))

@@ -45,8 +45,8 @@ OWN_SIZE_BYTES, TILE_BYTES = 45, 350 * MIB
 """Of one pixel of a photo that is drawn at its own size; and of a tile of it, whatever its size."""
 USUAL_RAY_IMAGES, USUAL_HOLE_BYTES, USUAL_AMBIGUOUS_SHARE = 10, 20, 0.2
 """What scenes take while their views are made, before anything is known of them."""
-MOST_COMPLETING = 9
-"""Views that complete the rays of several photos: three rows of three at most."""
+MOST_COMPLETING = 10
+"""Views that complete the rays of several photos: three rows of three at most, and the centre."""
 USUAL_GRID = GridShape(5, 5)
 """A photo is made no smaller than that so many of its views fit; more are not worth its details."""
 LEAST_PIXELS = 10_000

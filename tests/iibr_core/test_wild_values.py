@@ -574,7 +574,7 @@ READS_OR_TELLS = {
     "formats.images.thumbnail": "read_thumbnail read_jpeg_thumbnail",
     "formats.light_fields.stanford": "read_stanford StanfordWriter",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
-    "generation.light_field": "transformer_for",
+    "generation.light_field": "transformer_for nearest_first",
     "generation.stored_views": "StoredViews",
     "generation.dense_field": "GivenView require_steps",
     "generation.given_views": "read_given_views",

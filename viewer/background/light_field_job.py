@@ -1,5 +1,5 @@
 """A light field from disk, as it is shown: as read, and once more with disparity where its views bring none, so that
-focusing, wide apertures and viewpoints between the views work as with a photo.
+focusing, wide apertures and viewpoints between the views work as with a photo; or with views made between its own.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from iibr_core.color import encoded_from_stored
 from iibr_core.generation.memory_model import Budget, budget_of, require_field, require_matching
 from iibr_core.runtime.machine import memory_bytes
 from iibr_core.runtime.tiling import ShouldStop
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewUpdate, image_size
+from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset, ViewUpdate, image_size
 from viewer.model.state.scene import Progress, Scene, Source
 
 if TYPE_CHECKING:
@@ -42,8 +42,10 @@ def showings_of_light_field(
     report_progress: Callable[[Progress], None],
     takes_drafts: bool,
     known: FloatImage | None = None,
+    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
 ) -> Iterator[Showing]:
-    """The light field of a folder or file, whatever its layout.
+    """The light field of a folder or file, whatever its layout; on a denser grid than its own where the source asks for
+    one, once, views nearest to `nearest_to()` first.
 
     takes_drafts: views without disparity are shown as read, then with a coarse one, then with the final one; else the
     field is shown once, when all is known. known: disparity of the centre view that was found before. The views of a
@@ -56,7 +58,10 @@ def showings_of_light_field(
     field = open_light_field(Path(source.path))
     grid, (size, views) = grid_of(field), read_views(field)
     budget = budget_of(source.depth.memory_bytes or memory_bytes())
-    require_field(budget, field.name, size, grid)
+    require_field(budget, field.name, size, source.grid or grid)
+    if source.grid is not None and source.grid != grid:
+        yield _filled_between(source, field, budget, should_stop, report_progress, nearest_to)
+        return
     given = known if source.depth.file is None else _read_map(source, size)
     read: list[ViewUpdate] = [next(views)]
     scene = _scene_as_read(source, field, grid, read[0], disparity_range(field))
@@ -69,6 +74,45 @@ def showings_of_light_field(
         report_progress(Progress(doing="reading"))
         read += views
     yield from _with_disparity(_Field(scene, grid, read, budget), given, should_stop, report_progress, takes_drafts)
+
+
+def _filled_between(
+    source: Source,
+    field: MultiView,
+    budget: Budget,
+    should_stop: ShouldStop,
+    report_progress: Callable[[Progress], None],
+    nearest_to: Callable[[], ViewOffset],
+) -> Showing:
+    """The field with views made between its own, from all of them."""
+    from iibr_core.formats.light_fields.views import grid_of
+    from iibr_core.generation.dense_field import densify, require_steps
+    from iibr_core.generation.given_views import read_given_views
+    from iibr_core.inpainting.registry import load_inpainter
+
+    if source.depth.file is not None:
+        raise InputError(
+            f"{source.depth.file}: is the disparity of one view, and views between take that of all: open"
+            f" {field.name} without it"
+        )
+    assert source.grid is not None
+    grid = grid_of(field)
+    steps = require_steps(grid, source.grid, field.name)
+
+    def report(done: float, total: float, doing: str) -> None:
+        report_progress(Progress(doing=f"{doing}, {done / total:.0%}"))
+
+    given = read_given_views(field, budget, should_stop, report)
+    low, high = min(view.disparity.min() for view in given), max(view.disparity.max() for view in given)
+    middle = given[0]
+    centre = ViewUpdate(middle.row, middle.column, middle.colors, middle.disparity / np.float32(steps))
+    scene = replace(
+        _scene_as_read(source, field, grid, centre, (float(low) / steps, float(high) / steps)),
+        grid=source.grid,
+        depth_source="light field" if len(field.disparity) == len(field.views) else FROM_VIEWS,
+        has_view_disparity=True,
+    )
+    return Showing(scene, densify(given, grid, source.grid, should_stop, load_inpainter(source.inpaint), nearest_to))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +197,7 @@ def _scene_as_read(
         notes=field.notes,
         has_view_disparity=len(field.disparity) == len(field.views),
         subject_disparity_px=median_of_middle(centre.disparity) if centre.disparity is not None else 0.0,
+        given_grid=grid,
     )
 
 

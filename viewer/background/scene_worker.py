@@ -146,7 +146,7 @@ def results_of(
     """
     try:
         if is_light_field(Path(request.source.path)):
-            yield from _results_of_light_field(request, should_stop, report_progress)
+            yield from _results_of_light_field(request, should_stop, nearest_to, report_progress)
         else:
             yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
     finally:
@@ -246,10 +246,15 @@ def _centre_view(loaded: LoadedPhoto, plan: ScenePlan) -> ViewUpdate:
 
 
 def _results_of_light_field(
-    request: SceneRequest, should_stop: Callable[[], bool], report_progress: Callable[[Progress], None]
+    request: SceneRequest,
+    should_stop: Callable[[], bool],
+    nearest_to: Callable[[], ViewOffset],
+    report_progress: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     """The light field of a folder or file, once more each time that more is known of it."""
-    for showing in showings_of_light_field(request.source, should_stop, report_progress, request.takes_drafts):
+    for showing in showings_of_light_field(
+        request.source, should_stop, report_progress, request.takes_drafts, nearest_to=nearest_to
+    ):
         scene, centre = showing.scene, next(showing.views)
         yield SceneReady(request.generation, scene, None, centre)
         rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), showing.views))

@@ -15,6 +15,7 @@ from viewer.model.actions import (
     AskToSave,
     DoTask,
     HidePanel,
+    Notify,
     OpenPath,
     PauseMotion,
     Quit,
@@ -32,6 +33,7 @@ from viewer.model.actions import (
     ToggleSection,
     Undo,
 )
+from viewer.model.dense_field import next_denser
 from viewer.model.free_camera import MoveCamera, StepPose
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
@@ -52,6 +54,7 @@ from viewer.model.state.inspection import (
 )
 from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import LOOPS, LoopKind
+from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetGloss
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
@@ -60,6 +63,7 @@ from viewer.model.state.scene import source_beside, source_with_depth, source_wi
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask
 from viewer.model.zoom import SetZoom, Zoom
 
+NOTHING_BETWEEN = "There are no more views to make between: this is for light fields of few views, opened from disk."
 FONT_STEP = 1.1
 CAMERA_STEP = 0.05
 RECENT_SHOWN = 4
@@ -155,6 +159,11 @@ def _own_pixels(state: AppState) -> Action:
     return SetZoom(Zoom(1.0, centre))
 
 
+def _fill_between(state: AppState) -> Action:
+    denser = next_denser(state.scene) if state.scene is not None else None
+    return OpenPath(denser) if denser is not None else Notify(Notice(NOTHING_BETWEEN))
+
+
 def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
     return lambda state: SetBrush(replace(state.brush, tool=tool, is_on=True))
 
@@ -214,6 +223,7 @@ COMMANDS: tuple[Command, ...] = (
         for kind in COMPARISONS
     ),
     Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
+    Command("Fill between views", _fill_between),
     Command("Stop making views", _always(StopWork())),
     Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
     Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),

@@ -120,6 +120,31 @@ def test_unknown_disparity_is_refused():
         flat_view(1, 0, 90, np.nan)
 
 
+@pytest.mark.parametrize(
+    ("sparse", "dense"), [((3, 3), (5, 5)), ((2, 2), (3, 3)), ((2, 2), (4, 4)), ((2, 3), (3, 5)), ((4, 5), (7, 9))]
+)
+def test_the_centre_comes_first_given_or_not_and_every_view_once(sparse, dense):
+    sparse, dense = GridShape(*sparse), GridShape(*dense)
+    # Maps of noise: all views that complete the rays have something to add.
+    grey = np.full((12, 16, 3), 90, np.uint8)
+    given = [GivenView(*at, grey, wild(*at)) for at in np.ndindex(sparse)]
+    places = [(view.row, view.column) for view in densify(given, sparse, dense)]
+    assert places[0] == dense.centre
+    assert sorted(places) == list(np.ndindex(dense))
+
+
+def wild(row, column):
+    return np.random.default_rng([row, column]).uniform(-9, 9, (12, 16)).astype(np.float32)
+
+
+def test_where_the_user_looks_comes_before_the_rest():
+    given = [flat_view(row, column, 90) for row, column in np.ndindex(2, 2)]
+    made = densify(given, GridShape(2, 2), GridShape(7, 7), nearest_to=lambda: ViewOffset(-3.0, 2.0))
+    offsets = [GridShape(7, 7).offset(view.row, view.column) for view in made][5:]
+    away = [np.hypot(offset.t + 3, offset.s - 2) for offset in offsets]
+    assert away == sorted(away)
+
+
 def test_hdr_views_stay_hdr():
     given = [GivenView(0, u, np.full((12, 16, 3), 4.0, np.float16), np.zeros((12, 16), np.float32)) for u in (0, 1)]
     middle = by_index(list(densify(given, GridShape(1, 2), GridShape(1, 3))))[0, 1]
@@ -129,7 +154,10 @@ def test_hdr_views_stay_hdr():
 
 def test_it_ends_when_it_should_stop():
     given = [flat_view(row, column, 90) for row, column in np.ndindex(2, 2)]
-    assert len(list(densify(given, GridShape(2, 2), GridShape(5, 5), should_stop=lambda: True))) == 4
+    taken = []
+    for view in densify(given, GridShape(2, 2), GridShape(5, 5), should_stop=lambda: bool(taken)):
+        taken.append(view)
+    assert len(taken) == 5  # the centre, and those that are there anyway
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,9 @@ from iibr_core.formats.quilts import Quilt, lay_out
 from iibr_core.types import GridShape, ImageSize, ViewOffset, ViewUpdate
 from tests.iibr_core.known_scenes import view_of_wall
 from tests.viewer.conftest import Driver
+from viewer.model.actions import OpenPath
+from viewer.model.commands import COMMANDS
+from viewer.model.dense_field import with_views_between
 
 SIZE = 48, 64
 DISPARITY = 1.0
@@ -82,3 +85,26 @@ def test_a_bad_one_leaves_the_scene_with_a_notice(viewer: Driver, tmp_path: Path
     viewer.app.window.on_drop(None, [str(tmp_path / name)])
     viewer.until(lambda app: any(name in notice.text for notice in app.state.notices))
     assert viewer.app.state.scene == before
+
+
+def test_views_between_those_of_a_file_are_made_shown_and_taken_back(viewer: Driver, tmp_path: Path) -> None:
+    path = write_lenslet_image(tmp_path)
+    viewer.app.window.on_drop(None, [str(path)])
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.source.path == str(path))
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.depth_source != "none")
+    viewer.until_idle()
+    on_disk = viewer.app.state.scene
+    assert on_disk is not None
+    (fill,) = (command for command in COMMANDS if command.name == "Fill between views")
+    viewer.app.do(fill.action(viewer.app.state))
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.grid == (5, 5))
+    viewer.until_idle()
+    denser = viewer.app.state.scene
+    assert denser is not None
+    assert viewer.app.state.views_there == set(np.ndindex(5, 5))
+    assert denser.subject_disparity_px == pytest.approx(DISPARITY / 2, abs=0.05)
+    assert viewer.app.state.zoom is None
+    viewer.app.do(OpenPath(with_views_between(denser, GridShape(3, 3))))
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.grid == (3, 3))
+    viewer.until_idle()
+    assert [notice.text for notice in viewer.app.state.notices if notice.is_error] == []

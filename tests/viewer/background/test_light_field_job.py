@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import GridShape, InputError
 from viewer.background.light_field_job import FINDING, FROM_VIEWS
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.model.state.optics import CENTRE
@@ -107,3 +109,46 @@ def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
     results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda progress: said.append(progress.doing))
     with pytest.raises(Cancelled):
         list(results)
+
+
+def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), grid=GridShape(9, 9)))
+    said: list[str] = []
+    results = results_of(request, lambda: False, lambda: CENTRE, lambda progress: said.append(progress.doing))
+    ((ready, views),) = showings(results)
+    assert (ready.scene.grid, ready.scene.given_grid, ready.scene.depth_source) == ((9, 9), (5, 5), FROM_VIEWS)
+    assert ready.scene.disparity_range_px == pytest.approx((WALL_PX / 2, SQUARE_PX / 2), abs=0.15)
+    assert (ready.centre.row, ready.centre.column) == (4, 4)
+    assert {(view.view.row, view.view.column) for view in views} == set(np.ndindex(9, 9))
+    assert {view.view.is_final for view in views} == {True}
+    assert any(doing.startswith("finding disparity, ") for doing in said)
+    between = next(view.view for view in views if (view.view.row, view.view.column) == (3, 5))
+    assert between.disparity is not None
+    assert between.disparity[48, 48] == pytest.approx(SQUARE_PX / 2, abs=0.05)
+
+
+def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: Path) -> None:
+    said: list[str] = []
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), grid=GridShape(9, 9)))
+    results = results_of(
+        request, lambda: any(FINDING in doing for doing in said), lambda: CENTRE, lambda now: said.append(now.doing)
+    )
+    with pytest.raises(Cancelled):
+        list(results)
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (Source("", grid=GridShape(8, 8)), "give 9x9, 13x13, 17x17"),
+        (Source("", DepthChoice(file="centre.npy"), grid=GridShape(9, 9)), "the disparity of one view"),
+        (Source("", DepthChoice(memory_bytes=1 << 28), grid=GridShape(1025, 1025)), "1025 x 1025 views"),
+    ],
+)
+def test_views_between_that_cannot_be_made_are_told_in_a_line(tmp_path: Path, source: Source, message: str) -> None:
+    np.save(tmp_path / "centre.npy", np.zeros((96, 96), np.float32))
+    file = str(tmp_path / "centre.npy") if source.depth.file else None
+    depth = replace(source.depth, file=file)
+    source = replace(source, path=str(write_two_planes(tmp_path / "field")), depth=depth)
+    with pytest.raises(InputError, match=message):
+        list(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))

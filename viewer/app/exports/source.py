@@ -113,12 +113,12 @@ class ExportSource:
         return self.scene.infinity_px + (before.disparity_zero - after.disparity_zero) * after.disparity_scale
 
     def _views_of_folder(self) -> Iterator[ViewUpdate]:
-        """As read; with disparity that was found where the scene has such."""
+        """As read; with disparity that was found, and with views between them, where the scene has such."""
         from iibr_core.formats.light_fields.registry import open_light_field
         from iibr_core.formats.light_fields.views import read_views
         from viewer.background.light_field_job import showings_of_light_field
 
-        if self.scene.depth_source in ("none", "light field"):
+        if self.scene.grid == self.scene.given_grid and self.scene.depth_source in ("none", "light field"):
             return read_views(open_light_field(Path(self.scene.source.path)))[1]
         known = self._found_centre.disparity if self._found_centre is not None else None
         showings = showings_of_light_field(

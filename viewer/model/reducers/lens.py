@@ -33,7 +33,7 @@ from viewer.model.state.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.state.scene import Scene
+from viewer.model.state.scene import Scene, Source
 
 POINT_SPACING = 1 / 6
 """Of the radius: a stroke of the gloss brush is remembered by places this far apart."""
@@ -140,15 +140,16 @@ def _move_handle(state: AppState, scene: Scene, action: MoveTiltHandle) -> AppSt
 
 def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
     """The optics that show a newly planned scene as it was seen before; a scene not seen before starts afresh."""
-    if old is None or old.source is not new.source:
+    if old is None or not is_same_scene(old.source, new.source, new.given_grid is not None):
         return Optics()
-    if old.plan is None or new.plan is None:
-        return optics if old.grid == new.grid else Optics()  # a light field, of which more is known by now
     eye = ViewOffset(*(x * _steps(b) / _steps(a) for x, a, b in zip(optics.eye, old.grid, new.grid)))
     columns = _steps(new.grid.columns) / _steps(old.grid.columns)
-    ratio = new.plan.disparity_scale / old.plan.disparity_scale if old.plan.disparity_scale else 0.0
-    # (given - zero) * scale, for the given disparity that was in focus
-    shift = (old.plan.disparity_zero - new.plan.disparity_zero) * new.plan.disparity_scale
+    if old.plan is None or new.plan is None:
+        ratio, shift = 1 / columns, 0.0  # a light field: the same rays in other steps
+    else:
+        ratio = new.plan.disparity_scale / old.plan.disparity_scale if old.plan.disparity_scale else 0.0
+        # (given - zero) * scale, for the given disparity that was in focus
+        shift = (old.plan.disparity_zero - new.plan.disparity_zero) * new.plan.disparity_scale
     aperture = min(optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0]), aperture_limit(new.grid))
     return replace(
         optics,
@@ -159,6 +160,11 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
         focus_tilt=(optics.focus_tilt[0] * ratio, optics.focus_tilt[1] * ratio),
         aperture_diameter=aperture,
     )
+
+
+def is_same_scene(old: Source, new: Source, is_light_field: bool) -> bool:
+    """Whether what is opened was open before: a file opened again is new, other views of a light field are not."""
+    return old is new or (is_light_field and old.grid != new.grid and replace(old, grid=new.grid) == new)
 
 
 def _steps(views: int) -> int:

@@ -64,8 +64,9 @@ class Scene:
     file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
     view step as given. depth_models: names of those on this machine. inverse_metres: (slope, offset) of 1 / distance
     over the disparity as given, None where distances are not known in metres. color_space: of its views. own_size: of
-    the photo in its file, which a view may be smaller than; None for light fields. infinity_px: a photo's field
-    disparity of what is infinitely far, as far as it is known. is_sketch: it is shown in small while it is read.
+    the photo in its file, which a view may be smaller than; None for light fields. given_grid: of the views that are in
+    a light field's files; None for photos. infinity_px: a photo's field disparity of what is infinitely far, as far as
+    it is known. is_sketch: it is shown in small while it is read.
     """
 
     source: Source
@@ -90,6 +91,7 @@ class Scene:
     own_size: ScreenSize | None = None
     is_sketch: bool = False
     infinity_px: float = 0.0
+    given_grid: GridShape | None = None
 
     @property
     def size(self) -> ScreenSize:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from iibr_core.inpainting.registry import INPAINTERS
-from viewer.model.actions import Action, SetInpainter
+from iibr_core.types import GridShape
+from viewer.model.actions import Action, OpenPath, SetInpainter
+from viewer.model.dense_field import denser_grids, with_views_between
 from viewer.model.layout import Layout
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.scene import Scene
@@ -17,16 +19,24 @@ HOLES_TIP = (
 )
 
 
+BETWEEN_TIP = (
+    "Makes views between those on disk, of all that these see. First their disparity is found, where the files have"
+    " none: that takes longest. Exports take them along."
+)
+
+
 def scene_section(scene: Scene, facts: FactsRead, layout: Layout) -> list[Action]:
-    """Build the section; all that can be changed in it is what fills holes."""
+    """Build the section; what can be changed in it: a photo's ways to fill holes, views between a light field's."""
     gap(layout, 2)
     of_file = facts.facts if facts.path == scene.source.path else ()
     for what, value in (*of_file, *_sizes(scene), ("Depth", scene.depth_source)):
         label(what, layout)
         quiet(value)
     gap(layout, 2)
-    for reason in scene.plan.reasons if scene.plan else ("A light field from disk: its views are shown as they are.",):
+    for reason in scene.plan.reasons if scene.plan else (_of_light_field(scene),):
         quiet(reason)
+    if scene.given_grid is not None and denser_grids(scene.given_grid):
+        return _views_between(scene, scene.given_grid, layout)
     return _holes(scene, layout) if scene.plan is not None and scene.plan.has_disocclusion else []
 
 
@@ -42,6 +52,30 @@ def _holes(scene: Scene, layout: Layout) -> list[Action]:
         imgui.end_combo()
     tooltip(HOLES_TIP, layout)
     return actions
+
+
+def _views_between(scene: Scene, given: GridShape, layout: Layout) -> list[Action]:
+    """The views on disk alone, or one of the denser grids."""
+    actions: list[Action] = []
+    label("Views", layout, BETWEEN_TIP)
+    if imgui.begin_combo("##views", _grid_words(scene.grid, given)):
+        for grid in (given, *denser_grids(given)):
+            if imgui.selectable(_grid_words(grid, given), grid == scene.grid)[0] and grid != scene.grid:
+                actions.append(OpenPath(with_views_between(scene, grid)))
+        imgui.end_combo()
+    tooltip(BETWEEN_TIP, layout)
+    return actions
+
+
+def _grid_words(grid: GridShape, given: GridShape) -> str:
+    return f"{grid.columns} x {grid.rows}{', as on disk' if grid == given else ''}"
+
+
+def _of_light_field(scene: Scene) -> str:
+    given = scene.given_grid
+    if given is None or given == scene.grid:
+        return "A light field from disk: its views are shown as they are."
+    return f"A light field of {given.columns} x {given.rows} views from disk; those between are made of all of them."
 
 
 def _sizes(scene: Scene) -> tuple[tuple[str, str], ...]:

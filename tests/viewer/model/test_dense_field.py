@@ -1,0 +1,61 @@
+"""Views between those of a light field, as the window asks for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from iibr_core.generation.dense_field import require_steps
+from iibr_core.types import GridShape, ViewOffset
+from viewer.model.commands import COMMANDS
+from viewer.model.dense_field import MOST_ACROSS, denser_grids, next_denser, with_views_between
+from viewer.model.reducers.lens import carry_optics
+from viewer.model.state.app_state import AppState
+from viewer.model.state.optics import Optics
+from viewer.model.state.scene import Scene, Source
+
+GIVEN, DENSE = GridShape(3, 3), GridShape(5, 5)
+FIELD = Scene(Source("field"), "field", 60, 40, GIVEN, (-2.0, 3.0), "light field", given_grid=GIVEN)
+
+
+@pytest.mark.parametrize("given", [GridShape(3, 3), GridShape(2, 2), GridShape(1, 2), GridShape(9, 5)])
+def test_all_grids_that_are_offered_have_places_for_the_given_views(given: GridShape) -> None:
+    assert denser_grids(given)
+    for grid in denser_grids(given):
+        assert require_steps(given, grid) > 1
+        assert max(grid) <= MOST_ACROSS
+
+
+def test_nothing_lies_between_one_view_or_very_many() -> None:
+    assert denser_grids(GridShape(1, 1)) == denser_grids(GridShape(17, 32)) == ()
+
+
+def test_each_time_the_next_denser_grid_is_made_of_the_views_on_disk() -> None:
+    first = next_denser(FIELD)
+    assert first == Source("field", grid=DENSE)
+    denser = replace(FIELD, grid=DENSE, source=first)
+    assert next_denser(denser) == Source("field", grid=GridShape(9, 9))
+    assert with_views_between(denser, GIVEN) == FIELD.source
+    assert next_denser(replace(FIELD, grid=GridShape(17, 17))) is None
+
+
+def test_the_command_tells_where_nothing_lies_between() -> None:
+    (command,) = (command for command in COMMANDS if command.name == "Fill between views")
+    photo = replace(FIELD, given_grid=None)
+    for scene in (photo, None):
+        told = command.action(AppState(scene=scene))
+        assert "no more views" in told.notice.text  # type: ignore[union-attr]
+    opened = command.action(AppState(scene=FIELD))
+    assert opened.source == next_denser(FIELD)  # type: ignore[union-attr]
+
+
+def test_the_picture_stays_when_views_between_are_there() -> None:
+    """In steps of half the length, all that is counted in steps is twice as much, and disparity half."""
+    seen = Optics(eye=ViewOffset(0.5, -1.0), focus_disparity=1.0, focus_range=0.4, aperture_diameter=1.5, dolly=0.1)
+    denser = replace(FIELD, grid=DENSE, source=with_views_between(FIELD, DENSE))
+    carried = carry_optics(seen, FIELD, denser)
+    assert carried.eye == ViewOffset(1.0, -2.0)
+    assert (carried.focus_disparity, carried.focus_range, carried.aperture_diameter) == (0.5, 0.2, 3.0)
+    assert carry_optics(carried, denser, FIELD) == seen
+    assert carry_optics(seen, FIELD, replace(FIELD, source=Source("field"))) == Optics()  # the same file opened again

@@ -1,0 +1,29 @@
+"""Views between those of a light field from disk: which grids there are to choose from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from iibr_core.types import GridShape
+from viewer.model.state.scene import Scene, Source
+
+HALVINGS = 3
+MOST_ACROSS = 33
+"""More views beside each other gain nothing to look at."""
+
+
+def denser_grids(given: GridShape) -> tuple[GridShape, ...]:
+    """Grids that have the given views among theirs, each with half the steps of the one before."""
+    denser = (GridShape(*(1 + (views - 1) * 2**times for views in given)) for times in range(1, HALVINGS + 1))
+    return tuple(grid for grid in denser if max(given) > 1 and max(grid) <= MOST_ACROSS)
+
+
+def with_views_between(scene: Scene, grid: GridShape) -> Source:
+    """The light field that is open, to be opened with this grid."""
+    return replace(scene.source, grid=None if grid == scene.given_grid else grid)
+
+
+def next_denser(scene: Scene) -> Source | None:
+    """The same with the next denser grid, None where there is none, or the scene is a photo's."""
+    grids = denser_grids(scene.given_grid) if scene.given_grid is not None else ()
+    return next((with_views_between(scene, grid) for grid in grids if max(grid) > max(scene.grid)), None)
