@@ -1,10 +1,11 @@
 """What each part of making views is worth: one switch at a time against the default, error beside processor time.
 
-    python -m benchmarks.tables.ablations --data DATA [--weights FOLDER] [--scenes 3] [--out docs/tables/ablations.md]
+    python -m benchmarks.tables.ablations --data DATA [--weights FOLDER] [--scenes 3] [--out FILE.md]
 
 Scenes are drawn like those that training learns from, by seeds of their own, with exact maps and with spoilt ones; and
-those of DATA (folders as `iibr evaluate` takes them) that have true maps. FOLDER: ray transformers that lack one thing
-each; those that it does not hold yet are trained first, see `benchmarks.tables.trained_variants`.
+those of DATA (folders as `iibr evaluate` takes them) that have true maps. With FOLDER ray transformers that lack one
+thing each are compared instead, for docs/tables/trained.md; those that it does not hold yet are trained first, see
+`benchmarks.tables.trained_variants`.
 """
 
 from __future__ import annotations
@@ -52,6 +53,12 @@ JUDGED = tuple(
     for s in (-1, 1)
 )
 """Views of drawn scenes: the corners of the grid, and four that no ray was added from."""
+TRAINED_REPORT = FOLDER / "trained.md"
+ABOUT_ROWS = (
+    "First row: PSNR in dB, whole views / what the given view does not see (by a plain warp of the exact map). Others:"
+    " what the switch changes; more is better. Default: balanced, refined; its numbers in brackets. Drawn scenes: seeds"
+    f" from {FIRST_SEED}, {SIZE} px, {GRID.rows}x{GRID.columns} views, {len(JUDGED)} judged."
+)
 ABOUT_TRAINED = (
     f"Ray transformers, T, were trained by `benchmarks.tables.trained_variants`: {STEPS} steps each, as the shipped"
     " weights, all on the same scenes. *Trained again* lacks nothing: what a row differs from that one by less than it"
@@ -139,42 +146,58 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--weights", type=Path)
     parser.add_argument("--scenes", type=int, default=3)
-    parser.add_argument("--out", type=Path, default=FOLDER / "ablations.md")
+    parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    switches = list(SWITCHES)
-    if options.weights:
-        train_missing(options.weights, STEPS)
-        switches += [trained_switch(trained, options.weights) for trained in TRAINED_VARIANTS]
     exact = [_drawn(seed) for seed in range(FIRST_SEED, FIRST_SEED + options.scenes)]
     spoilt = [replace(scene, disparity=_spoil(scene.disparity, seed)) for seed, scene in enumerate(exact)]
-    known = list(_read(options.data))
     sets = {
         f"{len(exact)} drawn, exact maps": list(zip(exact, exact)),
         f"{len(exact)} drawn, spoilt maps": list(zip(spoilt, exact)),
-        **{scene.name: [(scene, scene)] for scene in known},
+        **{scene.name: [(scene, scene)] for scene in _read(options.data)},
     }
-    found = {switch.name: {name: _mean_figures(switch, scenes) for name, scenes in sets.items()} for switch in switches}
+    if options.weights:
+        train_missing(options.weights, STEPS)
+        switches = [DEFAULT, *(trained_switch(trained, options.weights) for trained in TRAINED_VARIANTS)]
+        found = _measure_all(switches, sets)
+        parts = [ABOUT_ROWS, markdown(("switch", *sets), table_rows(found)), unimportant_sentence(found), ABOUT_TRAINED]
+        write_report(
+            "ablations", "What each part of the ray transformer is worth", parts, options.out or TRAINED_REPORT
+        )
+        return
+    found = _measure_all(SWITCHES, sets)
+    time = (
+        "Time: processor time of the whole field of the first drawn scene, its map spoilt, against the default's,"
+        f" median of {ROUNDS} rounds."
+    )
+    rows = table_rows(found, time_ratios(spoilt[0], SWITCHES))
     parts = [
-        "First row: PSNR in dB, whole views / what the given view does not see (by a plain warp of the exact map)."
-        " Others: what the switch changes; more is better. Time: processor time of the whole field of the first drawn"
-        f" scene, its map spoilt, against the default's, median of {ROUNDS} rounds. Default: balanced, refined; its"
-        f" numbers in brackets. Drawn scenes: seeds from {FIRST_SEED}, {SIZE} px, {GRID.rows}x{GRID.columns} views,"
-        f" {len(JUDGED)} judged.",
-        markdown(("switch", *sets, "time"), table_rows(found, time_ratios(spoilt[0], switches))),
+        f"{ABOUT_ROWS} {time}",
+        markdown(("switch", *sets, "time"), rows),
         unimportant_sentence(found),
         _agreement_sentence(exact),
-        *([ABOUT_TRAINED] if options.weights else []),
+        f"What needs training stands in [{TRAINED_REPORT.name}]({TRAINED_REPORT.name}).",
     ]
     write_report("ablations", "What each part is worth", parts, options.out)
 
 
-def table_rows(found: Mapping[str, Mapping[str, Figures]], ratios: Mapping[str, float]) -> Iterator[tuple[str, ...]]:
-    """The default's decibels, which is the first; gains over it."""
+def _measure_all(switches: Sequence[Switch], sets: Mapping[str, Sequence[Judged]]) -> dict[str, dict[str, Figures]]:
+    return {switch.name: {name: _mean_figures(switch, scenes) for name, scenes in sets.items()} for switch in switches}
+
+
+def table_rows(
+    found: Mapping[str, Mapping[str, Figures]], ratios: Mapping[str, float] | None = None
+) -> Iterator[tuple[str, ...]]:
+    """The default's decibels, which is the first; gains over it. ratios: of time, by switch, for a last column."""
     (first, default), *others = found.items()
-    yield first, *(f"{own.full_db:.2f} / {_word(own.hole_db, '.2f')}" for own in default.values()), "1.00"
+    yield (
+        first,
+        *(f"{own.full_db:.2f} / {_word(own.hole_db, '.2f')}" for own in default.values()),
+        *([] if ratios is None else ["1.00"]),
+    )
     for name, of_sets in others:
         gains = [_gains(of_sets[of], default[of]) for of in default]
-        yield name, *(f"{full:+.2f} / {_word(hole, '+.2f')}" for full, hole in gains), f"{ratios[name]:.2f}"
+        cells = (f"{full:+.2f} / {_word(hole, '+.2f')}" for full, hole in gains)
+        yield name, *cells, *([] if ratios is None else [f"{ratios[name]:.2f}"])
 
 
 def unimportant_sentence(found: Mapping[str, Mapping[str, Figures]]) -> str:

@@ -115,7 +115,6 @@ TRAINED_VARIANTS = (
     TrainedVariant("T without EPI loss", lambdas=replace(LAMBDAS, epi=0.0)),
     TrainedVariant("T without inpainted rays", RayChoice(inpainted=False)),
     TrainedVariant("T of 3 hypotheses (6)", RayChoice(hypotheses=3)),
-    TrainedVariant("T of 9 hypotheses (6)", RayChoice(hypotheses=9)),
 )
 
 
