@@ -19,6 +19,7 @@ from benchmarks.speed.processes import JUDGED_SCENES, VIEW_JUDGE, output_lines
 from iibr_core.formats.outputs import atomic_write
 
 SOFT_MAPS = ("antinous-blur1", "antinous-blur2", "antinous-blur4", "antinous-half")
+AGAINST_WARP = "demo,antinous,teddy,moebius,motorcycle"
 TITLE = """# Figures of the README
 
 What the programs named here printed, on two cores of a shared machine, without a GPU.
@@ -29,7 +30,7 @@ IIBR = str(Path(sys.executable).parent / "iibr")
 def measurements(data: str, yardsticks: str | None) -> dict[str, list[str]]:
     """What to call Python with, by the heading of its section."""
     programs = {
-        "against-warp": ["-m", "benchmarks.against_warp", "--data", data],
+        "against-warp": ["-m", "benchmarks.against_warp", "--data", data, "--scenes", AGAINST_WARP, "--repeats", "2"],
         "first-picture": ["-m", "benchmarks.full_size", "12", "24", "48", "--save", "12"],
         "window": ["-m", "benchmarks.window"],
         "cancelled": ["-m", "benchmarks.cancel", "--times", "10"],

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from iibr_core.types import FloatImage, ViewOffset
 
 HYPOTHESES = 6
-"""K: the paper's 5 surfaces and the plain look-up. More take time and gain little (docs/transformer.md)."""
+"""K: the paper's 5 surfaces and the plain look-up. More take time and gain little (docs/tables)."""
 PLAIN = 128
 """Added to the source of the hypothesis that the ray shows the front-most surface as the photo mixed it at its edge."""
 REACH_PX = 6
