@@ -144,17 +144,17 @@ def _follow_lines(height, width, frame, means, lines, top, left, first, last, gr
             level = _level(step)
             k = min(int(level), len(means) - 2)
             part = np.float32(level - k)
-            total = red = green = blue = np.float32(0.0)
+            total = red = green = blue = 0.0
             for j in range(-PLACES, PLACES + 1):
                 n = nearest_pixel(place + j * step) % len(frame)
                 down, across = row - top - frame[n] // width, column - left - frame[n] % width
-                weight = np.float32(line_weight(lines[n, 0], lines[n, 1], down, across) * away / hypot(down, across))
+                weight = line_weight(lines[n, 0], lines[n, 1], down, across) * away / hypot(down, across)
                 total += weight
                 red += weight * (means[k, n, 0] + part * (means[k + 1, n, 0] - means[k, n, 0]))
                 green += weight * (means[k, n, 1] + part * (means[k + 1, n, 1] - means[k, n, 1]))
                 blue += weight * (means[k, n, 2] + part * (means[k + 1, n, 2] - means[k, n, 2]))
             # Against all else, which counts 1.
-            rest = np.float32(1.0) / (np.float32(1.0) + total)
+            rest = 1.0 / (1.0 + total)
             grown[row, column, 0] = rest * (grown[row, column, 0] + red)
             grown[row, column, 1] = rest * (grown[row, column, 1] + green)
             grown[row, column, 2] = rest * (grown[row, column, 2] + blue)

@@ -38,7 +38,7 @@ def find_lines(colors, disparity, hole, rims, one_surface, lines):
                     # Steps along both diagonals of 2 x 2 pixels: unlike those to the right and below, of one place.
                     falling = colors[v + 1, u + 1, c] - colors[v, u, c]
                     rising = colors[v, u + 1, c] - colors[v + 1, u, c]
-                    across, down = 0.5 * (falling + rising), 0.5 * (falling - rising)
+                    across, down = 0.5 * falling + 0.5 * rising, 0.5 * falling - 0.5 * rising
                     xx, xy, yy = xx + across * across, xy + across * down, yy + down * down
         # Its eigenvalues differ by sqrt((xx - yy)^2 + 4 xy^2); the line runs across the larger one's direction.
         noise = 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2

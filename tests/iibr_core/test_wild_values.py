@@ -445,10 +445,14 @@ ELEMENTWISE = {
 GLOSSY = "of a field's disparity and sound settings, as `shade_views` is given them"
 FINITE_BY_CONTRACT = {
     "rendering.gloss.geometry.SceneGeometry": GLOSSY,
+    "rendering.gloss.light_search.find_light": GLOSSY,
+    "rendering.gloss.microfacet.lobe_shares": GLOSSY,
     "rendering.gloss.microfacet.reflected_share": GLOSSY,
-    "rendering.gloss.reflection.reflected_light": GLOSSY,
     "rendering.gloss.reflection.reflection_disparity": GLOSSY,
-    "rendering.gloss.reflection.separate_light": GLOSSY,
+    "rendering.gloss.separation.eroded": GLOSSY,
+    "rendering.gloss.separation.harmonics": GLOSSY,
+    "rendering.gloss.separation.reflected_light": GLOSSY,
+    "rendering.gloss.separation.separate_light": GLOSSY,
     "rendering.gloss.settings.require_sound": "refuses what is not finite, tests/iibr_core/rendering/gloss",
     "rendering.gloss.shading.make_gloss_maps": GLOSSY,
     "rendering.gloss.shading.shade": GLOSSY,
