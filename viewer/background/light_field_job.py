@@ -58,8 +58,8 @@ def showings_of_light_field(
     field = open_light_field(Path(source.path))
     grid, (size, views) = grid_of(field), read_views(field)
     budget = budget_of(source.depth.memory_bytes or memory_bytes())
-    require_field(budget, field.name, size, source.grid or grid)
-    if source.grid is not None and source.grid != grid:
+    require_field(budget, field.name, size, source.filled_grid or grid)
+    if source.filled_grid is not None and source.filled_grid != grid:
         yield _filled_between(source, field, budget, should_stop, report_progress, nearest_to)
         return
     given = known if source.depth.file is None else _read_map(source, size)
@@ -95,9 +95,9 @@ def _filled_between(
             f"{source.depth.file}: is the disparity of one view, and views between take that of all: open"
             f" {field.name} without it"
         )
-    assert source.grid is not None
+    assert source.filled_grid is not None
     grid = grid_of(field)
-    steps = require_steps(grid, source.grid, field.name)
+    steps = require_steps(grid, source.filled_grid, field.name)
 
     def report(done: float, total: float, doing: str) -> None:
         report_progress(Progress(doing=f"{doing}, {done / total:.0%}"))
@@ -108,11 +108,13 @@ def _filled_between(
     centre = ViewUpdate(middle.row, middle.column, middle.colors, middle.disparity / np.float32(steps))
     scene = replace(
         _scene_as_read(source, field, grid, centre, (float(low) / steps, float(high) / steps)),
-        grid=source.grid,
+        grid=source.filled_grid,
         depth_source="light field" if len(field.disparity) == len(field.views) else FROM_VIEWS,
         has_view_disparity=True,
     )
-    return Showing(scene, densify(given, grid, source.grid, should_stop, load_inpainter(source.inpaint), nearest_to))
+    return Showing(
+        scene, densify(given, grid, source.filled_grid, should_stop, load_inpainter(source.inpaint), nearest_to)
+    )
 
 
 @dataclass(frozen=True, eq=False)

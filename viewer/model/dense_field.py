@@ -20,7 +20,7 @@ def denser_grids(given: GridShape) -> tuple[GridShape, ...]:
 
 def with_views_between(scene: Scene, grid: GridShape) -> Source:
     """The light field that is open, to be opened with this grid."""
-    return replace(scene.source, grid=None if grid == scene.given_grid else grid)
+    return replace(scene.source, filled_grid=None if grid == scene.given_grid else grid)
 
 
 def next_denser(scene: Scene) -> Source | None:

@@ -112,7 +112,7 @@ def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
 
 
 def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), grid=GridShape(9, 9)))
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
     said: list[str] = []
     results = results_of(request, lambda: False, lambda: CENTRE, lambda progress: said.append(progress.doing))
     ((ready, views),) = showings(results)
@@ -129,7 +129,7 @@ def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
 
 def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: Path) -> None:
     said: list[str] = []
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), grid=GridShape(9, 9)))
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
     results = results_of(
         request, lambda: any(FINDING in doing for doing in said), lambda: CENTRE, lambda now: said.append(now.doing)
     )
@@ -140,9 +140,9 @@ def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: 
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        (Source("", grid=GridShape(8, 8)), "give 9x9, 13x13, 17x17"),
-        (Source("", DepthChoice(file="centre.npy"), grid=GridShape(9, 9)), "the disparity of one view"),
-        (Source("", DepthChoice(memory_bytes=1 << 28), grid=GridShape(1025, 1025)), "1025 x 1025 views"),
+        (Source("", filled_grid=GridShape(8, 8)), "give 9x9, 13x13, 17x17"),
+        (Source("", DepthChoice(file="centre.npy"), filled_grid=GridShape(9, 9)), "the disparity of one view"),
+        (Source("", DepthChoice(memory_bytes=1 << 28), filled_grid=GridShape(1025, 1025)), "1025 x 1025 views"),
     ],
 )
 def test_views_between_that_cannot_be_made_are_told_in_a_line(tmp_path: Path, source: Source, message: str) -> None:

@@ -13,7 +13,7 @@ from viewer.model.dense_field import MOST_ACROSS, denser_grids, next_denser, wit
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Scene, Source
+from viewer.model.state.scene import Scene, Source, source_beside
 
 GIVEN, DENSE = GridShape(3, 3), GridShape(5, 5)
 FIELD = Scene(Source("field"), "field", 60, 40, GIVEN, (-2.0, 3.0), "light field", given_grid=GIVEN)
@@ -33,9 +33,9 @@ def test_nothing_lies_between_one_view_or_very_many() -> None:
 
 def test_each_time_the_next_denser_grid_is_made_of_the_views_on_disk() -> None:
     first = next_denser(FIELD)
-    assert first == Source("field", grid=DENSE)
+    assert first == Source("field", filled_grid=DENSE)
     denser = replace(FIELD, grid=DENSE, source=first)
-    assert next_denser(denser) == Source("field", grid=GridShape(9, 9))
+    assert next_denser(denser) == Source("field", filled_grid=GridShape(9, 9))
     assert with_views_between(denser, GIVEN) == FIELD.source
     assert next_denser(replace(FIELD, grid=GridShape(17, 17))) is None
 
@@ -59,3 +59,8 @@ def test_the_picture_stays_when_views_between_are_there() -> None:
     assert (carried.focus_disparity, carried.focus_range, carried.aperture_diameter) == (0.5, 0.2, 3.0)
     assert carry_optics(carried, denser, FIELD) == seen
     assert carry_optics(seen, FIELD, replace(FIELD, source=Source("field"))) == Optics()  # the same file opened again
+
+
+def test_another_file_is_opened_with_the_views_that_are_in_it() -> None:
+    filled = Source("field", grid=DENSE, filled_grid=DENSE)
+    assert source_beside(filled, "photo.png") == Source("photo.png", grid=DENSE)

@@ -164,7 +164,8 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
 
 def is_same_scene(old: Source, new: Source, is_light_field: bool) -> bool:
     """Whether what is opened was open before: a file opened again is new, other views of a light field are not."""
-    return old is new or (is_light_field and old.grid != new.grid and replace(old, grid=new.grid) == new)
+    filled = replace(old, filled_grid=new.filled_grid)
+    return old is new or (is_light_field and filled != old and filled == new)
 
 
 def _steps(views: int) -> int:
