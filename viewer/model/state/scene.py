@@ -21,8 +21,8 @@ class Source:
 
     path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
     transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`. is_literal:
-    disparity counts as it is given, in px per step of the grid, instead of the plan's parallax. grid: of a photo's views.
-    filled_grid: of a light field with views made between those on disk.
+    disparity counts as it is given, in px per step of the grid, instead of the plan's parallax. grid: of a photo's
+    views. filled_grid: of a light field with views made between those on disk.
     """
 
     path: str
@@ -37,8 +37,8 @@ class Source:
 
 
 def source_beside(source: Source | None, path: str) -> Source:
-    """To open another file: what was decided about the one before counts, but for what belongs to its depth map, or to the
-    views on disk.
+    """To open another file: what was decided about the one before counts, but for what belongs to its depth map, or
+    to the views on disk.
     """
     return _with_depth(replace(source or Source(""), path=path, filled_grid=None), file=None)
 
