@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, rims_of_holes
 from iibr_core.inpainting.protocol import Inpainter
-from iibr_core.inpainting.rim_lines import find_lines, line_weight
+from iibr_core.inpainting.rim_lines import find_lines, line_weight, mixed_beside
 from iibr_core.inpainting.rim_texture import mirror_texture
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
@@ -84,7 +84,7 @@ def _fill_view(
     pixels = flat_indices(hole, should_stop, threads)
     known = nearest_known(hole, pixels, should_stop, threads)
     rims, number = rims_of_holes(known, image_size(hole), should_stop, threads)
-    lines = np.empty((len(rims), 2), np.float32)
+    mixed, lines = mixed_beside(hole), np.empty((len(rims), 2), np.float32)
     reach = np.empty(len(pixels), np.float32)
     changed = np.empty((len(pixels), 3), np.float32)
 
@@ -107,7 +107,7 @@ def _fill_view(
         lambda part: _add_texture(changed[part], pixels[part], colors),
     ]  # fmt: skip
     in_pieces(
-        lambda part: find_lines(colors, disparity, hole, rims[part], one_surface, lines[part]),
+        lambda part: find_lines(colors, disparity, mixed, rims[part], one_surface, lines[part]),
         _pieces(len(rims)), should_stop, threads,
     )  # fmt: skip
     for step in steps:

@@ -4,23 +4,41 @@ from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+from numpy.typing import NDArray
+
 from iibr_core.runtime.jit import kernel
 
-REACH_PX = 3
-"""Lines are told from 7 x 7 pixels."""
+REACH_PX = 5
+"""Lines are told from 11 x 11 pixels."""
+MIXED_PX = 2
+"""Colours this close to a hole may be mixed with those of what hides it: their lines follow its outline."""
 STRENGTH_POWER, ANGLE_POWER = 2, 16
 """Lines count by their strength, and by the cosine of the angle off them, to these powers."""
 NOISE = 0.01
 """Steps between neighbouring pixels, standard deviation, that make no line."""
 
 
+def mixed_beside(hole: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The hole (H, W) and what is MIXED_PX from it at most, across, down or both."""
+    tall = hole.copy()
+    for k in range(1, MIXED_PX + 1):
+        tall[k:] |= hole[:-k]
+        tall[:-k] |= hole[k:]
+    mixed = tall.copy()
+    for k in range(1, MIXED_PX + 1):
+        mixed[:, k:] |= tall[:, :-k]
+        mixed[:, :-k] |= tall[:, k:]
+    return mixed
+
+
 @kernel
-def find_lines(colors, disparity, hole, rims, one_surface, lines):
+def find_lines(colors, disparity, mixed, rims, one_surface, lines):
     """Write lines (M, 2) at the rims, flat indices (M,): (cos 2a, sin 2a), a the angle at which colours change the
-    least; as long as they change across that line only, 0 where no way differs from others. Only what is known of a
-    rim's own surface counts: disparities that differ by one_surface at most.
+    least; as long as they change across that line only, 0 where no way differs from others. Only a rim's own surface
+    counts, disparities that differ by one_surface at most, and nothing that is `mixed` (H, W).
     """
-    height, width = hole.shape
+    height, width = mixed.shape
     for i in range(len(rims)):
         y, x = rims[i] // width, rims[i] % width
         d = disparity[y, x]
@@ -31,7 +49,7 @@ def find_lines(colors, disparity, hole, rims, one_surface, lines):
                 is_own = True
                 for j in range(2):
                     for k in range(2):
-                        is_own &= not hole[v + j, u + k] and abs(disparity[v + j, u + k] - d) <= one_surface
+                        is_own &= not mixed[v + j, u + k] and abs(disparity[v + j, u + k] - d) <= one_surface
                 if not is_own:
                     continue
                 for c in range(3):

@@ -478,6 +478,7 @@ FINITE_BY_CONTRACT = {
     "inpainting.nearest_known.nearest_known": "of masks only",
     "inpainting.nearest_known.rims_of_holes": "of indices only",
     "inpainting.patch.fill_patches": "of rendered views only",
+    "inpainting.rim_lines.mixed_beside": "of masks only",
     "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
     "depth.multi_view.matching.sweep": "of `matching_views`, whose lumas `luma_of` made finite",
     "depth.multi_view.semi_global.choose_disparity": "of costs in 8 bits",

@@ -10,7 +10,7 @@ from iibr_core.inpainting.background import (
     fill_background,
 )
 from iibr_core.inpainting.nearest_known import DIRECTIONS
-from iibr_core.inpainting.rim_lines import ANGLE_POWER, NOISE, REACH_PX, STRENGTH_POWER
+from iibr_core.inpainting.rim_lines import ANGLE_POWER, MIXED_PX, NOISE, REACH_PX, STRENGTH_POWER
 from iibr_core.inpainting.rim_texture import BINOMIAL, MOST_TEXTURE, NEARER, TEXTURE_SHARE, TRIES
 from iibr_core.types import ViewOffset
 
@@ -31,6 +31,12 @@ def line_slowly(colors, own, pixel):
     angle = np.arctan2(axes[1, 0], axes[0, 0])
     strength = (most - least) / (least + most + 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2)
     return strength * np.array([np.cos(2 * angle), np.sin(2 * angle)])
+
+
+def mixed_slowly(hole):
+    """(H, W): what has a hole's pixel MIXED_PX beside it, or nearer."""
+    around = [slice(max(k - MIXED_PX, 0), k + MIXED_PX + 1) for k in range(max(hole.shape))]
+    return np.array([[hole[around[y], around[x]].any() for x in range(hole.shape[1])] for y in range(hole.shape[0])])
 
 
 def along_line(line, way):
@@ -100,7 +106,8 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
         chosen = [p for p in seen if possible(*p)] or [(u, v) for u, v in seen if disparity[v, u] <= farthest]
         if chosen:
             reach[y, x] = min(np.hypot(u - x, v - y) for u, v in seen)
-            lines = [line_slowly(colors, own_surface(disparity, hole, (v, u), one_surface), (v, u)) for u, v in chosen]
+            clean = [own_surface(disparity, hole, (v, u), one_surface) & ~mixed_slowly(hole) for u, v in chosen]
+            lines = [line_slowly(colors, own, (v, u)) for own, (u, v) in zip(clean, chosen)]
             w = [1 / np.hypot(u - x, v - y) for u, v in chosen]
             w *= np.array([1 + ALONG_LINES * along_line(line, (u - x, v - y)) for line, (u, v) in zip(lines, chosen)])
             d = np.array([disparity[v, u] for u, v in chosen])
