@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces
+from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
 from iibr_core.types import FloatImage
 
 RIM_PX = 2
@@ -64,7 +64,7 @@ def choose_sides(
         if not len(pixels):
             return values
         contrast = _mean_color_step(colors, pixels)
-        parts = [pixels[first : first + MOST_PIECE_PIXELS] for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
+        parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
 
         weigh = partial(_weigh_colors, colors, values, unknown, distance, least_edge, ALIKE * contrast)
         weighed = in_pieces(weigh, parts, should_stop, tiling.THREADS)

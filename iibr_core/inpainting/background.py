@@ -18,7 +18,7 @@ from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.inpainting.rim_lines import find_lines, line_weight, mixed_beside
 from iibr_core.inpainting.rim_texture import mirror_texture
 from iibr_core.runtime.jit import kernel, nearest_pixel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
+from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
@@ -108,15 +108,10 @@ def _fill_view(
     ]  # fmt: skip
     in_pieces(
         lambda part: find_lines(colors, disparity, mixed, rims[part], one_surface, lines[part]),
-        _pieces(len(rims)), should_stop, threads,
+        pieces_of(len(rims), MOST_PIECE_PIXELS), should_stop, threads,
     )  # fmt: skip
     for step in steps:
-        in_pieces(step, _pieces(len(pixels)), should_stop, threads)
-
-
-def _pieces(count: int) -> list[slice]:
-    """So many pixels in pieces of MOST_PIECE_PIXELS."""
-    return [slice(first, first + MOST_PIECE_PIXELS) for first in range(0, count, MOST_PIECE_PIXELS)]
+        in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), should_stop, threads)
 
 
 def background_inpainter() -> Inpainter:

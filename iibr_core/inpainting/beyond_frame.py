@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.rim_lines import find_lines, line_weight
+from iibr_core.inpainting.rim_texture import BINOMIAL
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, Margins, image_size
@@ -25,8 +26,6 @@ guess, and close to the frame nobody misses it.
 """
 SLANT, PLACES = 2.0, 8
 """Lines are followed from so many places each way on the frame, from up to SLANT times as far as the frame is."""
-BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
-"""Texture is what differs from a mean with these weights, each way."""
 
 
 def extend_beyond_frame(

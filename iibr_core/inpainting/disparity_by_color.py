@@ -12,7 +12,7 @@ import numpy as np
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
+from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage
 
 REACH_PX = 4
@@ -51,7 +51,7 @@ def fill_disparity_by_color(photo: FloatImage, values: FloatImage, should_stop: 
     for _ in range(MOST_ROUNDS):
         if not len(pixels):
             return filled
-        parts = [pixels[first : first + MOST_PIECE_PIXELS] for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
+        parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
         votes = in_pieces(lambda part: _vote(colors, filled, part), parts, should_stop, tiling.THREADS)
         filled.reshape(-1)[pixels] = np.concatenate(votes)
         pixels = _unknown_around(filled, pixels, queued)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, raise_if_stopped
+from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, pieces_of, raise_if_stopped
 from iibr_core.types import ImageSize, image_size
 
 DIRECTIONS = np.array(
@@ -52,8 +52,8 @@ def rims_of_holes(
     means nothing elsewhere.
     """
     is_rim, number = np.zeros(size, np.bool_), np.empty(size, np.int32)
-    parts = range(0, len(known), MOST_PIECE_PIXELS)
-    in_pieces(lambda first: _mark(known[first : first + MOST_PIECE_PIXELS], is_rim), parts, should_stop, threads)
+    parts = pieces_of(len(known), MOST_PIECE_PIXELS)
+    in_pieces(lambda part: _mark(known[part], is_rim), parts, should_stop, threads)
     rims = flat_indices(is_rim, should_stop, threads)
     raise_if_stopped(should_stop)
     _number(rims, number)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, never
+from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
 RADIUS_PX = 3
@@ -88,7 +88,7 @@ def _targets(
     ascending, and their numbers (H, W), -1 for others. Cracks too thin to show texture are left out.
     """
     wanted, pixels = np.zeros_like(hole), np.flatnonzero(hole)
-    parts = [pixels[first : first + MOST_PIECE_PIXELS] for first in range(0, len(pixels), MOST_PIECE_PIXELS)]
+    parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
     in_pieces(lambda part: _add_surroundings(disparity, hole, in_front, part, wanted), parts, should_stop)
     targets = np.flatnonzero(wanted)
     number = np.full(hole.shape, -1, np.int32)

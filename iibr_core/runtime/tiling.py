@@ -37,6 +37,11 @@ def raise_if_stopped(should_stop: ShouldStop) -> None:
         raise Cancelled
 
 
+def pieces_of(count: int, most: int) -> list[slice]:
+    """Slices that part so many things into pieces of `most`, the last of which may be shorter."""
+    return [slice(first, first + most) for first in range(0, count, most)]
+
+
 def in_pieces(
     work: Callable[[Item], Result], items: Sequence[Item], should_stop: ShouldStop = never, threads: int = 1
 ) -> list[Result]:

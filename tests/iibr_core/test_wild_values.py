@@ -601,7 +601,7 @@ READS_OR_TELLS = {
     "require_dense_field "
     "require_own_size require_free_views require_matching mebibytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
-    "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands",
+    "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands pieces_of",
     "depth.search": "estimator_of read_shown_photo",
     "rendering.large_views": "Part tiles_of whole",
     "rendering.view_synthesis": "ViewSynthesis",
