@@ -22,8 +22,8 @@ from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import Disparity, FloatImage, GridShape, ReportProgress, ViewOffset
 from viewer.gpu.context import GLContext
-from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, stretch_image
-from viewer.gpu.refocus.renderer import Renderer, scale_size
+from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, scale_size, stretch_image
+from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
 from viewer.model.state.optics import Optics
 

@@ -22,21 +22,19 @@ from numpy.typing import NDArray
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import Cancelled, raise_if_stopped
-from iibr_core.types import SRGB, ColorSpace, InputError
+from iibr_core.types import InputError
 from viewer.app.exports.registry import export_path, require_export_place, writer_of
 from viewer.app.exports.source import ExportSource
 from viewer.app.save_places import require_size
 from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.display.scene_view import SceneView
-from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, Notify, ShowPrompt
 from viewer.model.export_kinds import export_kind
-from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import Exporting, ExportingChanged, ExportPrompt, ExportTask
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import Optics
 
 LOOK_S = 0.05
 """How often a thread that waits for its picture looks whether it is still wanted."""
@@ -46,11 +44,7 @@ LOOK_S = 0.05
 class _Wanted:
     """A picture that the thread waits for. is_drawn: set once image or error is there."""
 
-    optics: Optics
-    size_px: ScreenSize
-    part: TargetWindow
-    is_linear: bool
-    color_space: ColorSpace
+    settings: RenderSettings
     is_drawn: threading.Event = field(default_factory=threading.Event)
     image: NDArray[Any] | None = None
     error: Exception | None = None
@@ -145,18 +139,10 @@ class Exporter:
         self._stop_drawing()
         self._thread.close(cancels=False)
 
-    def _draw(
-        self,
-        export: _Export,
-        optics: Optics,
-        size_px: ScreenSize,
-        part: TargetWindow = WHOLE_PICTURE,
-        is_linear: bool = False,
-        color_space: ColorSpace = SRGB,
-    ) -> NDArray[Any]:
+    def _draw(self, export: _Export, settings: RenderSettings) -> NDArray[Any]:
         """In the thread: have it drawn, and wait."""
-        require_size(size_px)
-        wanted = _Wanted(optics, size_px, part, is_linear, color_space)
+        require_size(settings.size_px)
+        wanted = _Wanted(settings)
         self._asked.put(wanted)
         self._wake()
         while not wanted.is_drawn.wait(LOOK_S):
@@ -182,9 +168,7 @@ class Exporter:
             return
         try:
             if self._drawing is None or self._drawing.is_stopped:  # a picture was saved meanwhile
-                self._drawing = self._scene_view.start_picture(
-                    wanted.optics, wanted.size_px, wanted.is_linear, wanted.part, wanted.color_space
-                )
+                self._drawing = self._scene_view.start_picture(wanted.settings)
             self._drawing.advance(budget_s)
         except (InputError, MemoryError) as error:
             wanted.error = error

@@ -27,6 +27,7 @@ from iibr_core.types import (
 )
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.optics import Optics
 from viewer.model.state.scene import Progress, Scene
@@ -54,6 +55,11 @@ class FullPicture:
     size: ScreenSize
     smaller: FloatImage | None = None
     part: Rect = WHOLE
+
+    @property
+    def smaller_settings(self) -> RenderSettings:
+        """How `smaller` is drawn, from the scene's views."""
+        return RenderSettings(self.optics, self.scene.size, is_linear=True, color_space=self.scene.color_space)
 
     def with_smaller(self, smaller: FloatImage) -> FullPicture:
         """The same with what it needs."""

@@ -14,7 +14,6 @@ from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ViewUpdate, ignore_progress
 from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
-from viewer.app.image_export import render_pixels
 from viewer.app.save_places import require_size
 from viewer.background.comparison_worker import ComparisonJob
 from viewer.background.gloss import answer
@@ -23,7 +22,7 @@ from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, 
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
-from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
@@ -157,7 +156,8 @@ class HeadlessViewer:
             light = self._full_picture(scene, box_size, report_progress)
             pixels = encode_light(light, is_linear, color_space, scene.color_space)
         else:
-            pixels = render_pixels(self._scene_view, self.state, box_size, is_linear, color_space)
+            settings = RenderSettings(self.state.optics, box_size, is_linear=is_linear, color_space=color_space)
+            pixels = self._scene_view.picture(settings)
         if box_size == (width, height):
             return pixels
         image = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
@@ -170,10 +170,9 @@ class HeadlessViewer:
         loaded, optics = self._scene_view.loaded, self.state.optics
         assert loaded is not None
         assert scene.plan is not None
-        smaller = None
+        full = FullPicture(scene, scene.plan, loaded, optics, size)
         if needs_smaller(optics):
-            smaller = self._scene_view.picture(optics, scene.size, is_linear=True, color_space=scene.color_space)
-        full = FullPicture(scene, scene.plan, loaded, optics, size, smaller)
+            full = full.with_smaller(self._scene_view.picture(full.smaller_settings))
         return full.draw(report_progress=report_progress)
 
     def _prepare_gloss(self, optics: Optics) -> None:
@@ -198,18 +197,11 @@ class HeadlessViewer:
         scene, optics = self.scene, self.state.optics
         return needs_smaller(optics) or not is_full(scene, optics, size or scene.size)
 
-    def draw(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        part: TargetWindow = WHOLE_PICTURE,
-        is_linear: bool = False,
-        color_space: ColorSpace = SRGB,
-    ) -> NDArray[Any]:
+    def draw(self, settings: RenderSettings) -> NDArray[Any]:
         """A picture for an export, see `viewer.app.exports.source.Draw`."""
-        require_size(size_px)
-        self._prepare_gloss(optics)
-        return self._scene_view.picture(optics, size_px, is_linear, part, color_space)
+        require_size(settings.size_px)
+        self._prepare_gloss(settings.optics)
+        return self._scene_view.picture(settings)
 
     @property
     def centre(self) -> ViewUpdate | None:

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.types import SRGB, ColorSpace, FloatImage
-from viewer.app.save_places import require_size
-from viewer.display.scene_view import SceneView
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
@@ -71,18 +69,3 @@ def shot_of(state: AppState, size_px: ScreenSize, form: PictureFormat) -> SavedS
     space = SRGB if state.scene is None else state.scene.color_space
     photo = Path(state.source.path)
     return SavedShot(settings_of(state, size_px), form, form.space_for(space), None if is_folder(photo) else photo)
-
-
-def render_pixels(
-    scene_view: SceneView,
-    state: AppState,
-    size_px: ScreenSize,
-    is_linear: bool = False,
-    color_space: ColorSpace = SRGB,
-) -> NDArray[Any]:
-    """The picture with every sample it will get, (height, width, 3), of color_space: bytes, or float32 linear light.
-
-    Larger pictures than the graphics card can hold are drawn in parts. Raises InputError beyond MAX_PIXELS.
-    """
-    require_size(size_px)
-    return scene_view.picture(state.optics, size_px, is_linear=is_linear, color_space=color_space)

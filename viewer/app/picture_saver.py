@@ -26,6 +26,7 @@ from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.jobs import Failed, ProgressReport, message_of
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.picture_drawing import PictureDrawing, Pixels
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState
@@ -154,14 +155,10 @@ class PictureSaver:
         """Of the picture, or of what one at the photo's own size needs."""
         shot, full = request.shot, request.full
         if full is not None:
-            return self._scene_view.start_picture(
-                full.optics, full.scene.size, is_linear=True, color_space=full.scene.color_space
-            )
+            return self._scene_view.start_picture(full.smaller_settings)
+        is_linear, saved = is_float(request.path, shot.form), shot.settings
         return self._scene_view.start_picture(
-            shot.settings.optics,
-            shot.settings.size_px,
-            is_float(request.path, shot.form),
-            color_space=shot.color_space,
+            RenderSettings(saved.optics, saved.size_px, is_linear=is_linear, color_space=shot.color_space)
         )
 
     def _draw_full(self, request: PictureRequest, smaller: Pixels | None) -> list[Action]:

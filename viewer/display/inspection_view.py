@@ -25,6 +25,7 @@ from viewer.display.scene_view import SceneView, window_of
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle, SheetCell
 from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model.actions import Action, Notify
 from viewer.model.colormap import VIRIDIS
@@ -272,7 +273,7 @@ class InspectionView:
             return {}
         record = base.generation, base.views, base.previews, optics, size_px, part
         if self._kept is None or self._kept[0] != record:
-            self._kept = record, self._scene_view.picture(optics, size_px, part=window_of(part))
+            self._kept = record, self._scene_view.picture(RenderSettings(optics, size_px, window_of(part)))
         kept = self._kept[1]
         if kind == "kept":
             return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}

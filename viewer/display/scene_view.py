@@ -14,14 +14,15 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.rendering.gloss.settings import Gloss
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
 from viewer.background.gloss import GlossFound, GlossRequest
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.gpu.context import GLContext
-from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
+from viewer.gpu.refocus.lens import TargetWindow
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.app_state import AppState, DrawReport, Picture
@@ -241,31 +242,13 @@ class SceneView:
             self.renderer.refine()
         return self._drawn
 
-    def picture(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        is_linear: bool = False,
-        part: TargetWindow = WHOLE_PICTURE,
-        color_space: ColorSpace = SRGB,
-    ) -> NDArray[Any]:
-        """The converged picture of any size, (height, width, 3): uint8, encoded, or float32 linear light.
+    def picture(self, settings: RenderSettings) -> NDArray[Any]:
+        """The converged picture of any size. Before the first view it is black. The window's own picture stays."""
+        return self.renderer.converged_picture(settings)
 
-        part: what of it is drawn. color_space: of the result. Before the first view it is black. The window's own
-        picture stays.
-        """
-        return self.renderer.converged_picture(optics, size_px, is_linear, part, color_space)
-
-    def start_picture(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        is_linear: bool,
-        part: TargetWindow = WHOLE_PICTURE,
-        color_space: ColorSpace = SRGB,
-    ) -> PictureDrawing:
+    def start_picture(self, settings: RenderSettings) -> PictureDrawing:
         """The same, to be drawn a step at a time; another one, or other views, stop it."""
-        return self.renderer.start_picture(optics, size_px, is_linear, part, color_space)
+        return self.renderer.start_picture(settings)
 
     @property
     def note(self) -> str:

@@ -5,7 +5,11 @@ Row 0 comes first in all but the last, which is the screen's.
 
 from __future__ import annotations
 
+from typing import Any
+
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from viewer.model.layout import ScreenSize
 
@@ -41,6 +45,12 @@ class RenderTarget:
         else:
             self._ctx.disable(moderngl.BLEND)
         self._holds_sum = True
+
+    def read(self, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
+        """What was drawn, (H, W, 3), bytes or floats, row 0 at the top."""
+        width, height = self.framebuffer.size
+        raw = self.framebuffer.read(components=3, alignment=1, dtype="f1" if dtype is np.uint8 else "f4")
+        return np.frombuffer(raw, dtype).reshape(height, width, 3)[::-1].copy()
 
     def release(self) -> None:
         """Free framebuffer and textures."""

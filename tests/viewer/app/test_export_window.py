@@ -12,8 +12,8 @@ from PIL import Image, ImageSequence
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
-from viewer.app.image_export import render_pixels
 from viewer.app.main_loop import App
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, ShowPrompt
 from viewer.model.layout import ScreenSize
 from viewer.model.state.exporting import CancelExportTask, ExportOptions, ExportPrompt, ExportTask
@@ -69,7 +69,7 @@ def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: 
     viewer.app.do(DoTask(ExportTask("numbered-grid", str(tmp_path / "field"))))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(viewer.app) == [f"Exported {tmp_path / 'field'}"]
-    shown = render_pixels(viewer.app.scene_view, viewer.app.state, ScreenSize(96, 64)).astype(int)
+    shown = viewer.app.scene_view.picture(RenderSettings(viewer.app.state.optics, ScreenSize(96, 64))).astype(int)
     view = np.asarray(Image.open(tmp_path / "field" / "v01_u01.png")).astype(int)
     assert np.abs(view - shown).max() <= 2
 

@@ -15,8 +15,9 @@ from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_floa
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.app.image_export import export_picture, render_pixels, shot_of
+from viewer.app.image_export import export_picture, shot_of
 from viewer.app.picture_saver import PictureSaver
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.notices import Notice
@@ -88,7 +89,7 @@ def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
     scene_view, size_px = opened._scene_view, (WIDTH, HEIGHT)
     scene_view.converge(opened.state, size_px)
     shown, drawn = scene_view.renderer.read_image(), scene_view.pictures_drawn
-    scene_view.picture(opened.state.optics, (40, 30))
+    scene_view.picture(RenderSettings(opened.state.optics, (40, 30)))
     assert np.array_equal(scene_view.renderer.read_image(), shown)
     scene_view.converge(opened.state, size_px)
     assert scene_view.pictures_drawn == drawn
@@ -98,7 +99,7 @@ def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
 @pytest.mark.parametrize("size_px", [(0, 5), (5, -1), (20_000, 20_000)])
 def test_absurd_sizes_are_refused(opened: HeadlessViewer, size_px: tuple[int, int]) -> None:
     with pytest.raises(InputError, match=rf"{size_px[0]}x{size_px[1]} px: .* million"):
-        render_pixels(opened._scene_view, opened.state, size_px)
+        opened.draw(RenderSettings(opened.state.optics, size_px))
 
 
 def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path: Path) -> None:
@@ -115,7 +116,7 @@ def test_a_picture_starts_over_when_more_of_the_same_scene_is_there(tmp_path: Pa
         assert saver.add(SaveTask(str(out), (90, 60)), viewer.state, ()) == []
         assert saver.advance(0.0) == [SavingChanged(Saving("out.png"))]
         scene_view.renderer.upload_view(1, 1, np.full((HEIGHT, WIDTH, 3), 90, np.uint8), None)
-        expected = render_pixels(scene_view, viewer.state, (90, 60))
+        expected = scene_view.picture(RenderSettings(viewer.state.optics, (90, 60)))
         while saver.is_drawing:
             saver.advance(0.0)
         assert woken.wait(60)

@@ -18,7 +18,7 @@ from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, write_scene
 from viewer.app.full_picture import FullPicture
-from viewer.app.image_export import render_pixels
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, AskToSave, DismissNotice, DoTask, OpenPath, SetDepthStrength
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.optics import MoveEye, SetAperture
@@ -58,7 +58,7 @@ def texts(viewer: Driver) -> list[str]:
 def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: Path, name: str) -> None:
     app, out = viewer.app, tmp_path / name
     asked = app.state
-    expected = render_pixels(app.scene_view, asked, SIZE, is_linear=name.endswith("exr"))
+    expected = app.scene_view.picture(RenderSettings(asked.optics, SIZE, is_linear=name.endswith("exr")))
     expected = srgb_from_linear(expected) if name.endswith("exr") else expected
     app.do(DoTask(SaveTask(str(out), SIZE)))
     app.step()
@@ -232,7 +232,9 @@ def test_a_picture_is_saved_at_the_photos_own_size(
     assert saved.shape == photo.shape
     if aperture == 0:
         np.testing.assert_allclose(saved, photo, atol=1.01 / 255)
-    shown = linear_from_srgb(render_pixels(app.scene_view, app.state, app.state.scene.size) / np.float32(255))  # type: ignore[union-attr]
+    assert app.state.scene is not None
+    shown = app.scene_view.picture(RenderSettings(app.state.optics, app.state.scene.size))
+    shown = linear_from_srgb(shown / np.float32(255))
     smaller = mean_of_areas(linear_from_srgb(saved), image_size(shown))
     assert np.abs(smaller - shown).mean() < 0.01
 

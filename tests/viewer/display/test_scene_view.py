@@ -13,6 +13,7 @@ from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.display import scene_view
 from viewer.display.scene_view import SceneView
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import SetAperture
 
@@ -68,4 +69,4 @@ def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: Headless
         view.draw(opened.state, SIZE)
     view.renderer.refine()
     shown = view.renderer.read_image().astype(int)
-    assert np.abs(shown - view.picture(opened.state.optics, SIZE)).max() <= 1
+    assert np.abs(shown - view.picture(RenderSettings(opened.state.optics, SIZE))).max() <= 1

@@ -10,6 +10,7 @@ import pytest
 from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import ApertureSample, aperture_samples
 from viewer.model.state.optics import CENTRE, ApertureMask, ApertureShape, Optics
@@ -91,7 +92,7 @@ def width_of_spot(renderer: Renderer, optics: Optics, level: QualityLevel | None
         encoded = srgb_from_linear(2 * spot[..., None].repeat(3, axis=2))
         renderer.upload_view(row, column, stored_from_encoded(encoded, True), np.full(size, px_per_view, np.float32))
     if level is None:
-        light = renderer.converged_picture(optics, size, is_linear=True)[..., 0].astype(float)
+        light = renderer.converged_picture(RenderSettings(optics, size, is_linear=True))[..., 0].astype(float)
     else:
         renderer.render(optics, size, level=level)
         light = linear_from_srgb(renderer.read_image()[..., 0] / 255).astype(float)

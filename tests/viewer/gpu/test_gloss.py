@@ -13,6 +13,7 @@ from iibr_core.rendering.gloss.shading import GlossMaps, make_gloss_maps, shade
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import rms
 from viewer.gpu.inspection_passes import InspectionPasses, Line
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
@@ -99,7 +100,7 @@ def test_through_an_aperture_each_point_of_the_lens_sees_its_own_highlight(rende
     open_flat(renderer, photo, flat)
     renderer.set_gloss(maps)
     optics = Optics(focus_disparity=2.0, aperture_diameter=3.0, gloss=dim)
-    drawn = renderer.converged_picture(optics, (WIDTH, HEIGHT), is_linear=False)
+    drawn = renderer.converged_picture(RenderSettings(optics, (WIDTH, HEIGHT)))
     narrow = shaded(maps, photo, ViewOffset(0.0, 0.0))
     assert rms(drawn, narrow) < 0.05
     assert drawn.max() < narrow.max(), "the lobe is seen from several directions"

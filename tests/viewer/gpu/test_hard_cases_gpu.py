@@ -19,6 +19,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms
 from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.lens.limits import eye_limits
 from viewer.model.state.optics import Optics
@@ -126,7 +127,7 @@ def test_float16_sums_of_289_views(renderer: Renderer) -> None:
     optics = Optics(aperture_diameter=40.0, exposure_stops=math.log2(0.5 / light))
     expected = 255 * srgb_from_linear(np.array(0.5))
     assert np.abs(picture(renderer, optics, (8, 6)) - expected).max() <= 2
-    linear = renderer.converged_picture(replace(optics, exposure_stops=0.0), (8, 6), is_linear=True)
+    linear = renderer.converged_picture(RenderSettings(replace(optics, exposure_stops=0.0), (8, 6), is_linear=True))
     assert linear == pytest.approx(float(linear_from_srgb(encoded)[0, 0, 0]), rel=2e-3)
 
 

@@ -31,7 +31,7 @@ def passes(renderer: Renderer) -> Passes:
 
 @pytest.fixture
 def targets(renderer: Renderer) -> RenderTargets:
-    return renderer._targets_of(SIZE)
+    return renderer._screen.targets_of(SIZE)
 
 
 def lens(renderer: Renderer, optics: Optics) -> Lens:
@@ -199,7 +199,7 @@ def test_layers_are_laid_over_each_other(
     fill_tiles(targets, width_px, 0.0)
     targets.image.use()
     passes.present(wide, targets, narrowing=1.0, is_linear=False)
-    renderer._shown = targets
+    renderer._screen.show(targets)
     image = renderer.read_image()
     smoothed = min(width_px**2 / 11, 1.0)
     for side, columns in enumerate((slice(0, 70), slice(90, 160))):

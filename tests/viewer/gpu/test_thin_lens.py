@@ -19,6 +19,7 @@ from iibr_core.generation.light_field import generate
 from iibr_core.types import Disparity, FloatImage, Quality, ViewUpdate
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
 from tests.iibr_core.scenes import by_index, literal_plan
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.state.optics import Optics
 
@@ -51,7 +52,7 @@ def drawn_db(renderer: Renderer, scene: LensScene, field: Field, optics: Optics)
     renderer.open_field(GRID, width, height, hdr=False, with_disparity=field[0, 0].disparity is not None)
     for update in field.values():
         renderer.upload_view(update.row, update.column, update.colors, update.disparity)
-    picture = renderer.converged_picture(optics, (width, height), is_linear=False)
+    picture = renderer.converged_picture(RenderSettings(optics, (width, height)))
     return db(picture.astype(np.float32) / np.float32(255), scene)
 
 

@@ -11,6 +11,7 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.tiling import MARGIN_PX, PART_PX, picture_tiles
 from viewer.model.state.optics import ApertureShape, Optics
@@ -64,10 +65,10 @@ def test_parts_have_no_seams(
     renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch, optics: Optics
 ) -> None:
     SCENE.fill(renderer, GRID)
-    whole = renderer.converged_picture(optics, LARGE, is_linear=False).astype(int)
+    whole = renderer.converged_picture(RenderSettings(optics, LARGE)).astype(int)
     monkeypatch.setattr(gl, "max_texture_size", 160)
     assert len(picture_tiles(LARGE, gl.max_texture_size)) == 12
-    in_parts = renderer.converged_picture(optics, LARGE, is_linear=False)
+    in_parts = renderer.converged_picture(RenderSettings(optics, LARGE))
     difference = np.abs(in_parts - whole).max(-1)
     assert np.mean(difference > 2) < 0.001, "rounding may decide a depth edge otherwise here and there"
     assert np.mean(difference) < 0.05
@@ -78,25 +79,25 @@ def test_the_converged_picture_is_what_refining_ends_at(renderer: Renderer) -> N
     for optics in OPTICS:
         renderer.render(optics, (160, 120))
         renderer.refine()
-        assert np.array_equal(renderer.read_image(), renderer.converged_picture(optics, (160, 120), is_linear=False))
+        assert np.array_equal(renderer.read_image(), renderer.converged_picture(RenderSettings(optics, (160, 120))))
 
 
 def test_light_is_finer_than_eight_bits_and_not_cut_off(renderer: Renderer) -> None:
     ramp = np.linspace(0.2, 3.0, 64).astype(np.float16)
     renderer.open_field(GridShape(1, 1), 64, 4, hdr=True, with_disparity=False)
     renderer.upload_view(0, 0, np.repeat(np.tile(ramp[None, :, None], (4, 1, 1)), 3, axis=2), None)
-    light = renderer.converged_picture(Optics(exposure_stops=1.0), (64, 4), is_linear=True)
+    light = renderer.converged_picture(RenderSettings(Optics(exposure_stops=1.0), (64, 4), is_linear=True))
     assert light.dtype == np.float32
     assert srgb_from_linear(light[1, :, 0] / 2) == pytest.approx(ramp.astype(float), rel=2e-3)
     assert light.max() > 5
-    encoded = renderer.converged_picture(Optics(exposure_stops=1.0), (64, 4), is_linear=False)
+    encoded = renderer.converged_picture(RenderSettings(Optics(exposure_stops=1.0), (64, 4)))
     assert np.abs(np.clip(srgb_from_linear(light), 0, 1) * 255 - encoded).max() <= 0.51
 
 
 def test_light_between_the_steps_of_eight_bits(renderer: Renderer) -> None:
     """A sum of many samples takes more values than 256."""
     SCENE.fill(renderer, GRID)
-    light = renderer.converged_picture(OPTICS[1], (160, 120), is_linear=True)
+    light = renderer.converged_picture(RenderSettings(OPTICS[1], (160, 120), is_linear=True))
     steps = srgb_from_linear(light) * 255
     assert np.mean(np.abs(steps - np.rint(steps)) > 0.1) > 0.5
 
@@ -108,9 +109,9 @@ def test_a_picture_drawn_in_steps_is_the_one_drawn_at_once(
 ) -> None:
     SCENE.fill(renderer, GRID)
     monkeypatch.setattr(gl, "max_texture_size", 256)
-    at_once = renderer.converged_picture(optics, LARGE, is_linear)
+    at_once = renderer.converged_picture(RenderSettings(optics, LARGE, is_linear=is_linear))
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-5)
-    drawing = renderer.start_picture(optics, LARGE, is_linear)
+    drawing = renderer.start_picture(RenderSettings(optics, LARGE, is_linear=is_linear))
     seen = [drawing.progress]
     while not drawing.is_done:
         drawing.advance(budget_s=0.0)
@@ -128,12 +129,12 @@ def test_the_picture_on_the_screen_is_drawn_between_the_steps(
     SCENE.fill(renderer, GRID)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
     saved, alone = Optics(ViewOffset(0.3, 0.2), aperture_diameter=4.0), []
-    expected = renderer.converged_picture(saved, (160, 120), is_linear=False)
+    expected = renderer.converged_picture(RenderSettings(saved, (160, 120)))
     eyes = [Optics(ViewOffset(0.1 * i, -0.2), dolly=0.5, aperture_diameter=2.0) for i in range(5)]
     for optics in eyes:
         renderer.render(optics, (80, 60))
         alone.append(renderer.read_image())
-    drawing = renderer.start_picture(saved, (160, 120), is_linear=False)
+    drawing = renderer.start_picture(RenderSettings(saved, (160, 120)))
     for optics, image in zip(eyes, alone):
         drawing.advance(budget_s=0.0)
         renderer.render(optics, (80, 60))
@@ -149,8 +150,8 @@ def test_views_that_come_while_a_picture_is_drawn_are_not_seen_in_it(renderer: R
     for view in ((0, 0), (2, 2)):
         SCENE.upload(renderer, GRID, *view)
     optics = Optics(ViewOffset(0.3, 0.2), aperture_diameter=4.0)
-    expected = renderer.converged_picture(optics, (160, 120), is_linear=False)
-    drawing = renderer.start_picture(optics, (160, 120), is_linear=False)
+    expected = renderer.converged_picture(RenderSettings(optics, (160, 120)))
+    drawing = renderer.start_picture(RenderSettings(optics, (160, 120)))
     drawing.advance(budget_s=0.0)
     SCENE.upload(renderer, GRID, 4, 4)
     drawing.advance()
@@ -164,7 +165,7 @@ def test_another_field_stops_a_picture(renderer: Renderer) -> None:
         lambda: SCENE.upload(renderer, GRID, 2, 2),
         lambda: SCENE.fill(renderer, GRID),
     ):
-        drawing = renderer.start_picture(Optics(aperture_diameter=4.0), (160, 120), is_linear=False)
+        drawing = renderer.start_picture(RenderSettings(Optics(aperture_diameter=4.0), (160, 120)))
         drawing.advance(budget_s=0.0)
         change()
         assert drawing.is_stopped

@@ -17,6 +17,7 @@ from iibr_core.formats.files import open_binary
 from iibr_core.types import ImageSize, InputError, ViewOffset
 from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.source import ExportSource
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.export_settings import ExportSettings
 from viewer.model.lens.limits import aperture_limit, clamp_optics
 from viewer.model.reducers.camera_motion import point_on_loop
@@ -35,7 +36,7 @@ def write_motion(path: Path, source: ExportSource, settings: ExportSettings) -> 
     size = ImageSize(settings.size.height, settings.size.width)
     require_video_size(path, size)
     optics = optics_on_path(source.scene, source.optics, settings)
-    drawn = (draw_framed(source, each, settings.size) for each in optics)
+    drawn = (draw_framed(source, RenderSettings(each, settings.size)) for each in optics)
     frames = source.watched(drawn, settings.frames, "drawing frames")
     write_animation(path, frames, size, settings.rate)
 

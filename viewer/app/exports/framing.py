@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import SRGB, ColorSpace
 from viewer.app.exports.source import ExportSource
-from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import ScreenSize
-from viewer.model.state.optics import Optics
 
 THINNEST_BAR_PX = 2
 """Of less room than that at both sides together, the picture takes all: it comes of whole numbers of pixels."""
 
 
-def draw_framed(
-    source: ExportSource,
-    optics: Optics,
-    frame: ScreenSize,
-    part: TargetWindow = WHOLE_PICTURE,
-    is_linear: bool = False,
-    frame_aspect: float | None = None,
-    color_space: ColorSpace = SRGB,
-) -> NDArray[Any]:
-    """As `Draw` draws it, whole and undistorted in a frame. frame_aspect: width / height that the frame is shown with,
-    where that is another than its pixels'.
+def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: float | None = None) -> NDArray[Any]:
+    """The picture whole and undistorted in a frame of the settings' size.
+
+    frame_aspect: width / height that the frame is shown with, where that is another than its pixels'.
     """
+    part, frame = settings.part, settings.size_px
     aspect = part.width * source.scene.width / (part.height * source.scene.height)
     size = fitted(aspect, frame, frame_aspect or frame.width / frame.height)
-    pixels = source.draw(optics, size, part, is_linear, color_space)
+    pixels = source.draw(replace(settings, size_px=size))
     if size == frame:
         return pixels
     whole: NDArray[Any] = np.zeros((frame.height, frame.width, 3), pixels.dtype)

@@ -11,6 +11,7 @@ from viewer.app.exports.looking_glass import Bridge
 from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.pictures import write_with_metadata
 from viewer.app.exports.source import ExportSource
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.exporting import ExportOptions
@@ -31,7 +32,7 @@ def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> s
     quilt = _quilt_of(source.scene, settings.device)
     frame = ScreenSize(quilt.tile.width, quilt.tile.height)
     drawn = (
-        draw_framed(source, picture.optics, frame, picture.part, frame_aspect=quilt.aspect)
+        draw_framed(source, RenderSettings(picture.optics, frame, picture.part), quilt.aspect)
         for picture in side_pictures(source.scene, source.optics, quilt.views, settings.eyes)
     )
     write_with_metadata(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")), source)

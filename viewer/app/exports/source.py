@@ -5,50 +5,30 @@ A kind of export is a function that writes one file or folder of this, in whatev
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from numpy.typing import NDArray
 
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ViewUpdate
+from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
 from viewer.background.gloss import add_gloss
 from viewer.background.loaded_photo import LoadedPhoto, inpainting_aids
-from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow
-from viewer.model.layout import ScreenSize
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.state.optics import CENTRE, Optics
 from viewer.model.state.scene import Progress, Scene
 
 Item = TypeVar("Item")
 
 
-class Draw(Protocol):
-    """Draws the converged picture."""
-
-    def __call__(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        part: TargetWindow = WHOLE_PICTURE,
-        is_linear: bool = False,
-        color_space: ColorSpace = SRGB,
-    ) -> NDArray[Any]:
-        """(height, width, 3) of color_space: uint8, encoded, or float32 linear light. part: what of it is drawn.
-
-        Raises Cancelled once the export should stop, InputError where there is no room.
-        """
+Draw = Callable[[RenderSettings], NDArray[Any]]
+"""Draws a picture. Raises Cancelled once the export should stop, InputError where there is no room."""
 
 
-def undrawn(
-    optics: Optics,
-    size_px: ScreenSize,
-    part: TargetWindow = WHOLE_PICTURE,
-    is_linear: bool = False,
-    color_space: ColorSpace = SRGB,
-) -> NDArray[Any]:
+def undrawn(settings: RenderSettings) -> NDArray[Any]:
     """For kinds that draw nothing."""
     raise AssertionError("this kind of export is said to draw nothing")
 

@@ -17,6 +17,7 @@ from iibr_core.types import FloatImage, ImageSize
 from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.pictures import saved_space, write_with_metadata
 from viewer.app.exports.source import ExportSource
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import aperture_limit
@@ -97,7 +98,7 @@ def _write_folder(
     try:
         for name, optics in source.watched(stack, len(stack), "drawing"):
             place = unfinished.path / f"{name}{ending}"
-            pixels = draw_framed(source, optics, size, is_linear=is_float(place), color_space=space)
+            pixels = draw_framed(source, RenderSettings(optics, size, is_linear=is_float(place), color_space=space))
             write_with_metadata(place, pixels, source, color_space=space)
         if disparity is not None:
             write_pfm(unfinished.path / "disparity.pfm", disparity)
@@ -118,7 +119,7 @@ def _write_parts(
         return known is not None and name == ALL_IN_FOCUS
 
     def draw(name: str, optics: Optics) -> FloatImage:
-        light = draw_framed(source, optics, size, is_linear=True)
+        light = draw_framed(source, RenderSettings(optics, size, is_linear=True))
         return light if known is None or not has_disparity(name) else np.dstack([light, known])
 
     parts = [ExrPart(name, COLORS | (DISPARITY if has_disparity(name) else {})) for name, _ in stack]

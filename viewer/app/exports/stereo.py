@@ -17,6 +17,7 @@ from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.parallax import side_pictures
 from viewer.app.exports.pictures import saved_space, write_with_metadata
 from viewer.app.exports.source import ExportSource
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.export_settings import ExportSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.exporting import ExportOptions
@@ -48,7 +49,7 @@ def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1, 
     width, height = settings.size
     frame = ScreenSize(max(width // squeeze, 1), height)
     drawn = (
-        draw_framed(source, eye.optics, frame, eye.part, frame_aspect=width / height, color_space=color_space)
+        draw_framed(source, RenderSettings(eye.optics, frame, eye.part, color_space=color_space), width / height)
         for eye in side_pictures(source.scene, source.optics, 2, settings.eyes)
     )
     left, right = source.watched(drawn, 2, "drawing")

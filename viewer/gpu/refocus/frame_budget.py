@@ -57,6 +57,12 @@ LATEST_COUNTS = 0.4
 """How much the latest measurement counts against those before."""
 
 
+def scale_size(size_px: ScreenSize, scale: float) -> ScreenSize:
+    """That size times scale, at least one pixel."""
+    width, height = size_px
+    return ScreenSize(max(round(width * scale), 1), max(round(height * scale), 1))
+
+
 def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize) -> NDArray[np.uint8]:
     """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it."""
     rows, columns = (_taps(there, here) for there, here in zip(size_px[::-1], image.shape))

@@ -6,12 +6,11 @@ import math
 import time
 from collections.abc import Generator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import SRGB, ColorSpace
+from iibr_core.types import ColorSpace
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
@@ -41,12 +40,12 @@ class PictureDrawing:
         field: LightFieldTexture,
         whole: ProgressiveAccumulation,
         is_linear: bool,
-        color_space: ColorSpace = SRGB,
+        color_space: ColorSpace,
     ) -> None:
-        """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun. color_space: of the
-        image.
+        """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun.
 
-        Views that `field` gets from now on are not seen: all tiles show the same.
+        is_linear, color_space: see `RenderSettings`. Views that `field` gets from now on are not seen: all tiles show
+        the same.
         """
         width, height = whole.size_px
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
@@ -109,12 +108,5 @@ class PictureDrawing:
         yield from self._accumulator.sum_up_in_steps(self._field, accumulation, targets, pixels)
         self._accumulator.finish(accumulation, targets, target.framebuffer, self._is_linear, self._color_space)
         yield
-        drawn = read_pixels(target.framebuffer, np.float32 if self._is_linear else np.uint8)
+        drawn = target.read(np.float32 if self._is_linear else np.uint8)
         self.image[tile.kept] = drawn[tile.kept_of_drawn]
-
-
-def read_pixels(framebuffer: Any, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
-    """What was drawn, (H, W, 3), row 0 at the top."""
-    width, height = framebuffer.size
-    raw = framebuffer.read(components=3, alignment=1, dtype="f1" if dtype is np.uint8 else "f4")
-    return np.frombuffer(raw, dtype).reshape(height, width, 3)[::-1].copy()

@@ -15,9 +15,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors, ViewUpdate
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
-from viewer.gpu.gloss_textures import GlossTextures
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, r2_sequence
@@ -29,12 +28,14 @@ from viewer.gpu.refocus.frame_budget import (
     FrameTimeModel,
     QualityLevel,
     choose_quality_level,
+    scale_size,
     stretch_image,
 )
 from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow, lens_of
-from viewer.gpu.refocus.passes import TILE_PX
-from viewer.gpu.refocus.picture_drawing import PictureDrawing, read_pixels
-from viewer.gpu.render_targets import RenderTargets
+from viewer.gpu.refocus.open_field import OpenField
+from viewer.gpu.refocus.picture_drawing import PictureDrawing
+from viewer.gpu.refocus.render_settings import RenderSettings
+from viewer.gpu.refocus.screen_image import ScreenImage
 from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import DrawReport
 from viewer.model.state.optics import Optics
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
     from iibr_core.rendering.gloss.shading import GlossMaps
 
 PREPARED_SIZE = ScreenSize(16, 16)
-KEPT_SIZES = 2
-"""Of the picture: one drawn in a hurry is smaller than the one that follows it."""
 
 
 class Renderer:
@@ -52,24 +51,20 @@ class Renderer:
 
     prefilter: smooth what lies between sparse samples; off, it shows them as separate copies. adaptive: tiles take few
     samples where all is sharp, and skip searches that find nothing. report: what is known of the picture drawn last.
-    note: what had to be left out, a sentence for people. passes_shown: how many passes of the best picture what is
-    shown is made of; 0: it is softer than that.
+    passes_shown: how many passes of the best picture what is shown is made of; 0: it is softer than that.
     """
 
     def __init__(self, gl: GLContext, prefilter: bool = True, adaptive: bool = True) -> None:
         self.gl = gl
         self.ctx = gl.ctx
         self.prefilter = prefilter
-        self.field: LightFieldTexture | None = None
-        self._stand_in: LightFieldTexture | None = None
         self.report = DrawReport()
-        self.note = ""
         self.passes_shown = 0
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self.adaptive = adaptive
-        self._targets: dict[ScreenSize, RenderTargets] = {}
-        self._shown: RenderTargets | None = None
+        self._fields = OpenField(self.ctx)
+        self._screen = ScreenImage(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
         self._shown_from_pass = 0
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
@@ -87,6 +82,16 @@ class Renderer:
     def adaptive(self, is_on: bool) -> None:
         self._accumulator.passes.adaptive = is_on
 
+    @property
+    def field(self) -> LightFieldTexture | None:
+        """The light field, None before the first."""
+        return self._fields.field
+
+    @property
+    def note(self) -> str:
+        """What of the field had to be left out, a sentence for people."""
+        return self._fields.note
+
     def open_field(
         self,
         grid: GridShape,
@@ -101,17 +106,13 @@ class Renderer:
         Where the graphics driver cannot hold all views, fewer are kept, and `note` says so. Raises InputError where it
         cannot hold a single one; the old field then stays.
         """
-        field, self.note = _field_that_fits(self.ctx, grid, width, height, hdr, with_disparity)
-        if self.field is not None:
-            self._stop_picture()
-            self.field.release()
-        field.color_space = color_space
-        self.field = field
+        self._fields.open(grid, width, height, hdr, with_disparity, color_space)
+        self._stop_picture()
         self._accumulation = None
 
     def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Add or replace one view; see LightFieldTexture.upload."""
-        field = self._loaded_field()
+        field = self._fields.loaded
         if 0 <= row < field.grid.rows and 0 <= column < field.grid.columns and field.present[row, column]:
             self._stop_picture()
         field.upload(row, column, colors, disparity)
@@ -124,23 +125,13 @@ class Renderer:
         It has a disparity, and its colours are sRGB's.
         """
         self._stop_picture()
-        if self._stand_in is not None:
-            self._stand_in.release()
-            self._stand_in = None
-        if view is not None:
-            field = self._loaded_field()
-            size = field.grid, field.width, field.height
-            self._stand_in = LightFieldTexture(self.ctx, *size, field.hdr, with_disparity=True, stride=max(field.grid))
-            self._stand_in.upload(view.row, view.column, view.colors, view.disparity)
+        self._fields.stand_in(view)
         self._accumulation = None
 
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """What gloss means for the field, for optics that have one; None where it means nothing."""
-        field = self._loaded_field()
         self._stop_picture()
-        if field.gloss is not None:
-            field.gloss.release()
-        field.gloss = None if maps is None else GlossTextures(self.ctx, maps)
+        self._fields.set_gloss(maps)
         self._accumulation = None
 
     def render(
@@ -226,37 +217,22 @@ class Renderer:
             self._errors.add(self.read_image(), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
-    def start_picture(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        is_linear: bool,
-        part: TargetWindow = WHOLE_PICTURE,
-        color_space: ColorSpace = SRGB,
-    ) -> PictureDrawing:
-        """A picture with every sample it will get, of any size, to be drawn step by step; one at a time.
+    def start_picture(self, settings: RenderSettings) -> PictureDrawing:
+        """A picture with every sample it will get, to be drawn step by step; one at a time.
 
-        is_linear: float32 linear light, not cut off at white or 0; else uint8, encoded by sRGB's curve. part: what of
-        the picture is drawn, stretched to size_px. color_space: of the result. What was drawn last stays as it is.
-        Another field, or another image of a view that is there, stops it.
+        What was drawn last stays as it is. Another field, or another image of a view that is there, stops it.
         """
         self._stop_picture()
         accumulator = Accumulator(self.ctx, self.programs)
         accumulator.passes.adaptive = self.adaptive
-        whole = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
-        self._picture = PictureDrawing(self.gl, accumulator, self._open_field(), whole, is_linear, color_space)
+        whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part)
+        is_linear, space = settings.is_linear, settings.color_space
+        self._picture = PictureDrawing(self.gl, accumulator, self._fields.drawn, whole, is_linear, space)
         return self._picture
 
-    def converged_picture(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        is_linear: bool,
-        part: TargetWindow = WHOLE_PICTURE,
-        color_space: ColorSpace = SRGB,
-    ) -> NDArray[np.uint8 | np.float32]:
-        """The picture of `start_picture`, (height, width, 3), at once."""
-        drawing = self.start_picture(optics, size_px, is_linear, part, color_space)
+    def converged_picture(self, settings: RenderSettings) -> NDArray[np.uint8 | np.float32]:
+        """The picture of `start_picture`, at once."""
+        drawing = self.start_picture(settings)
         drawing.advance()
         self._stop_picture()
         return drawing.image
@@ -279,7 +255,7 @@ class Renderer:
     def prepare(self, optics: Optics) -> None:
         """Have what draws such a picture compiled, so that the first frame of it does not wait; none is shown."""
         if not self.is_drawing_picture:
-            self.converged_picture(optics, PREPARED_SIZE, is_linear=False)
+            self.converged_picture(RenderSettings(optics, PREPARED_SIZE))
 
     @property
     def samples_drawn(self) -> int:
@@ -289,7 +265,7 @@ class Renderer:
     @property
     def samples_converged(self) -> int:
         """How many the converged picture is made of, about."""
-        accumulation, field = self._current(), self._open_field()
+        accumulation, field = self._current(), self._fields.drawn
         per_pass = 1
         if accumulation.lens.aperture_share > 0 and field.present.any():
             per_pass = len(accumulation.lens.samples(field.grid, field.present))
@@ -298,65 +274,34 @@ class Renderer:
     @property
     def image_texture(self) -> int:
         """GL name of the renderer's own image (RGBA8, rows bottom-up). Another picture may change it."""
-        assert self._shown is not None, "render first"
-        return self._shown.image.textures[0].glo
+        return self._screen.shown.image.textures[0].glo
 
     def read_image(self) -> NDArray[np.uint8]:
         """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller."""
-        assert self._shown is not None, "render first"
-        image: NDArray[np.uint8] = read_pixels(self._shown.image.framebuffer, np.uint8)
-        size_px = self._current().size_px if self._accumulation else self._shown.size_px
-        return image if self._shown.size_px == size_px else stretch_image(image, size_px)
+        image, drawn_px = self._screen.read(), self._screen.shown.size_px
+        size_px = self._accumulation.size_px if self._accumulation else drawn_px
+        return image if drawn_px == size_px else stretch_image(image, size_px)
 
     def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
         """The picture at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
-        assert self._shown is not None, "render first"
-        framebuffer = self._shown.image.framebuffer
-        x, y = (min(max(int(at * size), 0), size - 1) for at, size in zip((u, 1 - v), framebuffer.size))
-        red, green, blue = framebuffer.read((x, y, 1, 1), components=3, alignment=1)
-        return red, green, blue
+        return self._screen.read_pixel(u, v)
 
     def release(self) -> None:
         """Free every GL object."""
         self._stop_picture()
         self.programs.release()
         self._accumulator.release()
-        for targets in self._targets.values():
-            targets.release()
-        self._targets.clear()
-        self._shown = None
-        for field in (self.field, self._stand_in):
-            if field is not None:
-                field.release()
-        self.field = self._stand_in = None
+        self._screen.release()
+        self._fields.release()
 
     def _current(self) -> ProgressiveAccumulation:
         assert self._accumulation is not None, "render first"
         return self._accumulation
 
-    def _open_field(self) -> LightFieldTexture:
-        """What is drawn."""
-        return self._stand_in or self._loaded_field()
-
-    def _loaded_field(self) -> LightFieldTexture:
-        if self.field is None:
-            raise ValueError("no light field is open")
-        return self.field
-
-    def _targets_of(self, size_px: ScreenSize) -> RenderTargets:
-        """Those of this size; beside them only the ones that were asked for last are kept."""
-        targets = self._targets.pop(size_px, None) or RenderTargets(self.ctx, size_px, TILE_PX)
-        while len(self._targets) >= KEPT_SIZES:
-            oldest = self._targets.pop(next(iter(self._targets)))
-            self._shown = None if self._shown is oldest else self._shown
-            oldest.release()
-        self._targets[size_px] = targets
-        return targets
-
     def _accumulation_of(
         self, optics: Optics, size_px: ScreenSize, level: QualityLevel, part: TargetWindow = WHOLE_PICTURE
     ) -> ProgressiveAccumulation:
-        field = self._open_field()
+        field = self._fields.drawn
         whole_width_px = round(size_px[0] / part.width)
         lens = replace(lens_of(optics, field, whole_width_px, self.prefilter, level), part=part)
         count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
@@ -365,13 +310,14 @@ class Renderer:
     def _draw(self, budget_s: float, passes: int) -> None:
         accumulation = self._current()
         sample_s = self._refining_s * math.prod(accumulation.size_px)
-        targets = self._targets_of(accumulation.size_px)
-        self._accumulator.sum_up(self._open_field(), accumulation, targets, passes, budget_s, sample_s)
+        targets = self._screen.targets_of(accumulation.size_px)
+        self._accumulator.sum_up(self._fields.drawn, accumulation, targets, passes, budget_s, sample_s)
 
     def _finish(self, framebuffer: moderngl.Framebuffer | None) -> None:
-        targets = self._targets_of(self._current().size_px)
+        targets = self._screen.targets_of(self._current().size_px)
         self._accumulator.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
-        self._shown, self.passes_shown = targets, self._current().pass_index
+        self._screen.show(targets)
+        self.passes_shown = self._current().pass_index
 
     def _stop_picture(self) -> None:
         if self._picture is not None:
@@ -379,7 +325,7 @@ class Renderer:
             self._picture = None
 
     def _work(self, optics: Optics, size_px: ScreenSize, part: TargetWindow, level: QualityLevel) -> DrawCost:
-        field = self._open_field()
+        field = self._fields.drawn
         lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), self.prefilter, level)
         samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []
         return DrawCost(
@@ -394,28 +340,3 @@ class Renderer:
     def _learn(self, samples: int, seconds: float) -> None:
         in_all = max(self.samples_converged, samples)
         self.report = DrawReport(samples, in_all, 1e3 * seconds, self._errors.estimate)
-
-
-def scale_size(size_px: ScreenSize, scale: float) -> ScreenSize:
-    """That size times scale, at least one pixel."""
-    width, height = size_px
-    return ScreenSize(max(round(width * scale), 1), max(round(height * scale), 1))
-
-
-def _field_that_fits(
-    ctx: moderngl.Context, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool
-) -> tuple[LightFieldTexture, str]:
-    """Room for as many views as the driver can hold, and a sentence where that is not all."""
-    note = ""
-    for stride in range(1, max(grid) + 1):
-        try:
-            return LightFieldTexture(ctx, grid, width, height, hdr, with_disparity, stride), note
-        except InputError as error:
-            if stride == max(grid):
-                raise
-            note = f"showing every {_ordinal(stride + 1)} view across and down: {error}"
-    raise AssertionError("the last try returns or raises")
-
-
-def _ordinal(number: int) -> str:
-    return f"{number}{ {2: 'nd', 3: 'rd'}.get(number, 'th') }"

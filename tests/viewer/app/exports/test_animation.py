@@ -16,6 +16,7 @@ from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.animation import optics_on_path
 from viewer.app.exports.source import ExportSource
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.export_kinds import EXPORTS
 from viewer.model.export_settings import settle
 from viewer.model.layout import ScreenSize
@@ -33,7 +34,7 @@ def path_of(source: ExportSource, **options: Any) -> list[Optics]:
 
 
 def expected_frames(source: ExportSource) -> list[np.ndarray]:
-    return [source.draw(optics, SIZE).astype(int) for optics in path_of(source, frames=COUNT)]
+    return [source.draw(RenderSettings(optics, SIZE)).astype(int) for optics in path_of(source, frames=COUNT)]
 
 
 def video_frames(path: Path) -> tuple[list[np.ndarray], float, str]:

@@ -18,6 +18,7 @@ from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.cameras import cameras_of
 from viewer.app.exports.source import ExportSource
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
 
@@ -96,7 +97,7 @@ def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp
     count = 96 * 64
     assert len(vertex) > count, "behind the square"
     colors = np.column_stack([vertex[f"f_dc_{i}"] for i in range(3)]) * 0.28209479177387814 + 0.5
-    shown = source.draw(Optics(), ScreenSize(96, 64)).reshape(-1, 3) / 255
+    shown = source.draw(RenderSettings(Optics(), ScreenSize(96, 64))).reshape(-1, 3) / 255
     assert np.abs(colors[:count] - shown).max() < 1.6 / 255
     opacity = 1 / (1 + np.exp(-np.asarray(vertex["opacity"])))
     assert 0.9 < opacity.min() <= opacity.max() < 1
@@ -116,7 +117,7 @@ def test_point_cloud(source: ExportSource, tmp_path: Path) -> None:
     assert [p.name for p in cloud.properties] == ["x", "y", "z", "red", "green", "blue"]
     for axis, sign in (("x", 1), ("y", -1), ("z", -1)):
         np.testing.assert_allclose(cloud[axis], sign * np.asarray(splats[axis]))
-    shown = source.draw(Optics(), ScreenSize(96, 64)).reshape(-1, 3).astype(int)
+    shown = source.draw(RenderSettings(Optics(), ScreenSize(96, 64))).reshape(-1, 3).astype(int)
     colors = np.column_stack([cloud[name] for name in ("red", "green", "blue")]).astype(int)
     assert np.abs(colors[: len(shown)] - shown).max() <= 1
 
@@ -179,7 +180,7 @@ def test_a_picture_with_its_depth_beside_it(
     source: ExportSource, tmp_path: Path, kind: str, picture: tuple[slice, ...], depth: tuple[slice, ...]
 ) -> None:
     pixels = np.asarray(Image.open(exported(source, kind, tmp_path / "a.png")))
-    assert np.abs(pixels[picture].astype(int) - source.draw(Optics(), ScreenSize(96, 64))).max() <= 1
+    assert np.abs(pixels[picture].astype(int) - source.draw(RenderSettings(Optics(), ScreenSize(96, 64)))).max() <= 1
     assert (pixels[depth].min(), pixels[depth].max()) == (0, 255)
     assert pixels[depth][32, 48, 0] == 255, "the square in the middle is near"
 
@@ -188,7 +189,7 @@ def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
     epi = np.asarray(Image.open(exported(source, "epi", tmp_path / "a.png", row=32))).astype(int)
     assert epi.shape == (3, 96, 3)
     for line, s in zip(epi, (-1.0, 0.0, 1.0)):
-        shown = source.draw(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64))[32].astype(int)
+        shown = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64)))[32].astype(int)
         assert np.abs(line - shown).max() <= 1
     with pytest.raises(InputError, match="rows 0 to 63"):
         exported(source, "epi", tmp_path / "b.png", row=64)

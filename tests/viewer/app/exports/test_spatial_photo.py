@@ -14,6 +14,7 @@ from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.types import ViewOffset
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.source import ExportSource
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
 
@@ -23,7 +24,7 @@ def test_both_pictures_are_what_the_renderer_shows(source: ExportSource, tmp_pat
     file = pillow_heif.open_heif(path)
     assert (len(file), file.primary_index) == (2, 0)
     for picture, s in zip(file, (-1.0, 1.0)):
-        expected = source.draw(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64)).astype(int)
+        expected = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64))).astype(int)
         assert np.abs(np.asarray(picture).astype(int) - expected).mean() < 3
     assert read_photo(path).size == (64, 96), "as an ordinary photo it is the left picture"
 

@@ -17,6 +17,7 @@ from iibr_core.runtime.tiling import Cancelled
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.source import ExportSource
 from viewer.app.exports.stack import aperture_sweep, focal_stack
+from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
 
@@ -31,7 +32,7 @@ def test_folder(source: ExportSource, tmp_path: Path, kind: str) -> None:
     names = {path.name for path in folder.iterdir()}
     assert names == {"all_in_focus.png", "disparity.pfm", *(f"{name}.png" for name, _ in stack)}
     for name, optics in (*stack, ("all_in_focus", Optics(focus_disparity=0.2))):
-        assert np.array_equal(np.asarray(Image.open(folder / f"{name}.png")), source.draw(optics, SIZE))
+        assert np.array_equal(np.asarray(Image.open(folder / f"{name}.png")), source.draw(RenderSettings(optics, SIZE)))
     disparity = read_pfm(folder / "disparity.pfm")
     low, high = source.scene.disparity_range_px
     assert (disparity.min(), disparity.max()) == (pytest.approx(low), pytest.approx(high))
@@ -44,7 +45,7 @@ def test_tiffs_have_16_bits(source: ExportSource, tmp_path: Path, kind: str) -> 
     assert {path.name for path in folder.iterdir()} == {"disparity.pfm", *(f"{name}.tif" for name, _ in stack)}
     for name, optics in stack:
         pixels = tifffile.imread(folder / f"{name}.tif")
-        expected = srgb_from_linear(source.draw(optics, SIZE, is_linear=True)) * 65535
+        expected = srgb_from_linear(source.draw(RenderSettings(optics, SIZE, is_linear=True))) * 65535
         assert pixels.dtype == np.uint16
         np.testing.assert_allclose(pixels, expected, atol=1)
 
@@ -56,7 +57,7 @@ def test_parts_of_an_exr_are_linear_light(source: ExportSource, tmp_path: Path, 
     for index, (name, optics) in enumerate(stack):
         part = oiio.ImageBuf(str(path), index, 0)
         assert part.spec().get_string_attribute("oiio:subimagename") == name
-        expected = source.draw(optics, SIZE, is_linear=True)
+        expected = source.draw(RenderSettings(optics, SIZE, is_linear=True))
         np.testing.assert_allclose(part.get_pixels(oiio.FLOAT)[..., :3], expected, rtol=1e-3, atol=1e-5)
         assert ("disparity" in part.spec().channelnames) == (name == "all_in_focus")
 
