@@ -2,36 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.jobs import Failed, ProgressReport
-from viewer.background.read_ahead import PhotoAhead, PhotosAhead, photos_within_budget
+from viewer.background.read_ahead import PhotoAhead, ReadAhead, WantedPhoto, photos_within_budget, read_whole_photo
 from viewer.background.scene_worker import (
     PhotosFound,
     SceneReady,
     SceneRequest,
     SceneResult,
     SceneWorker,
-    Sketched,
-    SketchWorker,
     ViewReady,
+    sketch_of,
 )
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify, OpenFailed, OpenPath, ProgressMade, SceneOpened
 from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
-from viewer.model.reducers.folder import photos_ahead
+from viewer.model.reducers.folder import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DepthSettings, DropStroke
 from viewer.model.state.folder import ShowFilmstrip
 from viewer.model.state.notices import Notice
 from viewer.model.state.scene import Source, source_beside
 
+SKETCHES_FIRST = 2
+"""A photo and its next are there in small before all of it is read: who goes on quickly meets no work to be stopped."""
+
 
 class SceneLoader:
-    """Everything is called from the one GL thread. ahead: photos that are read before they are asked for."""
+    """Everything is called from the one GL thread. ahead, sketches: photos that are read before they are asked for, and
+    in small.
+    """
 
     def __init__(
         self,
@@ -41,14 +46,14 @@ class SceneLoader:
         wake: Callable[[], None],
     ) -> None:
         """set_title: of the window that shows the scene. wake: called, in another thread, when there is a result."""
-        self.ahead = PhotosAhead(wake)
+        self.ahead = ReadAhead("iibr-ahead", wake, read_whole_photo)
+        self.sketches = ReadAhead("iibr-sketches", wake, sketch_of)
         self._scene_view = scene_view
         self._inspection_view = inspection_view
         self._set_title = set_title
         self._worker = SceneWorker(wake)
-        self._sketches = SketchWorker(wake)
         self._preview = DepthPreview(scene_view)
-        self._submitted = self._to_sketch = self._sketched = 0
+        self._submitted = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
 
@@ -62,9 +67,7 @@ class SceneLoader:
 
     def take_results(self, state: AppState) -> list[Action]:
         """The worker's results, as actions; the one place where they arrive."""
-        actions: list[Action] = []
-        while (sketch := self._sketches.next_result()) is not None:
-            actions += self._take_sketch(sketch, state)
+        actions = self._show_sketch(state)
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._take(result, state)
         return actions
@@ -83,6 +86,7 @@ class SceneLoader:
     def advance(self, state: AppState) -> None:
         """Ask for what the state wants now, if that is news, and for what is likely to be wanted next."""
         self._cancel(state)
+        self._read_sketches(state)
         is_wanted = state.generation not in (self._submitted, state.stopped)
         if is_wanted and state.source is not None and state.stroke is None:
             self._load(state, state.source)  # with a stroke under way it will be another one
@@ -91,13 +95,15 @@ class SceneLoader:
     def close(self) -> None:
         """Stop making and reading."""
         self._worker.close()
-        self._sketches.close()
+        self.sketches.close()
         self.ahead.close()
 
-    def _take_sketch(self, sketch: Sketched, state: AppState) -> list[Action]:
-        self._sketched = sketch.generation
-        is_news = self._scene_view.generation != sketch.generation == state.generation
-        return self._take(sketch.ready, state) if is_news and sketch.ready is not None else []
+    def _show_sketch(self, state: AppState) -> list[Action]:
+        """What was asked for, in small, as long as nothing else of it is there."""
+        if state.source is None or self._scene_view.generation == state.generation or self._reuses_photo(state):
+            return []
+        sketch = self.sketches.get(WantedPhoto(state.source, state.depth_strength))
+        return self._take(replace(sketch, generation=state.generation), state) if sketch is not None else []
 
     def _take(self, result: SceneResult, state: AppState) -> list[Action]:
         match result:
@@ -127,7 +133,6 @@ class SceneLoader:
         """What the user stopped, and what is wanted no more."""
         if state.stopped == state.generation != self._stopped:
             self._worker.cancel()
-            self._sketches.cancel()
             self._stopped = state.stopped
         if self._scene_view.generation == state.generation < self._submitted:
             self._worker.cancel()  # another file was being read, and will not be opened: what is here is whole
@@ -135,30 +140,24 @@ class SceneLoader:
 
     def _load(self, state: AppState, source: Source) -> None:
         """A new generation is a new job. The photo is read again only if another one was opened."""
-        scene = state.scene
-        loaded = self._scene_view.loaded if scene and scene.source is source else None
-        if loaded is None and (self._awaits_sketch(state, source) or self.ahead.is_reading(source)):
-            return
-        ahead = self.ahead.take(source, state.depth_strength) if loaded is None else None
-        if loaded is None:
+        loaded, plan = self._scene_view.loaded, None
+        if not self._reuses_photo(state):
             self._keep_left(state)
+            self._worker.cancel()
+            photo = WantedPhoto(source, state.depth_strength)
+            ahead = self.ahead.get(photo)
+            if ahead is None and (self.ahead.is_reading(photo) or not self._has_sketches(state)):
+                return
+            loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (None, None)
         self._submitted, self._depth_settings = state.generation, depth_settings_for_worker(state)
-        loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (loaded, None)
         self._worker.submit(
             SceneRequest(state.generation, source, state.depth_strength, loaded, self._depth_settings, plan=plan)
         )
 
-    def _awaits_sketch(self, state: AppState, source: Source) -> bool:
-        """Whether the photo is still being made ready to be shown in small. That comes first, and has the processor for
-        itself; it is not made where all of the photo was read before.
-        """
-        if source in self.ahead.ready:
-            return False
-        if self._to_sketch != state.generation:
-            self._to_sketch = state.generation
-            self._worker.cancel()
-            self._sketches.submit(SceneRequest(state.generation, source, state.depth_strength))
-        return self._sketched != state.generation and not self._sketches.is_lost
+    def _reuses_photo(self, state: AppState) -> bool:
+        """Whether the photo that is asked for is open, and all of it was read."""
+        scene = state.scene
+        return scene is not None and scene.source is state.source and self._scene_view.loaded is not None
 
     def _keep_left(self, state: AppState) -> None:
         """The photo that is left may be gone back to."""
@@ -166,11 +165,39 @@ class SceneLoader:
         if scene is None or scene.plan is None or loaded is None:
             return
         if loaded.depth_settings == DepthSettings(scene.source.depth.refine):
-            self.ahead.keep(PhotoAhead(scene.source, state.depth_strength, loaded, scene.plan))
+            self.ahead.keep(WantedPhoto(scene.source, state.depth_strength), PhotoAhead(loaded, scene.plan))
+
+    def _read_sketches(self, state: AppState) -> None:
+        """Of what is asked for and what is likely to be next. While the open photo's views are made they can wait."""
+        if _is_whole(state) and not state.progress.is_complete:
+            return
+        self.sketches.want(_photos_to_sketch(state) if state.stopped != state.generation else ())
+
+    def _has_sketches(self, state: AppState) -> bool:
+        return all(map(self.sketches.is_settled, _photos_to_sketch(state)[:SKETCHES_FIRST]))
 
     def _read_ahead(self, state: AppState) -> None:
-        """What is likely to be opened next, once there is something to look at."""
-        scene = state.scene
-        if scene is not None and scene.source is state.source and not scene.is_sketch:
-            wanted = photos_ahead(state)[: photos_within_budget(scene)]
-            self.ahead.want(wanted, state.depth_strength)
+        """What is likely to be opened next, once all of this photo is there; on the way to it nothing is begun."""
+        if state.scene is None or state.source is None:
+            return
+        photos = _wanted(state, (state.source, *photos_ahead(state, AHEAD)))
+        if _is_whole(state):
+            self.ahead.want(photos[1 : 1 + photos_within_budget(state.scene)])
+        else:
+            is_begun = self.ahead.is_reading(photos[0])
+            self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_settled, photos)])
+
+
+def _is_whole(state: AppState) -> bool:
+    """Whether all of what is asked for is read and shown."""
+    scene = state.scene
+    return scene is not None and scene.source is state.source and not scene.is_sketch
+
+
+def _photos_to_sketch(state: AppState) -> list[WantedPhoto]:
+    """What is asked for, and what is likely to be next."""
+    return [] if state.source is None else _wanted(state, (state.source, *photos_ahead(state, SKETCHED_AHEAD)))
+
+
+def _wanted(state: AppState, sources: Iterable[Source]) -> list[WantedPhoto]:
+    return [WantedPhoto(source, state.depth_strength) for source in sources]

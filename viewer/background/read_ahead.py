@@ -1,35 +1,47 @@
-"""The next photos of a folder, read and planned before they are asked for, as many as fit the memory budget."""
+"""Photos read before they are asked for: in small, to be shown at once, and whole, as many as fit the memory budget."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
 
 from iibr_core.generation.memory_model import KEPT_BYTES, READING_BYTES, budget_of, whole_bytes
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
-from viewer.background.jobs import Failed, Job, JobThread
+from iibr_core.runtime.tiling import ShouldStop
+from viewer.background.jobs import Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto, load_photo, make_plan
 from viewer.model.state.scene import Scene, Source
+
+Read = TypeVar("Read")
+
+
+class WantedPhoto(NamedTuple):
+    """A photo, its views planned with this depth strength."""
+
+    source: Source
+    depth_strength: float
+
+
+_Job = Job[WantedPhoto, tuple[WantedPhoto, Read | None]]
 
 
 @dataclass(frozen=True, eq=False)
 class PhotoAhead:
-    """A photo that is ready to be shown: read, its depth found, its views planned with this depth strength."""
+    """A photo that is ready to be shown: read, its depth found, its views planned."""
 
-    source: Source
-    depth_strength: float
     loaded: LoadedPhoto
     plan: ScenePlan
 
 
-@dataclass(frozen=True, eq=False)
-class AheadRequest:
-    """A photo to be read."""
-
-    source: Source
-    depth_strength: float
+def read_whole_photo(wanted: WantedPhoto, should_stop: ShouldStop) -> PhotoAhead:
+    """All of a photo. Raises InputError, and Cancelled once should_stop is true."""
+    loaded = load_photo(wanted.source, should_stop)
+    plan = make_plan(wanted.source, loaded, wanted.depth_strength)
+    give_back_memory()
+    return PhotoAhead(loaded, plan)
 
 
 def photos_within_budget(scene: Scene) -> int:
@@ -42,70 +54,61 @@ def photos_within_budget(scene: Scene) -> int:
     return max(math.floor((room - pixels * READING_BYTES) / (pixels * KEPT_BYTES)), 0)
 
 
-class PhotosAhead:
+class ReadAhead(Generic[Read]):
     """Reads what it is told to want, one after the other, and keeps that until it is taken or wanted no more."""
 
-    def __init__(self, wake: Callable[[], None]) -> None:
-        """wake: called, in the reading thread, when a photo was read."""
-        self._thread: JobThread[AheadRequest, PhotoAhead | Failed[Source]] = JobThread(
-            "iibr-ahead", wake, _read, lambda request, message: Failed(request.source, message)
-        )
-        self._ready: dict[Source, PhotoAhead] = {}
-        self._failed: set[Source] = set()
-        self._reading: Source | None = None
+    def __init__(
+        self, name: str, wake: Callable[[], None], read: Callable[[WantedPhoto, ShouldStop], Read | None]
+    ) -> None:
+        """name: of the thread that reads. wake: called there when a photo was read. read: gives None where there is
+        nothing to be had; errors mean the same: opening the photo will say why.
+        """
 
-    @property
-    def ready(self) -> tuple[Source, ...]:
-        """What is here to be taken."""
-        self._take_results()
-        return tuple(self._ready)
+        def read_one(job: _Job[Read]) -> Iterator[tuple[WantedPhoto, Read | None]]:
+            yield job.request, read(job.request, job.should_stop)
 
-    def want(self, sources: Sequence[Source], depth_strength: float) -> None:
-        """Read these, the first first; drop all others."""
+        self._thread = JobThread(name, wake, read_one, lambda wanted, message: (wanted, None))
+        self._known: dict[WantedPhoto, Read | None] = {}
+        self._reading: WantedPhoto | None = None
+
+    def want(self, wanted: Sequence[WantedPhoto]) -> None:
+        """Read these, the first first, and at once: another one that is being read can wait. Drop all others."""
         self._take_results()
-        strength = depth_strength
-        self._ready = {s: p for s, p in self._ready.items() if s in sources and p.depth_strength == strength}
-        self._failed.intersection_update(sources)
-        if self._reading is not None and self._reading not in sources:
+        self._known = {photo: read for photo, read in self._known.items() if photo in wanted}
+        missing = [photo for photo in wanted if photo not in self._known]
+        may_go_on = missing[:1] if missing[:1] == [*wanted[:1]] else missing
+        if self._reading is not None and self._reading not in may_go_on:
             self._thread.cancel()
             self._reading = None
-        missing = [s for s in sources if s not in self._ready and s not in self._failed]
         if self._reading is None and missing and not self._thread.is_lost:
             self._reading = missing[0]
-            self._thread.submit(AheadRequest(missing[0], strength))
+            self._thread.submit(missing[0])
 
-    def keep(self, photo: PhotoAhead) -> None:
-        """One that was read already may be wanted again."""
-        self._ready[photo.source] = photo
-
-    def take(self, source: Source, depth_strength: float) -> PhotoAhead | None:
-        """What was read of this, if it was; it is kept here no longer."""
+    def is_settled(self, photo: WantedPhoto) -> bool:
+        """Whether there is no use in waiting for it: it was read, or cannot be."""
         self._take_results()
-        photo = self._ready.pop(source, None)
-        return photo if photo is not None and photo.depth_strength == depth_strength else None
+        return photo in self._known or self._thread.is_lost
 
-    def is_reading(self, source: Source) -> bool:
+    def is_reading(self, photo: WantedPhoto) -> bool:
         """Whether it is under way."""
         self._take_results()
-        return self._reading == source and not self._thread.is_lost
+        return self._reading == photo and not self._thread.is_lost
+
+    def get(self, photo: WantedPhoto) -> Read | None:
+        """What was read of it, if it was."""
+        self._take_results()
+        return self._known.get(photo)
+
+    def keep(self, photo: WantedPhoto, read: Read) -> None:
+        """One that was read already may be wanted again."""
+        self._known[photo] = read
 
     def close(self) -> None:
         """Stop reading."""
         self._thread.close()
-        self._ready.clear()
+        self._known.clear()
 
     def _take_results(self) -> None:
         while (result := self._thread.next_result()) is not None:
             self._reading = None
-            if isinstance(result, Failed):
-                self._failed.add(result.id)  # opening it will say why
-            else:
-                self._ready[result.source] = result
-
-
-def _read(job: Job[AheadRequest, PhotoAhead | Failed[Source]]) -> Iterator[PhotoAhead]:
-    source, strength = job.request.source, job.request.depth_strength
-    loaded = load_photo(source, job.should_stop)
-    plan = make_plan(source, loaded, strength)
-    give_back_memory()
-    yield PhotoAhead(source, strength, loaded, plan)
+            self._known[result[0]] = result[1]

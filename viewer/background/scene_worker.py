@@ -32,6 +32,7 @@ from viewer.background.loaded_photo import (
     sketch_photo,
 )
 from viewer.background.photo_folder import first_photo
+from viewer.background.read_ahead import WantedPhoto
 from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.optics import CENTRE
@@ -63,14 +64,6 @@ class SceneReady:
     scene: Scene
     loaded: LoadedPhoto | None
     centre: ViewUpdate
-
-
-@dataclass(frozen=True, eq=False)
-class Sketched:
-    """The scene in small, None where there is no need of that or no way to it."""
-
-    generation: int
-    ready: SceneReady | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,16 +112,6 @@ class SceneWorker(JobThread[SceneRequest, SceneResult]):
         return results_of(job.request, job.should_stop, lambda: self.eye, report_progress)
 
 
-class SketchWorker(JobThread[SceneRequest, Sketched]):
-    """Has photos shown in small before they are read: one answer a request. In a thread of its own, as the scene's may
-    take its time to stop.
-    """
-
-    def __init__(self, wake: Callable[[], None]) -> None:
-        """wake: called, in the thread, when a result was posted."""
-        super().__init__("iibr-sketch", wake, _sketch, lambda request, message: Sketched(request.generation, None))
-
-
 def _failure(request: SceneRequest, message: str) -> Failed[int]:
     return Failed(request.generation, message)
 
@@ -153,22 +136,20 @@ def results_of(
         give_back_memory()
 
 
-def _sketch(job: Job[SceneRequest, Sketched]) -> Iterator[Sketched]:
-    yield sketch_of(job.request, job.should_stop)
+def sketch_of(wanted: WantedPhoto, should_stop: ShouldStop = never) -> SceneReady | None:
+    """A large photo in small, of generation 0; None where it cannot be read so: reading all of it will tell why.
 
-
-def sketch_of(request: SceneRequest, should_stop: ShouldStop = never) -> Sketched:
-    """A large photo in small; nothing where it cannot be read so: reading all of it will tell why."""
-    path = Path(request.source.path)
+    Raises Cancelled once should_stop is true.
+    """
+    source = wanted.source
     with suppress(InputError):
-        loaded = None if is_light_field(path) else sketch_photo(request.source, should_stop)
+        loaded = None if is_light_field(Path(source.path)) else sketch_photo(source, should_stop)
         if loaded is not None:
-            plan = make_plan(request.source, loaded, request.depth_strength)
-            scene = scene_of_photo(request.source, loaded, plan)
+            plan = make_plan(source, loaded, wanted.depth_strength)
+            scene = scene_of_photo(source, loaded, plan)
             scene = replace(scene, notes=(), depth_origin=None, depth_source="being looked for", is_sketch=True)
-            ready = SceneReady(request.generation, scene, None, _centre_view(loaded, plan))
-            return Sketched(request.generation, ready)
-    return Sketched(request.generation, None)
+            return SceneReady(0, scene, None, _centre_view(loaded, plan))
+    return None
 
 
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:

@@ -13,7 +13,9 @@ from iibr_core.types import GridShape
 from tests.viewer.background.test_scene_worker import write_large_jpeg
 from tests.viewer.conftest import Driver, write_scene
 from viewer.background import scene_worker
+from viewer.background.read_ahead import WantedPhoto
 from viewer.model.actions import OpenPath
+from viewer.model.state.folder import StepPhoto
 from viewer.model.state.scene import Source
 
 Opener = Callable[..., Driver]
@@ -45,7 +47,8 @@ def test_a_folder_opens_at_its_first_photo_with_all_of_them_in_small(viewer: Dri
 
 
 def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Driver, tmp_path: Path) -> None:
-    viewer.until(lambda app: any(source.path.endswith("photo1.png") for source in app.scene_loader.ahead.ready))
+    next_photo = WantedPhoto(Source(str(tmp_path / "photo1.png"), grid=GridShape(3, 3)), 1.0)
+    viewer.until(lambda app: app.scene_loader.ahead.get(next_photo) is not None)
     (tmp_path / "photo1.png").write_bytes(b"no photo any more")  # so that what is shown now was read before
     viewer.send("key", "Page_Down")
     shows(viewer, "photo1")
@@ -83,6 +86,22 @@ def test_the_next_photo_is_there_in_small_before_the_one_before_stops(
     driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
     may_stop.set()
     driver.until(lambda app: not app.state.scene.is_sketch)
+
+
+def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_window: Opener, tmp_path: Path) -> None:
+    paths = [write_large_jpeg(tmp_path, f"photo{i}") for i in range(3)]
+    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    last = WantedPhoto(Source(str(paths[2]), grid=GridShape(3, 3)), 1.0)
+    driver.until(lambda app: app.scene_loader.sketches.get(last) is not None)
+    for path in paths[1:]:
+        path.write_bytes(b"no photo any more")
+    driver.app.do(StepPhoto(2))
+    driver.app.step()
+    scene, drawn = driver.app.state.scene, driver.app.scene_view.picture_drawn
+    assert scene is not None
+    assert (scene.name, scene.is_sketch) == ("photo2", True)
+    assert drawn is not None
+    assert drawn.generation == driver.app.state.generation
 
 
 def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:

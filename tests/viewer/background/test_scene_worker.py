@@ -18,6 +18,7 @@ from tests.viewer.background.test_light_field_job import showings
 from viewer.background.jobs import QUEUED_RESULTS, Failed
 from viewer.background.light_field_job import UNKNOWN_DISPARITY_RANGE_PX
 from viewer.background.loaded_photo import sketch_photo
+from viewer.background.read_ahead import WantedPhoto
 from viewer.background.scene_worker import (
     SceneReady,
     SceneRequest,
@@ -90,18 +91,19 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
     assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
 
 
-def write_large_jpeg(folder: Path) -> Path:
+def write_large_jpeg(folder: Path, name: str = "large") -> Path:
     """A photo that takes a while to read."""
     rows, columns = np.mgrid[:1200, :1600]
     pixels = np.stack([rows % 256, columns % 256, (rows // 100 + columns // 100) % 2 * 200], axis=2)
-    Image.fromarray(pixels.astype(np.uint8)).save(folder / "large.jpg")
-    return folder / "large.jpg"
+    path = folder / f"{name}.jpg"
+    Image.fromarray(pixels.astype(np.uint8)).save(path)
+    return path
 
 
 def test_a_large_jpeg_has_a_sketch(tmp_path: Path) -> None:
-    request = SceneRequest(1, Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3)))
-    sketch = sketch_of(request).ready
-    whole = next(results_of(request, lambda: False, lambda: CENTRE))
+    source = Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3))
+    sketch = sketch_of(WantedPhoto(source, 1.0))
+    whole = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
     assert isinstance(whole, SceneReady)
     assert sketch is not None
     assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
@@ -122,7 +124,7 @@ def test_what_is_read_in_no_time_or_taken_literally_has_no_sketch(tmp_path: Path
 def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) -> None:
     path = write_large_jpeg(tmp_path)
     path.write_bytes(path.read_bytes()[:20_000])
-    assert sketch_of(SceneRequest(1, Source(str(path)))).ready is None
+    assert sketch_of(WantedPhoto(Source(str(path)), 1.0)) is None
     with pytest.raises(InputError, match=r"large\.jpg"):
         list(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.viewer.model.test_reducers import scene_of
 from viewer.model.actions import OpenPath, SceneOpened
-from viewer.model.reducers.folder import filmstrip_range, in_order, photos_ahead
+from viewer.model.reducers.folder import AHEAD, filmstrip_range, in_order, photos_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import FolderListed, FolderPhoto, ScrollFilmstrip, SetFolderOrder, StepPhoto
@@ -69,10 +69,10 @@ def test_a_walk_through_a_folder_leaves_one_recent_file() -> None:
 
 def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step() -> None:
     state = state_at("IMG_10.jpg")
-    assert [source.path[8:] for source in photos_ahead(state)] == ["IMG_11.jpg", "img_9.jpg", "Ä.png"]
+    assert [source.path[8:] for source in photos_ahead(state, AHEAD)] == ["IMG_11.jpg", "img_9.jpg", "Ä.png"]
     back = reduce(reduce(state, StepPhoto(1)), StepPhoto(-1))
-    assert [source.path[8:] for source in photos_ahead(back)] == ["img_9.jpg", "IMG_11.jpg"]
-    assert photos_ahead(AppState()) == ()
+    assert [source.path[8:] for source in photos_ahead(back, AHEAD)] == ["img_9.jpg", "IMG_11.jpg"]
+    assert photos_ahead(AppState(), AHEAD) == ()
 
 
 @pytest.mark.parametrize(

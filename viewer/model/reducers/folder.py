@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
@@ -13,6 +13,8 @@ from viewer.model.state.scene import Source, source_beside
 
 AHEAD = (1, -1, 2)
 """Photos read ahead, in steps on in the direction of the last step, the likeliest first."""
+SKETCHED_AHEAD = (1, 2, -1, 3, -2)
+"""The same, in small: one may go on before any of them is read whole."""
 
 
 def list_folder(state: AppState, path: str, photos: Iterable[FolderPhoto]) -> AppState:
@@ -55,10 +57,10 @@ def is_stepped_to(folder: PhotoFolder | None, source: Source) -> bool:
     return folder is not None and str(PurePath(folder.path) / folder.stepped_to) == source.path
 
 
-def photos_ahead(state: AppState) -> tuple[Source, ...]:
-    """What will be wanted soon, the likeliest first."""
+def photos_ahead(state: AppState, places: Sequence[int]) -> tuple[Source, ...]:
+    """What will be wanted soon, the likeliest first. places: so many steps on in the direction of the last."""
     step = state.folder.step if state.folder is not None else 1
-    found = (photo_after(state, step * steps) for steps in AHEAD)
+    found = (photo_after(state, step * steps) for steps in places)
     return tuple(dict.fromkeys(source for source in found if source is not None))
 
 

@@ -1,0 +1,118 @@
+"""Photos read before they are asked for: in which order, what gives way to what, what is forgotten."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.types import InputError
+from viewer.background.read_ahead import ReadAhead, WantedPhoto
+from viewer.model.state.scene import Source
+
+DEADLINE_S = 60.0
+
+
+def photo(name: str, depth_strength: float = 1.0) -> WantedPhoto:
+    return WantedPhoto(Source(name), depth_strength)
+
+
+A, B, C, BAD = (photo(name) for name in ("a", "b", "c", "bad"))
+
+
+class Shelf:
+    """Reads names. begun: in this order; a photo that is `held` is not finished before it is let go."""
+
+    def __init__(self) -> None:
+        self._woken, self._may_go_on = threading.Semaphore(0), threading.Event()
+        self.begun: list[str] = []
+        self.held = ""
+        self.ahead = ReadAhead("test", self._woken.release, self._read)
+
+    def _read(self, wanted: WantedPhoto, should_stop: ShouldStop) -> str:
+        name = wanted.source.path
+        self.begun.append(name)
+        self._woken.release()
+        if name == "bad":
+            raise InputError("bad: no photo")
+        if name == self.held:
+            assert self._may_go_on.wait(DEADLINE_S)
+            raise_if_stopped(should_stop)
+        return f"{name} {wanted.depth_strength:g}"
+
+    def let_go(self) -> None:
+        self.held = ""
+        self._may_go_on.set()
+
+    def want_until_settled(self, *wanted: WantedPhoto) -> None:
+        self.ahead.want(wanted)
+        while not all(map(self.ahead.is_settled, wanted)):
+            assert self._woken.acquire(timeout=DEADLINE_S), "the reader went silent"
+            self.ahead.want(wanted)
+
+    def want_until_begun(self, name: str, *wanted: WantedPhoto) -> None:
+        self.ahead.want(wanted)
+        while name not in self.begun:
+            assert self._woken.acquire(timeout=DEADLINE_S), "the reader went silent"
+            self.ahead.want(wanted)
+
+
+@pytest.fixture
+def shelf() -> Iterator[Shelf]:
+    made = Shelf()
+    yield made
+    made.let_go()
+    made.ahead.close()
+
+
+def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_more(shelf: Shelf) -> None:
+    shelf.want_until_settled(B, A)
+    shelf.want_until_settled(A, B, C)
+    assert shelf.begun == ["b", "a", "c"]
+    assert [shelf.ahead.get(wanted) for wanted in (A, B, C)] == ["a 1", "b 1", "c 1"]
+    shelf.ahead.want([C])
+    assert [shelf.ahead.get(wanted) for wanted in (A, B, C)] == [None, None, "c 1"]
+    assert not shelf.ahead.is_settled(A)
+
+
+def test_what_was_planned_with_another_strength_is_another_photo(shelf: Shelf) -> None:
+    shelf.want_until_settled(A, photo("a", 0.5))
+    assert (shelf.ahead.get(A), shelf.ahead.get(photo("a", 0.5))) == ("a 1", "a 0.5")
+
+
+def test_what_cannot_be_read_is_settled_and_not_tried_again(shelf: Shelf) -> None:
+    shelf.want_until_settled(BAD, A)
+    shelf.want_until_settled(A, BAD)
+    assert shelf.ahead.get(BAD) is None
+    assert shelf.begun == ["bad", "a"]
+
+
+@pytest.mark.parametrize("wanted", [(B, A), (B,)], ids=["first", "alone"])
+def test_what_is_wanted_first_does_not_wait_for_another(shelf: Shelf, wanted: tuple[WantedPhoto, ...]) -> None:
+    shelf.held = "a"
+    shelf.want_until_begun("a", A)
+    shelf.ahead.want(wanted)
+    assert shelf.ahead.is_reading(B)
+    shelf.let_go()
+    shelf.want_until_settled(*wanted)
+    assert shelf.begun == ["a", "b", *("a" for photo in wanted if photo is A)]
+
+
+def test_what_is_being_read_goes_on_while_the_first_is_there(shelf: Shelf) -> None:
+    shelf.want_until_settled(A)
+    shelf.held = "b"
+    shelf.want_until_begun("b", A, B)
+    shelf.ahead.want([A, C, B])
+    assert shelf.ahead.is_reading(B)
+    shelf.let_go()
+    shelf.want_until_settled(A, C, B)
+    assert shelf.begun == ["a", "b", "c"]
+
+
+def test_one_that_was_read_elsewhere_is_kept_as_long_as_it_is_wanted(shelf: Shelf) -> None:
+    shelf.ahead.keep(A, "as it was")
+    shelf.want_until_settled(A, B)
+    assert shelf.ahead.get(A) == "as it was"
+    assert shelf.begun == ["b"]
