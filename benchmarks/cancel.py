@@ -49,9 +49,9 @@ class Watch:
         self._threads.last = time.thread_time()
         return False
 
-    def in_words(self, count: int = 3) -> str:
+    def in_words(self) -> str:
         """The longest pieces in words."""
-        longest = sorted(self.longest_ms.items(), key=lambda item: -item[1])[:count]
+        longest = sorted(self.longest_ms.items(), key=lambda item: -item[1])[:3]
         return ", ".join(f"{ms:.0f} ms before {place}" for place, ms in longest)
 
 

@@ -147,9 +147,9 @@ def judge(truth: Truth, photo: FloatImage, plain: list[ViewUpdate], matt: list[V
     return Verdict(float(ratios["gloss"]), float(ratios["plain"]), *tracks)
 
 
-def off_by(made: float, true: float, reach: float, least_px: float = 1.0) -> str:
+def off_by(made: float, true: float, reach: float) -> str:
     """How far a figure of a track is from the truth; nothing where over the views it comes to less than a pixel."""
-    return f"{abs(made / true - 1):.1%}" if abs(true) * reach > least_px else "-"
+    return f"{abs(made / true - 1):.1%}" if abs(true) * reach > 1 else "-"
 
 
 def encoded(linear: FloatImage) -> FloatImage:

@@ -1,4 +1,4 @@
-"""Light slab <-> Pluecker: rays as lines in space (paper, section 3.1), also those of cameras off the plane.
+"""Light slab -> Pluecker: rays as lines in space (paper, section 3.1), also those of cameras off the plane.
 
 World axes: x right, y down, z away from the cameras, in pixels of the plane z = 1, where disparity is 0. View (t, s)
 stands at (s, t) * VIEW_STEP_PX on the plane z = 0 and sees the world point (X, Y, 1) at pixel (X, Y): a light slab.
@@ -36,42 +36,3 @@ def line_of_pixel(x: ArrayLike, y: ArrayLike, offset: ViewOffset) -> Lines:
     eye = np.array([offset.s, offset.t, 0.0]) * VIEW_STEP_PX
     towards = np.stack([x - eye[0], y - eye[1], np.ones_like(x)], axis=-1)
     return line_of(np.broadcast_to(eye, towards.shape), towards)
-
-
-def pixel_of_line(lines: Lines) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where lines meet the plane z = 1: (x, y), each (N,), the pixel at which any view on such a ray sees it.
-
-    Lines along the plane give infinity or NaN.
-    """
-    return _crossing(lines, 1.0)
-
-
-def offset_of_line(lines: Lines) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where lines meet the plane of the cameras: view offsets (t, s), each (N,)."""
-    x, y = _crossing(lines, 0.0)
-    return y / VIEW_STEP_PX, x / VIEW_STEP_PX
-
-
-def distance_between(one: Lines, other: Lines) -> NDArray[np.float64]:
-    """Least distance (N,) of two lines each; 0 where they meet. Of parallel ones the distance everywhere."""
-    direction, moment, direction_2, moment_2 = one[..., :3], one[..., 3:], other[..., :3], other[..., 3:]
-    across = np.linalg.norm(np.cross(direction, direction_2), axis=-1)
-    mutual = np.abs((direction * moment_2).sum(-1) + (direction_2 * moment).sum(-1))
-    facing = np.sign((direction * direction_2).sum(-1))[..., None]
-    parallel = np.linalg.norm(np.cross(direction, moment - facing * moment_2), axis=-1)
-    return np.where(across > 1e-12, mutual / np.maximum(across, 1e-12), parallel)
-
-
-def depth_of(disparity: ArrayLike) -> NDArray[np.float64]:
-    """Depth z of points of a disparity (px per view step): 1 for 0; infinite where the sight lines are parallel."""
-    with np.errstate(divide="ignore"):
-        return VIEW_STEP_PX / (VIEW_STEP_PX + np.asarray(disparity, np.float64))
-
-
-def _crossing(lines: Lines, z: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where lines meet the plane of this z. The point nearest the origin is d x m."""
-    direction = lines[..., :3]
-    nearest = np.cross(direction, lines[..., 3:])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = (z - nearest[..., 2]) / direction[..., 2]
-        return nearest[..., 0] + along * direction[..., 0], nearest[..., 1] + along * direction[..., 1]

@@ -36,9 +36,9 @@ def scenes_of_folder(folder: Path, max_pixels: int | None, with_soft: bool) -> l
     return [made for scene in known for made in bench_scenes(scene, limit, with_soft)]
 
 
-def made_up_scenes(with_soft: bool, seed: int = 0) -> list[BenchScene]:
+def made_up_scenes(with_soft: bool) -> list[BenchScene]:
     """A ray-cast scene: true disparity, true views, a field of 9x9 views; also with a soft map."""
-    scene = random_scene(np.random.default_rng(seed), MADE_UP_SIZE, MADE_UP_DISPARITY)
+    scene = random_scene(np.random.default_rng(0), MADE_UP_SIZE, MADE_UP_DISPARITY)
     photo, disparity = render(scene, MADE_UP_SIZE, ViewOffset(0.0, 0.0))
     signs = [(t, s) for t in (-MADE_UP_REACH, MADE_UP_REACH) for s in (-MADE_UP_REACH, MADE_UP_REACH)]
     judged = [ViewOffset(t * down, s * across) for down, across in JUDGED_SHARES for t, s in signs]

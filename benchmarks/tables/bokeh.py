@@ -135,7 +135,7 @@ def draw_shot(seed: int, size: ImageSize, rays: int) -> Shot:
     return Shot(photo, maps_of(photo, disparity, rng), tuple(exposures))
 
 
-def trace_lens(scene: RaycastScene, size: ImageSize, lens: ThinLens, rays: int, seed: int = 0) -> FloatImage:
+def trace_lens(scene: RaycastScene, size: ImageSize, lens: ThinLens, rays: int) -> FloatImage:
     """What a thin lens sees (H, W, 3), sRGB-encoded: distributed ray tracing (Cook et al. 1984).
 
     Every ray of a pixel goes through a place of its own in the round aperture and in the pixel's square, and through
@@ -145,7 +145,7 @@ def trace_lens(scene: RaycastScene, size: ImageSize, lens: ThinLens, rays: int, 
 
     y, x = (grid.ravel() for grid in np.indices(size))
     light = np.zeros((len(x), 3))
-    for out, turn, down, right in Sobol(4, rng=seed).random(rays):
+    for out, turn, down, right in Sobol(4, rng=0).random(rays):
         r, angle = lens.radius_views * math.sqrt(out), 2 * math.pi * turn
         at = ViewOffset(r * math.sin(angle), r * math.cos(angle))
         x_there = x + right - 0.5 - lens.focus_disparity * at.s

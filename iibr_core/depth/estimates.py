@@ -23,12 +23,10 @@ class RelativeInverseDepth:
 class MetricDepth:
     """Distance from the camera.
 
-    metres: (H, W) float32, positive. focal_px: the focal length that the estimate goes with, in pixels of a picture
-    this large (W x H), or None where it says nothing about it.
+    metres: (H, W) float32, positive.
     """
 
     metres: FloatImage
-    focal_px: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

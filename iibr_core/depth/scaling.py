@@ -5,7 +5,6 @@ What has no scale of its own is given the parallax that viewing plans for; depth
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -25,21 +24,16 @@ OUTLIER_SPANS = 2.0
 DoubleImage = NDArray[np.float64]
 
 
-def disparity_from(
-    estimate: Estimate, grid: GridShape, baseline_m: float | None = None, focus_m: float = np.inf
-) -> FloatImage:
+def disparity_from(estimate: Estimate, grid: GridShape) -> FloatImage:
     """Disparity (H, W) float32, px per view step of the grid, of an estimate (H, W); NaN where it knows nothing.
 
-    A DisparityMap counts as it is. Metric depth with a focal length and baseline_m (metres between neighbouring views)
-    gives true disparity, 0 at the distance focus_m. All else is linear in inverse depth: between its 1st and 99th
-    percentile lies TOTAL_PARALLAX of the width across the grid, its median stays still, outliers are moved in.
-    Raises InputError if nothing is known, or if baseline or focus are no positive distances.
+    A DisparityMap counts as it is. All else is linear in inverse depth: between its 1st and 99th percentile lies
+    TOTAL_PARALLAX of the width across the grid, its median stays still, outliers are moved in. Raises InputError if
+    nothing is known.
     """
     match estimate:
         case DisparityMap(px_per_view):
             return _not_absurd(px_per_view.astype(np.float64))
-        case MetricDepth(metres, focal_px) if baseline_m is not None and focal_px is not None:
-            return _true_disparity(_inverse(metres), focal_px, baseline_m, focus_m)
         case MetricDepth(metres):
             return _scale_to_viewing_range(_inverse(metres), grid)
         case RelativeInverseDepth(values):
@@ -76,14 +70,6 @@ def _inverse(metres: FloatImage) -> DoubleImage:
     depth = metres.astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         return _finite_or_nan(np.where(depth > 0, 1 / depth, np.nan))
-
-
-def _true_disparity(inverse: DoubleImage, focal_px: float, baseline_m: float, focus_m: float) -> FloatImage:
-    if not (isfinite(baseline_m) and baseline_m > 0):
-        raise InputError(f"baseline {baseline_m} m: give the distance between neighbouring views, such as 0.01")
-    if not focus_m > 0:
-        raise InputError(f"focus distance {focus_m} m: give a positive distance, or infinity")
-    return _not_absurd(focal_px * baseline_m * (inverse - 1 / focus_m))
 
 
 def _not_absurd(disparity: DoubleImage) -> FloatImage:

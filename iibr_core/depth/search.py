@@ -297,16 +297,15 @@ def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
     """The estimate for a picture of another (height, width), surface by surface; lengths in pixels are scaled along."""
     if _values(estimate).shape == size:
         return estimate
-    ratio = size.width / _values(estimate).shape[1]
     match estimate:
         case RelativeInverseDepth(values):
             return RelativeInverseDepth(resample_surfaces(values, size))
-        case MetricDepth(metres, focal_px):
+        case MetricDepth(metres):
             # Surfaces are told apart by inverse distance: what is far would else be all that counts.
-            resampled = np.reciprocal(resample_surfaces(np.reciprocal(metres), size))
-            return MetricDepth(resampled, None if focal_px is None else focal_px * ratio)
+            return MetricDepth(np.reciprocal(resample_surfaces(np.reciprocal(metres), size)))
         case DisparityMap(px_per_view):
-            return DisparityMap(resample_surfaces(px_per_view, size) * np.float32(ratio))
+            ratio = np.float32(size.width / px_per_view.shape[1])
+            return DisparityMap(resample_surfaces(px_per_view, size) * ratio)
 
 
 def _values(estimate: Estimate) -> FloatImage:

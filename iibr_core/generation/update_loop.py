@@ -36,12 +36,7 @@ def render_outer_views(
             yield offset, view
 
 
-def complete_ray_set(
-    rays: RaySet,
-    outer: Iterable[ViewOffset],
-    should_stop: ShouldStop = never,
-    inpainter: Inpainter = fill_background,
-) -> None:
+def complete_ray_set(rays: RaySet, outer: Iterable[ViewOffset], should_stop: ShouldStop = never) -> None:
     """`render_outer_views` for those who want the rays only. Raises Cancelled once should_stop is true."""
-    for _ in render_outer_views(rays, outer, should_stop, inpainter):
+    for _ in render_outer_views(rays, outer, should_stop):
         pass

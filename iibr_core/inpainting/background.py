@@ -59,14 +59,13 @@ def continue_farthest(
     hole: NDArray[np.bool_],
     farthest_views: float,
     should_stop: ShouldStop = never,
-    threads: int = 1,
 ) -> None:
     """The same in a picture of which nobody knows what the photo hides there: the farthest surface around goes on.
 
     farthest_views: surfaces are one that part by less than SURFACE_PX so many view steps away.
     """
     nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
-    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, threads)
+    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, threads=1)
 
 
 def _fill_view(

@@ -70,22 +70,20 @@ def entropy_loss(weights: Tensor) -> Tensor:
     return -(weights * logarithm).sum(dim=-1).mean()
 
 
-def structure_tensor(
-    epi: Tensor, derivative_sigma: float = DERIVATIVE_SIGMA, window_sigma: float = WINDOW_SIGMA
-) -> Tensor:
+def structure_tensor(epi: Tensor) -> Tensor:
     """Structure tensor J = G * (grad epi  grad epi^T) of EPIs (Wanner and Goldluecke, CVPR 2012, section 3).
 
     epi: (E, C, V, W), one row per view along s, or along t. Returns (E, 3, V, W): J_xx, J_xs, J_ss, summed over the
     channels, in colour squared per pixel squared. Where one surface of disparity d is seen,
-    J_xs / J_xx = d. Derivatives are Gaussian derivatives (derivative_sigma), exact for ramps; G is a Gaussian
-    (window_sigma). Both end at 3 sigma; outside the EPI its border repeats. Sigmas in samples: pixels along x, views
+    J_xs / J_xx = d. Derivatives are Gaussian derivatives (DERIVATIVE_SIGMA), exact for ramps; G is a Gaussian
+    (WINDOW_SIGMA). Both end at 3 sigma; outside the EPI its border repeats. Sigmas in samples: pixels along x, views
     along s. One bad number spoils the whole EPI.
     """
-    smooth, slope = _gaussian(derivative_sigma, epi), _gaussian_derivative(derivative_sigma, epi)
+    smooth, slope = _gaussian(DERIVATIVE_SIGMA, epi), _gaussian_derivative(DERIVATIVE_SIGMA, epi)
     x = _correlate(epi, along_s=smooth, along_x=slope)
     s = _correlate(epi, along_s=slope, along_x=smooth)
     products = torch.stack([(x * x).sum(dim=1), (x * s).sum(dim=1), (s * s).sum(dim=1)], dim=1)
-    window = _gaussian(window_sigma, epi)
+    window = _gaussian(WINDOW_SIGMA, epi)
     return _correlate(products, along_s=window, along_x=window)
 
 

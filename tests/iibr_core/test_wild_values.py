@@ -436,7 +436,6 @@ ELEMENTWISE = {
     "color.encoded_from_stored": lambda x: color.encoded_from_stored(x.astype(np.float16)),
     "color.linear_from_srgb": color.linear_from_srgb,
     "color.srgb_from_linear": color.srgb_from_linear,
-    "geometry.depth_of": plucker.depth_of,
     "geometry.line_of": lambda x: plucker.line_of(np.stack([x, x, x], -1), np.ones((len(x), 3))),
     "formats.images.oiio_reader.upright": lambda x: oiio_reader.upright(x[None], 2)[0, ::-1],
 }

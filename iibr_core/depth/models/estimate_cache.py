@@ -25,7 +25,11 @@ MAX_BYTES = 512 * 2**20
 FORMAT = "1"
 """Part of every key: raise it when estimates mean something else."""
 
-KINDS = {"relative": RelativeInverseDepth, "metric": MetricDepth, "disparity": DisparityMap}
+KINDS: dict[str, type[RelativeInverseDepth | MetricDepth | DisparityMap]] = {
+    "relative": RelativeInverseDepth,
+    "metric": MetricDepth,
+    "disparity": DisparityMap,
+}
 # What numpy, zipfile and zlib raise for damaged files; RuntimeError: encrypted, or compressed in an unknown way.
 MISREADINGS = (*npy.MISREADINGS, OSError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
@@ -54,12 +58,12 @@ def load(key: str) -> Estimate | None:
     path = cache_folder() / f"{key}.npz"
     try:
         with np.load(path, allow_pickle=False) as kept:
-            kind, values, focal_px = str(kept["kind"]), np.array(kept["values"], np.float32), float(kept["focal_px"])
+            kind, values = str(kept["kind"]), np.array(kept["values"], np.float32)
         if values.ndim != 2:
             return None
         with contextlib.suppress(OSError):
             os.utime(path)  # the least recently used go first
-        return MetricDepth(values, focal_px or None) if kind == "metric" else KINDS[kind](values)
+        return KINDS[kind](values)
     except MISREADINGS:
         return None
 
@@ -72,12 +76,9 @@ def store(key: str, estimate: Estimate) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with atomic_write(folder / f"{key}.npz") as temporary:
             match estimate:
-                case RelativeInverseDepth(values):
-                    np.savez(temporary, kind="relative", values=values, focal_px=0.0)
-                case MetricDepth(values, focal_px):
-                    np.savez(temporary, kind="metric", values=values, focal_px=focal_px or 0.0)
-                case DisparityMap(values):
-                    np.savez(temporary, kind="disparity", values=values, focal_px=0.0)
+                case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
+                    kind = next(name for name, record in KINDS.items() if isinstance(estimate, record))
+                    np.savez(temporary, kind=kind, values=values)
         _make_room(folder)
 
 

@@ -48,9 +48,7 @@ def _unidepth(model: LocalModel, photo: Photo) -> MetricDepth:
     network = importlib.import_module("unidepth.models").UniDepthV2.from_pretrained(str(model.folder)).eval()
     with torch.inference_mode():
         said = network.infer(torch.from_numpy(bytes_from_encoded(photo.pixels)).permute(2, 0, 1))
-    return MetricDepth(
-        _positive(_array(said["depth"]).squeeze()), float(_array(said["intrinsics"]).reshape(3, 3)[0, 0])
-    )
+    return MetricDepth(_positive(_array(said["depth"]).squeeze()))
 
 
 def _moge(model: LocalModel, photo: Photo) -> MetricDepth:
@@ -59,8 +57,7 @@ def _moge(model: LocalModel, photo: Photo) -> MetricDepth:
     network = importlib.import_module("moge.model.v2").MoGeModel.from_pretrained(str(model.folder)).eval()
     with torch.inference_mode():
         said = network.infer(torch.from_numpy(np.clip(photo.pixels, 0, 1)).permute(2, 0, 1))
-    # MoGe's intrinsics count in widths of the picture.
-    return MetricDepth(_positive(_array(said["depth"])), float(_array(said["intrinsics"])[0, 0]) * photo.size.width)
+    return MetricDepth(_positive(_array(said["depth"])))
 
 
 def _array(said: Any) -> FloatImage:

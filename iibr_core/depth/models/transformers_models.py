@@ -248,7 +248,7 @@ def _depth_pro_estimate(canonical: FloatImage, field_of_view: Any) -> Estimate:
         return RelativeInverseDepth(canonical)
     width = canonical.shape[1]
     focal_px = width / 2 / math.tan(math.radians(float(field_of_view[0])) / 2)
-    return MetricDepth(1 / np.clip(canonical * np.float32(width / focal_px), *INVERSE_LIMITS), focal_px)
+    return MetricDepth(1 / np.clip(canonical * np.float32(width / focal_px), *INVERSE_LIMITS))
 
 
 def _require_weights(folder: Path) -> None:

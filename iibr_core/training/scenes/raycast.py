@@ -49,6 +49,8 @@ PRIMITIVE = np.dtype(
 CHUNK_PIXELS = 4096
 FARTHEST = 1e7
 """Positions (px) and view offsets are cast no farther out than this."""
+SAME_SURFACE_PX = 1e-3
+"""Disparities that differ by no more are of one point."""
 STEEPEST = 0.5
 """A surface seen at a smaller cosine than this gets a coarser pattern; above, the samples of a pixel average it."""
 TENT_STEPS = sqrt(6.0)
@@ -125,16 +127,15 @@ def is_visible_from(
     disparity: ArrayLike,
     offset: ViewOffset,
     other: ViewOffset = ViewOffset(0.0, 0.0),  # noqa: B008 (immutable)
-    tolerance_px: float = 1e-3,
 ) -> NDArray[np.bool_]:
     """(N,): whether the points at (x, y) with this disparity in one view are seen from another, in frame or not.
 
-    True disocclusion is its negation. tolerance_px: of disparity.
+    True disocclusion is its negation.
     """
     x, y, d = (np.asarray(a, np.float64) for a in (x, y, disparity))
     across, down = offset.s - other.s, offset.t - other.t
     there = disparity_at(scene, x + d * across, y + d * down, other)
-    return np.abs(there - d) <= tolerance_px
+    return np.abs(there - d) <= SAME_SURFACE_PX
 
 
 def _clamp_finite(values: ArrayLike) -> NDArray[np.float64]:

@@ -38,18 +38,9 @@ def test_a_grid_of_one_view_is_no_division_by_zero() -> None:
     assert np.isfinite(disparity_from(RelativeInverseDepth(ramp()), GridShape(1, 1))).all()
 
 
-def test_metric_depth_with_focal_length_and_baseline_is_true_disparity() -> None:
-    metres = np.array([[1.0, 2.0], [4.0, np.inf]], np.float32)
-    got = disparity_from(MetricDepth(metres, 800.0), GRID, baseline_m=0.01, focus_m=2.0)
-    np.testing.assert_allclose(got, [[4.0, 0.0], [-2.0, -4.0]], atol=1e-6)
-
-
-@pytest.mark.parametrize(("focal_px", "baseline_m"), [(None, None), (800.0, None), (None, 0.01)])
-def test_metric_depth_without_one_of_them_is_spread_by_inverse_depth(
-    focal_px: float | None, baseline_m: float | None
-) -> None:
+def test_metric_depth_is_spread_by_inverse_depth() -> None:
     inverse = ramp() + 0.5
-    got = disparity_from(MetricDepth(1 / inverse, focal_px), GRID, baseline_m)
+    got = disparity_from(MetricDepth(1 / inverse), GRID)
     np.testing.assert_allclose(got, disparity_from(RelativeInverseDepth(inverse), GRID), atol=1e-4)
 
 
@@ -103,20 +94,14 @@ def test_rounding_is_no_depth() -> None:
     "estimate",
     [
         RelativeInverseDepth(np.full((3, 3), np.nan, np.float32)),
-        MetricDepth(np.array([[0, -1, np.nan]], np.float32), 10.0),
+        MetricDepth(np.array([[0, -1, np.nan]], np.float32)),
         DisparityMap(np.full((2, 2), np.inf, np.float32)),
         RelativeInverseDepth(np.zeros((0, 4), np.float32)),
     ],
 )
 def test_nothing_known_is_told(estimate: RelativeInverseDepth | MetricDepth | DisparityMap) -> None:
     with pytest.raises(InputError, match="knows no value"):
-        disparity_from(estimate, GRID, 0.01)
-
-
-@pytest.mark.parametrize(("baseline_m", "focus_m"), [(0.0, 1.0), (-0.1, 1.0), (np.nan, 1.0), (0.1, 0.0), (0.1, np.nan)])
-def test_bad_distances_are_told(baseline_m: float, focus_m: float) -> None:
-    with pytest.raises(InputError, match="m: give"):
-        disparity_from(MetricDepth(np.ones((2, 2), np.float32), 100.0), GRID, baseline_m, focus_m)
+        disparity_from(estimate, GRID)
 
 
 @settings(max_examples=60)

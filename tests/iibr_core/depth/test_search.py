@@ -268,9 +268,8 @@ def test_lengths_in_pixels_scale_with_the_picture() -> None:
     disparity = resize_estimate(DisparityMap(halves), ImageSize(4, 4))
     assert isinstance(disparity, DisparityMap)
     np.testing.assert_array_equal(disparity.px_per_view[0], [2, 2, 8, 8])
-    metric = resize_estimate(MetricDepth(halves, 10.0), ImageSize(4, 4))
+    metric = resize_estimate(MetricDepth(halves), ImageSize(4, 4))
     assert isinstance(metric, MetricDepth)
-    assert metric.focal_px == 20
     np.testing.assert_allclose(metric.metres[0], [1, 1, 4, 4])
     relative = resize_estimate(RelativeInverseDepth(halves), ImageSize(4, 4))
     assert isinstance(relative, RelativeInverseDepth)
