@@ -85,7 +85,7 @@ def open_with_depth(
     there is none; Cancelled where should_stop says so.
     """
     choice, path = choice or DepthChoice(), Path(path)
-    photo = read_photo(path, max_pixels, keeps_primaries=True)
+    photo = read_photo(path, max_pixels, keeps_primaries=True, should_stop=should_stop)
     search = _DepthSearch(path, photo, choice, max_pixels, should_stop, report_progress)
     if choice.file is not None:
         return _finish(search.of_file(Path(choice.file)), choice, grid, should_stop)

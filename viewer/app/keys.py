@@ -20,11 +20,14 @@ ARROW_STEP_VIEWS = 0.5
 
 @dataclass(frozen=True)
 class Keys:
-    """The keys of this frame that mean something: arrows as a view offset, Esc, and commands by name."""
+    """The keys of this frame that mean something: arrows as a view offset, Esc, and commands by name; repeats: those of
+    them whose keys are held since an earlier frame.
+    """
 
     arrows: ViewOffset = CENTRE
     is_escape: bool = False
     commands: tuple[str, ...] = ()
+    repeats: frozenset[str] = frozenset()
 
 
 def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
@@ -35,7 +38,9 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     if keys.is_escape:
         actions += _escape_actions(state)
     is_typing = state.prompt is not None and not isinstance(state.prompt, str)
+    shows_photo = state.shown_generation == state.generation
     commands = [BY_NAME[name] for name in keys.commands]
+    commands = [c for c in commands if shows_photo or not (c.awaits_photo and c.name in keys.repeats)]
     actions += [command.action(state) for command in commands if not is_typing or command.chords[0].ctrl]
     if any(keys.arrows) and not is_typing:
         eye = state.optics.eye
@@ -84,11 +89,11 @@ def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys
 
     held_now = bool(io.key_ctrl or io.key_super), bool(io.key_shift)
 
-    def is_struck(chord: Chord) -> bool:
+    def is_struck(chord: Chord, repeats: bool = True) -> bool:
         holds = struck.get(chord.key.lstrip("_"), held_now) == (chord.ctrl, chord.shift)
         if chord.key == "space":
             return holds and imgui.is_key_released(imgui.Key.space) and not used_space
-        return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key))
+        return holds and imgui.is_key_pressed(getattr(imgui.Key, chord.key), repeats)
 
     down = pressed(imgui.Key.down_arrow) - pressed(imgui.Key.up_arrow)
     right = pressed(imgui.Key.right_arrow) - pressed(imgui.Key.left_arrow)
@@ -102,8 +107,9 @@ def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys
         return imgui.get_key_pressed_amount(key, io.key_repeat_delay, io.key_repeat_rate)
 
     commands = tuple(command.name for command in COMMANDS for _ in range(strikes(command)))
+    repeats = frozenset(name for name in commands if not any(is_struck(c, False) for c in BY_NAME[name].chords))
     is_escape = bool(imgui.is_key_pressed(imgui.Key.escape, False))
     if is_escape and imgui.is_popup_open("", imgui.PopupFlags_.any_popup):  # a drop-down, and nothing under it
         imgui.internal.close_popup_to_level(0, True)
         is_escape = False
-    return Keys(ViewOffset(float(down), float(right)), is_escape, commands)
+    return Keys(ViewOffset(float(down), float(right)), is_escape, commands, repeats)

@@ -44,8 +44,8 @@ class FilmstripView:
         self._unreadable: set[str] = set()
         self._asked: tuple[str, ...] = ()
 
-    def thumbnails(self, paths: tuple[str, ...]) -> dict[str, Thumbnail]:
-        """Those of these photos that are there by now; the others are being read."""
+    def thumbnails(self, paths: tuple[str, ...]) -> dict[str, Thumbnail | None]:
+        """Those of these photos that are there by now, None of what cannot be read; the others are being read."""
         if not paths:
             return {}
         self._texture = self._texture or ThumbnailTexture(self._ctx)
@@ -57,7 +57,7 @@ class FilmstripView:
         if missing and not set(missing) <= set(self._asked):
             self._asked = missing
             self._thread.submit(ThumbnailRequest(missing))
-        return {path: thumbnail for path, thumbnail in found.items() if thumbnail is not None}
+        return {path: found[path] for path in paths if found[path] is not None or path in self._unreadable}
 
     def release(self) -> None:
         """Stop reading and free the texture."""

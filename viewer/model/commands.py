@@ -114,13 +114,15 @@ class Chord:
 @dataclass(frozen=True)
 class Command:
     """One thing that can be done. action: of the state in which it was asked for. is_held: it goes on while its keys
-    are held, as often in a second however long a frame takes.
+    are held, as often in a second however long a frame takes. awaits_photo: it goes on then when the photo asked for
+    before is shown.
     """
 
     name: str
     action: Callable[[AppState], Action]
     chords: tuple[Chord, ...] = ()
     is_held: bool = False
+    awaits_photo: bool = False
 
 
 def _always(action: Action) -> Callable[[AppState], Action]:
@@ -180,8 +182,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Copy the picture", _always(DoTask(CopyTask())), (Chord("c", ctrl=True),)),
     Command("Paste a picture, or the path of one", _always(DoTask(PasteTask())), (Chord("v", ctrl=True),)),
     Command("Keep these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
-    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),)),
-    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),)),
+    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), awaits_photo=True),
+    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), awaits_photo=True),
     Command("Filmstrip", lambda state: ShowFilmstrip(not state.preferences.shows_filmstrip), (Chord("f"),)),
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),

@@ -21,7 +21,7 @@ from viewer.ui.overlays.reticle import overlays
 from viewer.ui.panel import panel
 from viewer.ui.style import pack_color, palette_of
 
-NO_THUMBNAILS: Mapping[str, Thumbnail] = MappingProxyType({})
+NO_THUMBNAILS: Mapping[str, Thumbnail | None] = MappingProxyType({})
 
 
 def build_screen(
@@ -29,7 +29,7 @@ def build_screen(
     layout: Layout,
     picture_texture: int | None,
     textures: InspectionTextures = NO_INSPECTION_TEXTURES,
-    thumbnails: Mapping[str, Thumbnail] = NO_THUMBNAILS,
+    thumbnails: Mapping[str, Thumbnail | None] = NO_THUMBNAILS,
 ) -> list[Action]:
     """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up. textures:
     what inspection shows. thumbnails: of the filmstrip, by path.

@@ -16,6 +16,7 @@ from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.color_profile import color_profile_of
 from iibr_core.formats.images.oiio_reader import Raster, full_scale
 from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize
 
 BAND_ROWS = 32
@@ -41,17 +42,19 @@ class OddValues(NamedTuple):
     largest: float
 
 
-def downsampled_linear(open_rows: Callable[[], Rows], size: ImageSize) -> tuple[FloatImage, bool, OddValues]:
+def downsampled_linear(
+    open_rows: Callable[[], Rows], size: ImageSize, should_stop: ShouldStop = never
+) -> tuple[FloatImage, bool, OddValues]:
     """A picture's linear light over black at a smaller (height, width): (H, W, 3), whether it is opaque, and what of it
     was not finite: NaN counts as black, infinity as the largest value there is.
 
     open_rows: gives the picture from its first row on; asked again where infinity is met, as what replaces it is not
-    known before the end. Raises InputError as reading its rows does.
+    known before the end. Raises InputError as reading its rows does, Cancelled once should_stop is true.
     """
     averages = _Averages(open_rows(), size)
-    result = averages.result()
+    result = averages.result(should_stop)
     if averages.has_infinity:
-        result = _Averages(open_rows(), size, _instead_of_infinity(averages.odd.largest)).result()
+        result = _Averages(open_rows(), size, _instead_of_infinity(averages.odd.largest)).result(should_stop)
     return result, averages.is_opaque, averages.odd
 
 
@@ -101,7 +104,7 @@ class _Averages:
         self.is_opaque, self.has_infinity, self.odd = True, False, OddValues(0, -math.inf)
         self._seen = 0
 
-    def result(self) -> FloatImage:
+    def result(self, should_stop: ShouldStop) -> FloatImage:
         height, stored = self._size.height, self._rows.size
         result, row_step = np.empty((*self._size, 3), np.float32), stored.height / height
         most_rows = max(1, int(MOST_ROWS_PIXELS / stored.width / row_step))
@@ -110,6 +113,7 @@ class _Averages:
             # Areas are counted from the band's first row of the file, however few of its rows are there at a time.
             band = _rows_under(top, bottom, height, stored.height)
             for first in range(top, bottom, most_rows):
+                raise_if_stopped(should_stop)
                 last = min(first + most_rows, bottom)
                 lines = range(first - top, last - top)
                 here = _rows_under(first, last, height, stored.height)

@@ -23,6 +23,7 @@ from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attri
 from iibr_core.formats.images.oiio_writer import PNG_SETTINGS, write_image_file
 from iibr_core.formats.images.picture_source import PictureSource, read_source
 from iibr_core.formats.images.side_by_side import own_picture
+from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
@@ -37,15 +38,16 @@ def read_photo(
     max_pixels: int = DEFAULT_MAX_PIXELS,
     fov_deg: float = DEFAULT_FOV_DEG,
     keeps_primaries: bool = False,
+    should_stop: ShouldStop = never,
 ) -> Photo:
     """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads), HEIC or AVIF as a photo, upright,
     max_pixels large at most; of two pictures side by side, as their file's name says, the left eye's.
 
     fov_deg: horizontal field of view where the file gives no focal length. keeps_primaries: the photo stays in the
     colour space of its file, else it is converted to sRGB, which cuts off what that lacks. Raises InputError, naming
-    the file, if it is missing, no picture, cut off, or absurdly large.
+    the file, if it is missing, no picture, cut off, or absurdly large; Cancelled once should_stop is true.
     """
-    return read_picture(own_picture(Path(path)), max_pixels, fov_deg, keeps_primaries)
+    return read_picture(own_picture(Path(path)), max_pixels, fov_deg, keeps_primaries, should_stop)
 
 
 def read_picture(
@@ -53,6 +55,7 @@ def read_picture(
     max_pixels: int = DEFAULT_MAX_PIXELS,
     fov_deg: float = DEFAULT_FOV_DEG,
     keeps_primaries: bool = False,
+    should_stop: ShouldStop = never,
 ) -> Photo:
     """Read any picture of a file, as `read_photo` does."""
     if max_pixels < 1:
@@ -64,7 +67,8 @@ def read_picture(
     if size == stored_size:
         encoded, is_opaque, odd = _encode(rows.read(0, size.height))
     else:
-        linear, is_opaque, odd = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(source), size)
+        averaged = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(source), size, should_stop)
+        linear, is_opaque, odd = averaged
         encoded = _encode_in_place(linear)
     space = color_space_of(spec)
     if not keeps_primaries:

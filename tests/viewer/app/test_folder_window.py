@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from imgui_bundle import imgui
+from PIL import ImageGrab
 
 from iibr_core.types import GridShape
 from tests.viewer.background.test_scene_worker import write_large_jpeg
 from tests.viewer.conftest import Driver, write_scene
+from viewer.app.main_loop import App
 from viewer.background import scene_worker
 from viewer.background.read_ahead import WantedPhoto
 from viewer.model.actions import OpenPath
@@ -29,6 +33,18 @@ def viewer(open_window: Opener, tmp_path: Path) -> Driver:
     driver.until(lambda app: app.state.folder is not None)
     driver.until_idle()
     return driver
+
+
+def bad_tile(app: App) -> np.ndarray | None:
+    """The middle tile of three, as it is on the screen; None without filmstrip."""
+    strip = app.layout().filmstrip
+    if strip is None:
+        return None
+    left, middle, width = app.window.place[0], strip.x + strip.width / 2, strip.height  # type: ignore[index]
+    top = app.window.place[1] + strip.y  # type: ignore[index]
+    screen = ImageGrab.grab(xdisplay=os.environ["DISPLAY"])
+    box = left + middle - width / 2, top + 8, left + middle + width / 2, top + strip.height - 8
+    return np.asarray(screen.crop(tuple(map(round, box))))  # type: ignore[arg-type]
 
 
 def shows(driver: Driver, name: str) -> None:
@@ -102,6 +118,42 @@ def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_windo
     assert (scene.name, scene.is_sketch) == ("photo2", True)
     assert drawn is not None
     assert drawn.generation == driver.app.state.generation
+
+
+def test_a_held_key_shows_every_photo_that_it_asks_for(open_window: Opener, tmp_path: Path) -> None:
+    for i in range(8):
+        write_large_jpeg(tmp_path, f"photo{i}")
+    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver.until(lambda app: app.state.folder is not None)
+    asked, shown = set[int](), set[int]()
+
+    def is_at_the_last(app: App) -> bool:
+        drawn = app.scene_view.picture_drawn
+        asked.add(app.state.generation)
+        shown.add(drawn.generation if drawn is not None else 0)
+        return app.state.scene is not None and app.state.scene.name == "photo7" and app.state.generation in shown
+
+    driver.send("keydown", "Page_Down")
+    driver.until(is_at_the_last)
+    driver.send("keyup", "Page_Down")
+    assert len(asked) > 7
+    assert asked <= shown
+
+
+def test_a_photo_that_cannot_be_read_has_its_name_in_the_filmstrip(open_window: Opener, tmp_path: Path) -> None:
+    write_scene(tmp_path, "photo0")
+    write_scene(tmp_path, "photo2")
+    bad = tmp_path / "photo1.jpg"
+    bad.write_bytes(b"no photo")
+    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver.until(lambda app: bad_tile(app) is not None)
+    driver.until(lambda app: app._filmstrip.thumbnails((str(bad),)) == {str(bad): None})
+    driver.until_idle()
+    assert (bad_tile(driver.app).max(axis=2) > 150).sum() > 20  # letters
+    driver.send("key", "Page_Down")
+    driver.until(lambda app: any("photo1.jpg" in notice.text for notice in app.state.notices))
+    driver.send("key", "Page_Down")
+    shows(driver, "photo2")
 
 
 def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:

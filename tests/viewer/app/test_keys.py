@@ -13,6 +13,7 @@ from viewer.model.actions import Action, AskToSave, SetFullscreen, ShowPrompt, U
 from viewer.model.commands import BY_NAME
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.folder import StepPhoto
 from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
 from viewer.model.state.optics import MoveEye, ResetOptics
 from viewer.model.state.prompts import PalettePrompt
@@ -49,6 +50,16 @@ def test_what_is_typed_too_early_is_no_command() -> None:
     keys = Keys(arrows=ViewOffset(1, 0), commands=("Keep this state to compare", "Save the picture…"))
     assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [AskToSave()]
     assert len(actions_from_keys(keys, replace(STATE, prompt="welcome"))) == 3
+
+
+def test_a_held_key_goes_on_to_the_next_photo_once_the_one_before_is_shown() -> None:
+    name = "Next photo of the folder"
+    pressed, held = Keys(commands=(name,)), Keys(commands=(name,), repeats=frozenset({name}))
+    waiting = replace(STATE, generation=STATE.shown_generation + 1)
+    assert actions_from_keys(held, STATE) == actions_from_keys(pressed, waiting) == [StepPhoto(1)]
+    assert actions_from_keys(held, waiting) == []
+    undo = Keys(commands=("Undo",), repeats=frozenset({"Undo"}))
+    assert actions_from_keys(undo, waiting) == [Undo()]
 
 
 def test_arrows() -> None:

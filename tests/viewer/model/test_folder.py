@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from tests.viewer.model.test_reducers import scene_of
-from viewer.model.actions import OpenPath, SceneOpened
+from viewer.model.actions import OpenFailed, OpenPath, SceneOpened, StopWork
 from viewer.model.reducers.folder import AHEAD, filmstrip_range, in_order, photos_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
@@ -65,6 +65,28 @@ def test_a_walk_through_a_folder_leaves_one_recent_file() -> None:
     state = reduce(state, OpenPath(Source("/photos/img_9.jpg")))
     state = reduce(state, SceneOpened(state.generation, scene_of(source=Source("/photos/img_9.jpg"))))
     assert state.recent[:2] == ("/photos/img_9.jpg", "/photos/IMG_11.jpg")
+
+
+def test_a_photo_that_does_not_open_is_told_once_and_passed_by() -> None:
+    state = state_at("img_9.jpg")
+    state = reduce(state, SceneOpened(0, scene_of(source=Source("/photos/img_9.jpg", max_pixels=7))))
+    damaged = reduce(replace(state, source=state.scene.source), StepPhoto(1))  # type: ignore[union-attr]
+    state = reduce(damaged, OpenFailed(damaged.generation, "IMG_10.jpg: damaged"))
+    assert open_name(state) == "img_9.jpg"
+    assert "damaged" in state.notices[-1].text
+    state = reduce(state, StepPhoto(1))
+    assert open_name(state) == "IMG_11.jpg"
+    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
+    assert open_name(reduce(state, StepPhoto(-1))) == "img_9.jpg"
+    assert reduce(damaged, StopWork()).folder.unreadable == frozenset()  # type: ignore[union-attr]
+
+
+def test_steps_end_where_nothing_beyond_can_be_opened() -> None:
+    state = state_at("IMG_11.jpg")
+    assert state.folder is not None
+    state = replace(state, folder=replace(state.folder, unreadable=frozenset({"Ä.png"})))
+    assert reduce(state, StepPhoto(1)) is state
+    assert reduce(state, StepPhoto(9)) is state
 
 
 def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step() -> None:

@@ -41,15 +41,19 @@ def place_of_photo(folder: PhotoFolder, source: Source | None) -> int | None:
 
 
 def photo_after(state: AppState, steps: int) -> Source | None:
-    """What to open so many photos on; None at the folder's ends, and where no photo is open."""
+    """What to open so many photos on, or beyond where that is known as unreadable; None at the folder's ends, and where
+    no photo is open.
+    """
     folder = state.folder
     place = None if folder is None else place_of_photo(folder, state.source)
     if folder is None or place is None:
         return None
-    wanted = min(max(place + steps, 0), len(folder.photos) - 1)
-    if wanted == place:
-        return None
-    return source_beside(state.source, str(PurePath(folder.path) / folder.photos[wanted].name))
+    last = len(folder.photos) - 1
+    wanted = min(max(place + steps, 0), last)
+    beyond = range(wanted, last + 1) if steps > 0 else range(wanted, -1, -1)
+    names = (folder.photos[i].name for i in beyond if i != place)
+    name = next((name for name in names if name not in folder.unreadable), None)
+    return None if name is None else source_beside(state.source, str(PurePath(folder.path) / name))
 
 
 def is_stepped_to(folder: PhotoFolder | None, source: Source) -> bool:

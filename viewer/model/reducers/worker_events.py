@@ -38,7 +38,7 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
             shown = state.progress if state.stopped == state.generation else progress
             return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
-            return _leave_job(add_notice(state, notice_in_window(message, is_error=True)))
+            return _leave_job(add_notice(_mark_unreadable(state), notice_in_window(message, is_error=True)))
 
 
 def stop_work(state: AppState) -> AppState:
@@ -120,6 +120,15 @@ def _offers(scene: Scene) -> tuple[Notice, ...]:
         return (Notice(str(error), is_error=True),)
     words = f"This picture was saved by iibr, with its settings. {unknown_note(settings)}"
     return (Notice(words.strip(), offer=settings),)
+
+
+def _mark_unreadable(state: AppState) -> AppState:
+    """The state that knows that the photo stepped to does not open, if nothing of it is shown."""
+    folder, source, scene = state.folder, state.source, state.scene
+    is_shown = scene is not None and scene.source is source
+    if folder is None or source is None or is_shown or not is_stepped_to(folder, source):
+        return state
+    return replace(state, folder=replace(folder, unreadable=folder.unreadable | {folder.stepped_to}))
 
 
 def _leave_job(state: AppState) -> AppState:

@@ -24,7 +24,8 @@ class PhotoFolder:
     """A folder and its photos, in the order in which one goes through them. step: of the last, 1 or -1.
 
     stepped_to: the name of the photo that the last step asked for, "" before the first. scrolled: the filmstrip
-    shows what lies so many photos after the one that is open.
+    shows what lies so many photos after the one that is open. unreadable: names of those that could not be opened:
+    steps pass them by.
     """
 
     path: str
@@ -32,6 +33,7 @@ class PhotoFolder:
     step: int = 1
     stepped_to: str = ""
     scrolled: int = 0
+    unreadable: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,9 @@ class FolderListed:
 
 @dataclass(frozen=True)
 class StepPhoto:
-    """Open the photo so many after the one that is open; the first or the last where there are not so many."""
+    """Open the photo so many after the one that is open; the first or the last where there are not so many, the one
+    beyond where that could not be opened.
+    """
 
     steps: int
 

@@ -15,6 +15,8 @@ from viewer.model.state.folder import ScrollFilmstrip, StepPhoto, Thumbnail
 from viewer.ui.style import pack_color, palette_of
 
 CELL_ASPECT, ROOM = 1.5, 6.0
+WORDS_SIZE = 0.85
+"""Of words in a cell, against the usual text."""
 
 
 def filmstrip_paths(state: AppState, layout: Layout) -> tuple[str, ...]:
@@ -26,8 +28,8 @@ def filmstrip_paths(state: AppState, layout: Layout) -> tuple[str, ...]:
     return tuple(str(PurePath(folder.path) / folder.photos[i].name) for i in shown)
 
 
-def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnail]) -> list[Action]:
-    """Build the row; a click opens a photo, the wheel goes on in the folder."""
+def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnail | None]) -> list[Action]:
+    """Build the row; a click opens a photo, the wheel goes on in the folder. What cannot be read has its name."""
     rect, folder = layout.filmstrip, state.folder
     if rect is None or folder is None:
         return []
@@ -44,9 +46,14 @@ def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnai
     left = rect.x + (rect.width - len(shown) * (width + room) + room) / 2
     for number, i in enumerate(shown):
         cell = Rect(left + number * (width + room), rect.y + room, width, height)
-        thumbnail = thumbnails.get(str(PurePath(folder.path) / folder.photos[i].name))
-        if _cell(cell, folder.photos[i].name, thumbnail, i == place, state, layout) and place is not None:
+        name = folder.photos[i].name
+        path = str(PurePath(folder.path) / name)
+        thumbnail = thumbnails.get(path)
+        does_open = name not in folder.unreadable
+        if _cell(cell, name, thumbnail, i == place, state, layout) and place is not None and does_open:
             actions.append(StepPhoto(i - place))
+        if thumbnail is None and (path in thumbnails or not does_open):
+            _write(cell, f"Cannot be read: {name}", state)
     wheel = imgui.get_io().mouse_wheel if imgui.is_window_hovered() else 0.0
     if wheel:
         actions.append(ScrollFilmstrip(-round(wheel) or (-1 if wheel > 0 else 1)))
@@ -58,6 +65,15 @@ def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnai
 def _count(rect: Rect, layout: Layout) -> int:
     room = ROOM * layout.ui_scale
     return int((rect.width - room) // ((rect.height - 2 * room) * CELL_ASPECT + room))
+
+
+def _write(cell: Rect, words: str, state: AppState) -> None:
+    """Words in a cell, as far as they fit."""
+    size = WORDS_SIZE * imgui.get_font_size()
+    corner, width = imgui.ImVec2(cell.x + size / 3, cell.y + size / 3), cell.width - size * 2 / 3
+    ends = imgui.ImVec4(cell.x, cell.y, cell.x + cell.width, cell.y + cell.height)
+    color = pack_color(palette_of(state.preferences.theme).text)
+    imgui.get_window_draw_list().add_text(imgui.get_font(), size, corner, color, words, width, ends)
 
 
 def _cell(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, state: AppState, layout: Layout) -> bool:
