@@ -16,7 +16,7 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import crumbs, edge_blur, pictorial_cues, refine, rim_sides, rims, scaling, search
+from iibr_core.depth import crumbs, edge_blur, pictorial_cues, refine, rim_sides, rims, scaling, search, subject
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
@@ -414,6 +414,7 @@ FINITE = {
     "rendering.joined_rays.joined_either_way": lambda v, _: joined_rays.joined_either_way(
         joined_rays.join_rays(depths(v), 0.5, 0.5)
     ),
+    "depth.subject.subject_disparity": lambda v, _: subject.subject_disparity(depths(v)),
     "rendering.disparity_statistics.find_soft_edges": lambda v, _: disparity_statistics.find_soft_edges(depths(v), 0.5),
     "rendering.disparity_statistics.measure_disparity": lambda v, _: (
         disparity_statistics.measure_disparity(depths(v)[None], 1.0).softness

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.color import encoded_from_stored
+from iibr_core.depth.subject import subject_disparity
 from iibr_core.generation.memory_model import Budget, budget_of, require_field, require_matching
 from iibr_core.runtime.machine import memory_bytes
 from iibr_core.runtime.tiling import ShouldStop
@@ -135,7 +136,7 @@ class _Field:
             disparity_range_px=range_px,
             depth_source=origin,
             has_view_disparity=True,
-            subject_disparity_px=median_of_middle(values),
+            subject_disparity_px=subject_disparity(values),
         )
         return Showing(scene, self._views_with(values, is_final, should_stop))
 
@@ -198,7 +199,7 @@ def _scene_as_read(
         is_hdr=field.is_hdr,
         notes=field.notes,
         has_view_disparity=len(field.disparity) == len(field.views),
-        subject_disparity_px=median_of_middle(centre.disparity) if centre.disparity is not None else 0.0,
+        subject_disparity_px=subject_disparity(centre.disparity) if centre.disparity is not None else 0.0,
         given_grid=grid,
     )
 
@@ -221,10 +222,3 @@ def _keep(read: list[ViewUpdate], views: Iterator[ViewUpdate]) -> Iterator[ViewU
 
 def _range_of(values: FloatImage) -> tuple[float, float]:
     return float(values.min()), float(values.max())
-
-
-def median_of_middle(disparity: FloatImage) -> float:
-    """The median of the middle ninth of the picture."""
-    height, width = disparity.shape
-    part = disparity[height // 3 : height - height // 3, width // 3 : width - width // 3]
-    return float(np.median(part))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.generation.plan import ScenePlan
@@ -21,7 +22,7 @@ from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
-from viewer.background.light_field_job import median_of_middle, showings_of_light_field
+from viewer.background.light_field_job import showings_of_light_field
 from viewer.background.loaded_photo import (
     LoadedPhoto,
     apply_depth_settings,
@@ -169,7 +170,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         plan=plan,
         notes=loaded.photo.notes + loaded.disparity.notes + plan.notes,
         focal_px=_known_focal_px(loaded.photo),
-        subject_disparity_px=median_of_middle(plan.field_disparity(loaded.disparity).values),
+        subject_disparity_px=subject_disparity(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
         depth_origin=loaded.origin,
         levels=loaded.levels,
