@@ -39,6 +39,11 @@ class DepthOrigin:
         """The same in one line."""
         return f"Depth: {self.words}."
 
+    @property
+    def advising_line(self) -> str:
+        """The same with the advice; "" where there is none to give."""
+        return f"{self.line} {self.advice}" if self.advice else ""
+
 
 @dataclass(frozen=True)
 class DepthChoice:

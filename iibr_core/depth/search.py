@@ -244,7 +244,7 @@ class _DepthSearch:
 def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
     """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
     photo, origin, inverse_metres = found.photo, found.origin, None
-    notes = origin.failures + ((f"{origin.line} {origin.advice}",) if origin.advice else ())
+    notes = origin.failures + ((origin.advising_line,) if origin.advice else ())
     if isinstance(found.depth, Disparity):
         values, notes, holes = found.depth.values, found.depth.notes + notes, found.depth.unknown
     else:

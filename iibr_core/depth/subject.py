@@ -31,10 +31,11 @@ def subject_disparity(disparity: FloatImage) -> float:
         [int(share * side) for share in shares] for shares, side in ((MIDDLE_ROWS, height), (MIDDLE_COLUMNS, width))
     )
     middle = disparity[rows[0] : rows[1] + 1, columns[0] : columns[1] + 1]
-    known = middle[np.isfinite(middle)]
+    known = middle[np.isfinite(middle)].astype(np.float64)
     if not known.size:
         return 0.0
-    known = np.clip(known.astype(np.float64), *np.percentile(known, (STRAY_PERCENT, 100 - STRAY_PERCENT)))
+    low, high = np.percentile(known, (STRAY_PERCENT, 100 - STRAY_PERCENT))
+    known = np.clip(known, low, high)
     threshold, separation = _otsu(known)
     near = known[known > threshold]
     is_there = separation >= LEAST_SEPARATION and near.size >= LEAST_SHARE * known.size

@@ -73,8 +73,7 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
     else:
         imgui.text_wrapped(state.scene.name)
         quiet(size_text(state.scene))
-        depth_line(state.scene, layout)
-        actions += _progress(state, layout)
+        actions += depth_line(state, state.scene, layout) + _progress(state, layout)
         if state.report is not None:
             quiet(report_text(state.report, state.progress.is_complete))
         actions += _presets(state.scene, layout)
@@ -85,16 +84,15 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
 
 
 def progress_text(progress: Progress) -> str:
-    """The progress in one line, "23 of 81 views, 1.2 s, 3 s left"; empty where nothing was asked for.
-
-    Once all are there: "81 of 81 views, sharpening edges, 2.2 s, 2 s left", as long as some are drafts.
+    """The progress in one short line: "23 of 81 views, 3 s left", "sharpening edges, 2 s left" once all are there and
+    some are drafts, "81 of 81 views, 5 s" at the end; empty where nothing was asked for.
     """
     if not progress.total:
         return progress.doing
-    sharpening = ", sharpening edges" if progress.drafts and progress.done == progress.total else ""
-    words = f"{progress.done} of {view_count_text(progress.total)}{sharpening}, {progress.seconds:.1f} s"
+    is_sharpening = progress.drafts and progress.done == progress.total
+    words = "sharpening edges" if is_sharpening else f"{progress.done} of {view_count_text(progress.total)}"
     left_s = seconds_left(progress)
-    return words if left_s < 1 else f"{words}, {time_text(left_s)} left"
+    return f"{words}, {time_text(left_s)} left" if left_s >= 1 else f"{words}, {time_text(progress.seconds)}"
 
 
 def report_text(report: DrawReport, has_all_views: bool) -> str:
@@ -113,8 +111,10 @@ def seconds_left(progress: Progress) -> float:
 
 
 def time_text(seconds: float) -> str:
-    """Seconds for people: "12 s", "3 min"."""
-    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+    """Seconds for people: "0.2 s", "12 s", "3 min"."""
+    if seconds >= 100:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds:.0f} s" if seconds >= 1 else f"{seconds:.1f} s"
 
 
 def view_count_text(number: int) -> str:

@@ -13,9 +13,11 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver
 from viewer.app.window_slot import STEP
-from viewer.model.actions import AskToSave, Notify, OpenPath, ShowPrompt, StopWork
+from viewer.model.actions import AskToSave, HidePanel, Notify, OpenPath, ShowPrompt, StopWork
 from viewer.model.commands import COMMANDS
+from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.exporting import AskToExport, ExportPrompt
+from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 from viewer.model.state.scene import Source
@@ -51,6 +53,42 @@ def test_arrows_select_a_command_far_down_the_list_and_enter_runs_it(viewer: Dri
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.preferences.font_scale > before)
     assert viewer.app.state.prompt is None
+
+
+def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(viewer: Driver) -> None:
+    """In slow frames: a letter for each of those that it takes to come up."""
+    viewer.app.do(ShowPrompt(PalettePrompt()))
+    for typed in ("d", "i", "f", "f", "er"):
+        imgui.get_io().add_input_characters_utf8(typed)
+        viewer.app.step()
+    viewer.until_idle()
+    assert viewer.app.state.prompt == PalettePrompt("differ")
+    viewer.send("key", "BackSpace")
+    viewer.until(lambda app: app.state.prompt == PalettePrompt("diffe"))
+
+
+def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer: Driver) -> None:
+    for hides_panel in (False, True):
+        viewer.app.do(HidePanel(hides_panel), ShowPrompt("help"))
+        viewer.until_idle()
+        pad, window = imgui.internal.find_window_by_name("prompt str"), viewer.app.layout().window
+        assert (pad.pos.x + pad.size.x, pad.size.y) == (window.width, window.height)
+        assert pad.scroll_max.x == pad.scroll_max.y == 0, "its rows scroll, its button stays"
+        assert pad.size.x == PANEL_WIDTH
+        viewer.press("Close", "prompt str")
+        viewer.until(lambda app: app.state.prompt is None)
+
+
+def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
+    for button in ("Portrait", "Macro"):
+        viewer.find(button)
+        viewer.until_idle()
+        tip = imgui.internal.find_window_by_name("##Tooltip_00")
+        assert tip is not None, button
+        assert tip.active, button
+        assert tip.hidden_frames_can_skip_items <= 0, button
+        viewer.send("mousemove", *viewer.position(0.1, 0.1))
+        viewer.until_idle()
 
 
 def test_up_stays_at_the_first_command_and_typing_begins_there_again(viewer: Driver) -> None:
@@ -174,6 +212,10 @@ def test_a_photo_without_depth_has_a_button_that_opens_a_map(open_window: Opener
     write_image(tmp_path / "alone.png", np.full((64, 96, 3), 100, np.uint8))
     driver = open_window(tmp_path / "alone.png", grid=GridShape(3, 3))
     driver.until_idle()
-    assert not any("--" in notice.text for notice in driver.app.state.notices)
-    driver.press("Open a depth map…", "notices")
+    assert not driver.app.state.notices, "the panel says it, and nothing lies over the picture"
+    driver.press("Open a map…##better")
     driver.until(lambda app: app.state.prompt == PathPrompt("map"))
+    driver.send("key", "Escape")
+    driver.until(lambda app: app.state.prompt is None)
+    driver.press("Get a model…##better")
+    driver.until(lambda app: isinstance(app.state.prompt, ModelsPrompt))

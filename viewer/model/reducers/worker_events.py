@@ -72,7 +72,9 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         history=map_optics(state.history, lambda optics: carry_optics(optics, old, scene)),
         inspection=replace(state.inspection, pair=None, probe=None),
     )
-    notices = (*map(notice_in_window, scene.notes), *_offers(scene))[-NOTICES_KEPT:]
+    said_in_panel = scene.depth_origin.advising_line if scene.depth_origin is not None else ""
+    notes = (notice_in_window(note) for note in scene.notes if note != said_in_panel)
+    notices = (*notes, *_offers(scene))[-NOTICES_KEPT:]
     if old is not None and old.source is scene.source:
         is_whole_now = old.is_sketch and not scene.is_sketch
         return replace(opened, notices=(*state.notices, *notices)[-NOTICES_KEPT:]) if is_whole_now else opened

@@ -40,6 +40,18 @@ def text_field(name: str, text: str, hint: str = "") -> tuple[str, bool]:
     return new, bool(imgui.is_item_deactivated() and is_enter)
 
 
+def search_field(name: str, text: str, hint: str) -> tuple[str, bool]:
+    """The same; it also takes what was typed in the frame before it got the keys, with which it begins."""
+    typed = "".join(map(chr, imgui.get_io().input_queue_characters))
+    new, is_entered = text_field(name, text, hint)
+    if imgui.is_window_appearing():
+        return text + typed, False
+    if text and imgui.is_item_activated():  # ImGui selects all of it, so that what is typed would take its place
+        imgui.internal.get_input_text_state(imgui.get_item_id()).reload_user_buf_and_move_to_end()
+        return text + typed, False
+    return new, is_entered
+
+
 def focus_on_appearing() -> None:
     """What comes next has the keys once the prompt is there."""
     if imgui.is_window_appearing():

@@ -13,7 +13,7 @@ from iibr_core.formats.images.picture_kinds import BEST_QUALITY, KINDS, PROFILES
 from iibr_core.types import SRGB
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
 from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching, recent_commands
-from viewer.model.layout import Layout, ScreenSize
+from viewer.model.layout import PANEL_WIDTH, Layout, ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import GetModelTask, ModelsPrompt
@@ -25,13 +25,15 @@ from viewer.ui.overlays.prompt_rows import (
     prompt_actions,
     prompt_buttons,
     say_problem,
+    search_field,
     size_rows,
     text_field,
 )
 from viewer.ui.widgets import button, gap, label, quiet
 
 Option = TypeVar("Option")
-PROMPT_WIDTH, MODELS_WIDTH, HELP_WIDTH = 460.0, 490.0, 860.0
+PROMPT_WIDTH, MODELS_WIDTH = 460.0, 490.0
+KEYS_WIDTH = 112.0
 ROWS_SHOWN = 12
 MOUSE = (
     ("Drag", "Move the viewpoint"),
@@ -76,14 +78,7 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     prompt = state.prompt
     if prompt is None:
         return []
-    usual = HELP_WIDTH if prompt == "help" else MODELS_WIDTH if isinstance(prompt, ModelsPrompt) else PROMPT_WIDTH
-    width = min(usual * layout.ui_scale, layout.window.width)
-    middle = imgui.ImVec2(max(layout.panel.x, width) / 2, layout.window.height / 2)
-    if prompt == "welcome":  # in a corner: in the middle are faces
-        imgui.set_next_window_pos(imgui.ImVec2(0, 0))
-    else:
-        imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
-    imgui.set_next_window_size(imgui.ImVec2(width, 0))
+    _place(prompt, layout)
     imgui.begin(f"prompt {type(prompt).__name__}", None, _FLAGS)
     # A field that is typed in takes Esc for itself; one Esc is to close all of it.
     is_left = imgui.get_io().want_text_input and imgui.is_key_pressed(imgui.Key.escape, False)
@@ -92,6 +87,25 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     if is_left:
         return [ShowPrompt(None)]
     return actions
+
+
+def _place(prompt: Prompt, layout: Layout) -> None:
+    """In the middle of the picture; what is told at the first start in a corner, as in the middle are faces; the help
+    in the panel's place: it is read while the hand tries it on the picture.
+    """
+    scale, window = layout.ui_scale, layout.window
+    if prompt == "help":
+        imgui.set_next_window_pos(imgui.ImVec2(window.width, 0), 0, imgui.ImVec2(1, 0))
+        width = min(PANEL_WIDTH * scale, window.width)
+        imgui.set_next_window_size_constraints(imgui.ImVec2(width, window.height), imgui.ImVec2(width, window.height))
+        return
+    width = min((MODELS_WIDTH if isinstance(prompt, ModelsPrompt) else PROMPT_WIDTH) * scale, window.width)
+    if prompt == "welcome":
+        imgui.set_next_window_pos(imgui.ImVec2(0, 0))
+    else:
+        middle = imgui.ImVec2(max(layout.panel.x, width) / 2, window.height / 2)
+        imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(imgui.ImVec2(width, 0))
 
 
 def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
@@ -109,7 +123,8 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case "quit":
             return _quit(layout)
         case "help":
-            return _help(layout, [*MOUSE, *((c.chords[0].words, c.name) for c in COMMANDS if c.chords)])
+            keys = ((command.chords[0].words, command.name) for command in COMMANDS if command.chords)
+            return _help(layout, [*MOUSE, *keys], imgui.TableFlags_.scroll_y)
         case "welcome":
             return _help(layout, [*MOUSE[:FIRST_GESTURES], ("F1", "All of mouse and keys")])
 
@@ -227,7 +242,7 @@ def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Act
     """Commands that match what was typed; the arrow keys select one of them, Enter runs it."""
     focus_on_appearing()
     imgui.set_next_item_width(-1)
-    text, entered = text_field("command", prompt.text, "Type a command")
+    text, entered = search_field("command", prompt.text, "Type a command")
     matching = commands_matching(text, recent_commands(state))
     steps = imgui.is_key_pressed(imgui.Key.down_arrow) - imgui.is_key_pressed(imgui.Key.up_arrow)
     selected = min(max((prompt.selected if text == prompt.text else 0) + steps, 0), max(len(matching) - 1, 0))
@@ -260,23 +275,25 @@ def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -
     return pressed
 
 
-def _help(layout: Layout, rows: list[tuple[str, str]]) -> list[Action]:
-    """What the mouse and the keys do, in two columns where there is room."""
+def _help(layout: Layout, rows: list[tuple[str, str]], flags: int = 0) -> list[Action]:
+    """What the mouse and the keys do; the button stays in sight where the rows scroll."""
+    style = imgui.get_style()
+    button_width = imgui.calc_text_size("Close").x + 2 * style.frame_padding.x
+    imgui.align_text_to_frame_padding()
     imgui.text("Mouse and keys")
+    imgui.same_line(imgui.get_window_width() - style.window_padding.x - button_width)
+    is_closed = button("Close", layout)
     gap(layout, 2)
-    across = 2 if imgui.get_content_region_avail().x > 1.5 * PROMPT_WIDTH * layout.ui_scale else 1
-    down = -(-len(rows) // across)
-    if imgui.begin_table("keys", 2 * across, imgui.TableFlags_.sizing_fixed_fit):
-        for i in range(down * across):
-            index = i % across * down + i // across
-            what, meaning = rows[index] if index < len(rows) else ("", "")
+    if imgui.begin_table("keys", 2, flags):
+        imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, KEYS_WIDTH * layout.ui_scale)
+        imgui.table_setup_column("meaning", imgui.TableColumnFlags_.width_stretch)
+        for what, meaning in rows:
             imgui.table_next_column()
-            imgui.text_disabled(what)
+            quiet(what)
             imgui.table_next_column()
-            imgui.text(meaning.rstrip("…"))
+            imgui.text_wrapped(meaning.rstrip("…"))
         imgui.end_table()
-    gap(layout, 2)
-    return [ShowPrompt(None)] if button("Close", layout) else []
+    return [ShowPrompt(None)] if is_closed else []
 
 
 def _quit(layout: Layout) -> list[Action]:

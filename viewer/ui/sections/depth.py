@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
 from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthStrength
-from viewer.model.commands import BRUSH_WORDS
+from viewer.model.commands import BRUSH_WORDS, BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.state.app_state import AppState
@@ -41,16 +41,29 @@ BRUSH_TIPS: dict[BrushTool, str] = {
     "level": "Drag over the picture to give it one depth, up to the photo's edges (B puts the brush away).",
     "fill": "Click a surface to give it one depth, up to edges of the photo and of depth (B puts the bucket away).",
 }
-
+BETTER_DEPTH = (("Open a map…", "Open a depth map…"), ("Get a model…", "Get a depth model…"))
+"""Words on a button, and the command they stand for."""
 TOOLS_A_ROW = 3
 
 
-def depth_line(scene: Scene, layout: Layout) -> None:
-    """Where depth came from, in one line; how to get better depth and what failed come up over it."""
+def depth_line(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Where depth came from, in one line, and what failed; buttons to get better depth where it is poor."""
     origin = scene.depth_origin
     quiet(origin.line if origin is not None else f"Depth: {scene.depth_source}.")
-    if origin is not None:
-        tooltip("\n".join(map(words_in_window, (*origin.failures, origin.advice))).strip(), layout)
+    if origin is None:
+        return []
+    tooltip("\n".join(map(words_in_window, (*origin.failures, origin.advice))).strip(), layout)
+    if not origin.advice:
+        return []
+    actions: list[Action] = []
+    spacing = 4 * layout.ui_scale
+    width = (imgui.get_content_region_avail().x - spacing) / len(BETTER_DEPTH)
+    for i, (words, name) in enumerate(BETTER_DEPTH):
+        if i:
+            imgui.same_line(0, spacing)
+        if button(f"{words}##better", layout, words_in_window(origin.advice), width=width):
+            actions.append(BY_NAME[name].action(state))
+    return actions
 
 
 def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:

@@ -30,7 +30,7 @@ from viewer.ui.widgets import button, checkbox, choice, quiet, slider
 OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "Disparity", "entropy": "Entropy", "inpainted": "Inpainted"}
 EPI_SENTENCE = "Epipolar plane images: one line of the picture from every view, a surface slopes the more the nearer."
 OVERLAY_TIPS: dict[OverlayKind, str] = {
-    "disparity": "How near everything is, in px per view step.",
+    "disparity": "How near everything is, as colours.",
     "entropy": "How undecided the weights of the rays are: 1 where no ray of the photo shows anything.",
     "inpainted": "What the photo never saw and had to be made up.",
 }
