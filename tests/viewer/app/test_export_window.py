@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 from PIL import Image, ImageSequence
 
 from iibr_core.types import GridShape, ViewOffset
@@ -114,6 +115,19 @@ def test_it_is_asked_for_by_key_and_says_what_is_wrong(viewer: Driver, tmp_path:
     assert app.state.prompt is None
     with Image.open(there) as image:
         assert image.size == (192, 64)
+
+
+def test_where_it_goes_is_typed_at_once_and_seen_whole(viewer: Driver, tmp_path: Path) -> None:
+    out = tmp_path / ("a" * 60 + ".gif")
+    viewer.app.do(ShowPrompt(ExportPrompt("gif", "somewhere.gif")))
+    viewer.until_idle()
+    viewer.type(str(out))
+    viewer.until(lambda app: app.state.prompt == ExportPrompt("gif", str(out)))
+    viewer.find("##path", "prompt ExportPrompt")
+    viewer.until_idle()
+    tip = imgui.internal.find_window_by_name("##Tooltip_00")
+    assert tip is not None
+    assert tip.active
 
 
 def test_the_window_asks_for_what_a_kind_can_be_told(viewer: Driver, tmp_path: Path) -> None:

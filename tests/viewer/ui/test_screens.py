@@ -85,7 +85,7 @@ def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section
 @pytest.mark.parametrize(
     "action",
     [
-        ShowPrompt("help"),
+        ShowPrompt("welcome"),
         ShowPrompt(PalettePrompt("mo")),
         AskToSave(),
         AskForPath("photo"),

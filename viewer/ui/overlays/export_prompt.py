@@ -20,6 +20,8 @@ from viewer.model.state.exporting import ANIMATIONS, ExportOptions, ExportPrompt
 from viewer.model.state.scene import Scene
 from viewer.ui.overlays.prompt_rows import (
     choice_row,
+    focus_on_appearing,
+    path_field,
     prompt_actions,
     prompt_buttons,
     say_problem,
@@ -55,8 +57,9 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
     for name, row in ROWS.items():
         if name in kind.heeds:
             options = row(options, asked)
+    focus_on_appearing()
     label("File" if kind.endings else "Folder", layout)
-    path, entered = text_field("path", prompt.path)
+    path, entered = path_field(prompt.path, layout)
     edited = replace(prompt, path=path, options=options)
     if edited != prompt:
         edited = replace(edited, already_there=False, problem="")

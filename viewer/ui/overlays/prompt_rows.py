@@ -13,7 +13,7 @@ from viewer.model.lens.limits import LARGEST_SIDE_PX
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import Prompt
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import button, gap, label
+from viewer.ui.widgets import button, gap, label, tooltip
 
 Choice = TypeVar("Choice", bound=str)
 
@@ -38,6 +38,14 @@ def text_field(name: str, text: str, hint: str = "") -> tuple[str, bool]:
     _, new = imgui.input_text_with_hint(f"##{name}", hint, text)
     is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
     return new, bool(imgui.is_item_deactivated() and is_enter)
+
+
+def path_field(path: str, layout: Layout) -> tuple[str, bool]:
+    """A text field for a path; one that is too long for it comes up whole over it."""
+    new, is_entered = text_field("path", path)
+    is_cut = imgui.calc_text_size(new).x > imgui.get_item_rect_size().x
+    tooltip(new if is_cut else "", layout)
+    return new, is_entered
 
 
 def search_field(name: str, text: str, hint: str) -> tuple[str, bool]:

@@ -22,12 +22,12 @@ from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.prompt_rows import (
     focus_on_appearing,
+    path_field,
     prompt_actions,
     prompt_buttons,
     say_problem,
     search_field,
     size_rows,
-    text_field,
 )
 from viewer.ui.widgets import button, gap, label, quiet
 
@@ -136,7 +136,7 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     gap(layout, 2)
     focus_on_appearing()
     label("File", layout)
-    path, entered = text_field("path", prompt.path)
+    path, entered = path_field(prompt.path, layout)
     edited = prompt if path == prompt.path else replace(prompt, path=path, already_there=False, problem="")
     edited = edited if is_map else _form_rows(_sized(edited, state, layout), state, layout)
     gap(layout, 2)
@@ -202,7 +202,7 @@ def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
     gap(layout, 2)
     focus_on_appearing()
     label("Path", layout)
-    path, entered = text_field("path", prompt.path)
+    path, entered = path_field(prompt.path, layout)
     quiet("This system has no file dialog (zenity or kdialog): type a path, or drop a file on the window.")
     pressed, closed = prompt_buttons("Open", layout)
     if (pressed or entered) and path.strip():
