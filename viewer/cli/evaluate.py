@@ -35,7 +35,8 @@ def evaluate(
         str,
         typer.Option(
             metavar="auto|gt|estimate|FILE",
-            help="Of the given view: the data set's (gt), estimated from the photo, a file; auto: gt if there is one.",
+            help="Of the given view: the data set's (gt), estimated from the photo, a file (px per view step; LLFF: per"
+            " mean distance of neighbours); auto: gt if there is one.",
         ),
     ] = "auto",
     quality: Annotated[

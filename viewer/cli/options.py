@@ -196,7 +196,12 @@ SCENE_HELP = "A photo, a stereo photo, or a light field: a folder of views, a qu
 ScenePath = Annotated[Path, typer.Argument(help=SCENE_HELP, show_default=False)]
 DisparityFile = Annotated[
     Path | None,
-    typer.Option("--disparity", metavar="FILE", help="Disparity map: PFM, EXR, NPY or 16-bit PNG.", show_default=False),
+    typer.Option(
+        "--disparity",
+        metavar="FILE",
+        help="Disparity map: PFM, EXR, NPY or 16-bit PNG; px per view step (LLFF: per mean distance of neighbours).",
+        show_default=False,
+    ),
 ]
 DisparityScale = Annotated[
     float, number_option("Multiply the disparity file's values by this (a 16-bit PNG needs it).")

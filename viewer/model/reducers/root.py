@@ -141,10 +141,11 @@ def reduce(state: AppState, action: Action) -> AppState:
         case Quit(is_sure):
             asks = state.has_unsaved_edits and not is_sure
             return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
-    return _file_or_prompt(state, action)
+    return _reduce_files(state, action)
 
 
-def _file_or_prompt(state: AppState, action: Action) -> AppState:
+def _reduce_files(state: AppState, action: Action) -> AppState:
+    """What is opened, and what is to be done outside."""
     match action:
         case FactsRead() as facts:
             return replace(state, facts=facts)
@@ -177,6 +178,12 @@ def _file_or_prompt(state: AppState, action: Action) -> AppState:
             return replace(state, tasks=(*state.tasks, task))
         case TaskTaken(task):
             return replace(state, tasks=tuple(other for other in state.tasks if other != task))
+    return _reduce_screen(state, action)
+
+
+def _reduce_screen(state: AppState, action: Action) -> AppState:
+    """What stands on the screen beside the picture: prompts, notices, progress, and where one looks."""
+    match action:
         case ShowPrompt(prompt):
             return replace(state, prompt=prompt)
         case AskForPath(what):
@@ -242,7 +249,7 @@ def _step_photo(state: AppState, steps: int) -> AppState:
         return state
     name = PurePath(source.path).name
     folder = replace(state.folder, step=1 if steps > 0 else -1, stepped_to=name, scrolled=0)
-    return _file_or_prompt(replace(state, folder=folder), OpenPath(source))
+    return _reduce_files(replace(state, folder=folder), OpenPath(source))
 
 
 def _leave_field(state: AppState) -> FinishedField | None:
