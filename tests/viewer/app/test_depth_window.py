@@ -33,13 +33,8 @@ from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 Opener = Callable[..., Driver]
+pytestmark = pytest.mark.usefixtures("no_dialogs")
 GRID = GridShape(3, 3)
-
-
-@pytest.fixture(autouse=True)
-def _no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a system without zenity and its like: a dialog would wait for a person."""
-    monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
 
 
 @pytest.fixture

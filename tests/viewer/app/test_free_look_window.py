@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,21 +9,12 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import Camera, GridShape, ImageSize
+from iibr_core.types import Camera, ImageSize
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver
 from viewer.model.actions import DoTask
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.state.optics import SetAperture, SetFocus
 from viewer.model.state.tasks import SaveTask
-
-Opener = Callable[..., Driver]
-
-
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
-    return driver
 
 
 def seen(viewer: Driver) -> np.ndarray:

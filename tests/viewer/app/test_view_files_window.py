@@ -41,13 +41,6 @@ def write_lenslet_image(folder: Path) -> Path:
     return folder / "wall_eslf.png"
 
 
-@pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
-    return driver
-
-
 @pytest.mark.parametrize(("write", "grid"), [(write_quilt, GridShape(1, 6)), (write_lenslet_image, GridShape(3, 3))])
 def test_a_file_of_views_dropped_is_a_light_field_with_disparity(
     viewer: Driver, tmp_path: Path, write: Callable[[Path], Path], grid: GridShape

@@ -24,21 +24,7 @@ from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
 Opener = Callable[..., Driver]
-
-
-@pytest.fixture(autouse=True)
-def _no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a system without zenity and its like: a dialog would wait for a person."""
-    monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
-
-
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
-    driver.send("mousemove", *driver.position(0.1, 0.1))
-    driver.until_idle()
-    return driver
+pytestmark = pytest.mark.usefixtures("no_dialogs")
 
 
 def test_a_saved_picture_can_be_taken_again_without_the_window(

@@ -23,20 +23,7 @@ from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 from viewer.model.state.scene import Source
 
 Opener = Callable[..., Driver]
-
-
-@pytest.fixture(autouse=True)
-def _no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
-
-
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
-    driver.send("mousemove", *driver.position(0.1, 0.1))
-    driver.until_idle()
-    return driver
+pytestmark = pytest.mark.usefixtures("no_dialogs")
 
 
 def test_arrows_select_a_command_far_down_the_list_and_enter_runs_it(viewer: Driver) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import SMALL_WINDOW, Driver
@@ -17,15 +16,6 @@ from viewer.model.state.inspection import Compare, KeepState
 from viewer.model.state.optics import MoveEye, SetAperture, SetExposure
 
 Opener = Callable[..., Driver]
-
-
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
-    driver.send("mousemove", *driver.position(0.1, 0.1))
-    driver.until_idle()
-    return driver
 
 
 def test_f11_fills_the_screen_and_escape_comes_back_to_where_it_was(viewer: Driver) -> None:

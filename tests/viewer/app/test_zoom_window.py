@@ -18,13 +18,6 @@ from viewer.model.zoom import SetZoom, Zoom
 Opener = Callable[..., Driver]
 
 
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
-    return driver
-
-
 def until_sharp(viewer: Driver) -> np.ndarray:
     """The part that is seen, from the photo's own pixels, once it is shown."""
     viewer.until(lambda app: app.sharpener.pixels is not None)

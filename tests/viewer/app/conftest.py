@@ -1,0 +1,27 @@
+"""A window with a photo, and a system without dialogs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from iibr_core.types import GridShape
+from tests.viewer.conftest import Driver
+
+
+@pytest.fixture
+def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+    """All views of the photo are there; the pointer rests in the picture, off the near square."""
+    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver.until_idle()
+    driver.send("mousemove", *driver.position(0.1, 0.1))
+    driver.until_idle()
+    return driver
+
+
+@pytest.fixture
+def no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a system without zenity and its like: a dialog would wait for a person."""
+    monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
