@@ -22,6 +22,7 @@ import numpy as np
 import psutil
 
 from iibr_core.formats.images.photo import write_image
+from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import GridShape, ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
@@ -126,6 +127,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--steps", type=int, default=2000)
     steps = parser.parse_args().steps
+    limit_arenas()  # as the program does
     with tempfile.TemporaryDirectory() as name, private_display():
         folder, out = Path(name) / "photos", Path(name)
         folder.mkdir()

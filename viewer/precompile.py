@@ -45,6 +45,7 @@ def write_kernels(folder: Path) -> None:
         kernel_cache.PRECOMPILED = folder  # it is empty: nothing comes from an earlier run
         for source in _photos(Path(scratch)):
             _open(source)
+        _paint()
         _look_around(source)
         _find_gloss(source)
         _collect(kept, folder)
@@ -57,6 +58,13 @@ def _open(source: Source) -> None:
 
     for _ in results_of(SceneRequest(0, source), lambda: False, lambda: CENTRE):
         pass
+
+
+def _paint() -> None:
+    """What the first stroke of the depth brush needs."""
+    from viewer.background.loaded_photo import prepare_brush
+
+    prepare_brush()
 
 
 def _look_around(source: Source) -> None:

@@ -6,7 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from iibr_core.types import InputError, ViewOffset
+from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed, ProgressReport
+from viewer.background.loaded_photo import prepare_brush
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, WantedPhoto, photos_within_budget, read_whole_photo
 from viewer.background.scene_worker import (
     PhotosFound,
@@ -53,6 +55,8 @@ class SceneLoader:
         self._set_title = set_title
         self._worker = SceneWorker(wake)
         self._preview = DepthPreview(scene_view)
+        self._brush_loader = FileWorker("iibr-brush", wake)
+        self._has_brush = False
         self._submitted = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
@@ -97,6 +101,7 @@ class SceneLoader:
         self._worker.close()
         self.sketches.close()
         self.ahead.close()
+        self._brush_loader.close()
 
     def _show_sketch(self, state: AppState) -> list[Action]:
         """What was asked for, in small, as long as nothing else of it is there."""
@@ -124,10 +129,17 @@ class SceneLoader:
             self._scene_view.open(result)
             self._inspection_view.open()
             self._set_title(f"{result.scene.name} - iibr")
+            self._load_brush(result)
             return [SceneOpened(result.generation, result.scene)]
         self._scene_view.add(result.view)
         self._inspection_view.add(result.view)
         return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column))]
+
+    def _load_brush(self, ready: SceneReady) -> None:
+        """Beside the first photo's views, so that the first stroke does not wait."""
+        if not self._has_brush and ready.loaded is not None:
+            self._has_brush = True
+            self._brush_loader.submit(FileRequest(0, prepare_brush))
 
     def _cancel(self, state: AppState) -> None:
         """What the user stopped, and what is wanted no more."""

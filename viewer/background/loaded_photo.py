@@ -257,7 +257,7 @@ def still_disparity(source: Source, before_strokes: FloatImage) -> float:
 
 
 def prepare_brush() -> None:
-    """Have the brush compiled, so that the first stroke does not wait for it."""
+    """Have the brush's kernels loaded, or compiled, so that the first stroke does not wait for them."""
     from iibr_core.depth.editing.canvas import DepthCanvas
     from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 

@@ -29,7 +29,6 @@ from viewer.background.loaded_photo import (
     inpainting_aids,
     load_photo,
     make_plan,
-    prepare_brush,
     sketch_photo,
 )
 from viewer.background.photo_folder import first_photo
@@ -218,8 +217,6 @@ def _results_of_photo(
         inpainting_aids(source, loaded, report_painting),
     )  # fmt: skip
     yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
-    if not should_stop():
-        prepare_brush()
 
 
 def _centre_view(loaded: LoadedPhoto, plan: ScenePlan) -> ViewUpdate:

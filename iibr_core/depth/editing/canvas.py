@@ -127,12 +127,12 @@ class DepthCanvas:
         under, distance, target = self._open.under, self._open.distance, self._open.target
         values = self._values.copy()
         for i in range(first, len(stroke.points)):
-            window = self._reach(stroke, i, self._open)
+            rows, columns = self._reach(stroke, i, self._open)
             if target is None:
                 amount = stroke.strength * (self._extent[1] - self._extent[0]) * SIGNS[stroke.tool]
-                _move(values[window], under[window], distance[window], amount)
+                _move(values, under, distance, rows, columns, amount)
             else:
-                _blend(values[window], under[window], target[window], distance[window], stroke.strength)
+                _blend(values, under, target, distance, rows, columns, stroke.strength)
         self._values = values
 
     def _reach(self, stroke: Stroke, index: int, open_stroke: _OpenStroke) -> Window:
@@ -144,7 +144,8 @@ class DepthCanvas:
         if _value_at(open_stroke.distance, stroke.points[index]) > 0:  # else it is filled already
             surface = surface_at(self._guide, open_stroke.under, stroke, index, self._extent)
             open_stroke.distance[surface] = 0
-        return np.s_[:, :]
+        height, width = open_stroke.distance.shape
+        return slice(0, height), slice(0, width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,19 +173,19 @@ def _goes_on(old: Stroke, new: Stroke) -> bool:
 
 
 @kernel
-def _move(values, under, distance, amount):
-    """Lay a stroke that moves by an amount on what was there before."""
-    for y in range(distance.shape[0]):
-        for x in range(distance.shape[1]):
+def _move(values, under, distance, rows, columns, amount):
+    """Lay a stroke that moves by an amount on what was there before, in a window."""
+    for y in range(rows.start, rows.stop):
+        for x in range(columns.start, columns.stop):
             # In float64, which does not overflow.
             values[y, x] = min(max(under[y, x] + falloff(distance[y, x]) * amount, -MOST), MOST)
 
 
 @kernel
-def _blend(values, under, target, distance, strength):
-    """Lay a stroke that leads to a target on what was there before."""
-    for y in range(distance.shape[0]):
-        for x in range(distance.shape[1]):
+def _blend(values, under, target, distance, rows, columns, strength):
+    """Lay a stroke that leads to a target on what was there before, in a window."""
+    for y in range(rows.start, rows.stop):
+        for x in range(columns.start, columns.stop):
             before = np.float64(under[y, x])
             change = strength * (np.float64(target[y, x]) - before)
             values[y, x] = min(max(before + falloff(distance[y, x]) * change, -MOST), MOST)

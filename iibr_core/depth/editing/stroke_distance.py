@@ -28,6 +28,10 @@ SPECK_PIXELS = 3
 """So few unlike pixels in a square of 3 x 3 are texture."""
 ROUNDED = 1e-3
 """More than rounding takes off a distance."""
+HALF_UP_PX = 1e-6
+"""Added to places: what lies between two pixels, but for rounding, belongs to the second."""
+SAME = np.float32(1e-6)
+"""Distances that differ by less are one: a stroke that runs back over itself begins no ways anew."""
 UNKNOWN = np.float32(-1.0)
 UNQUEUED, LAST = np.int32(-2), np.int32(-1)
 
@@ -54,13 +58,12 @@ def measure_from(guide: Guide, stroke: Stroke, index: int, distance: FloatImage)
     reach = ceil(radius) + 1
     rows, columns = pixel_span(ys, reach, size.height), pixel_span(xs, reach, size.width)
     if distance[rows, columns].size:
-        bordered = guide[rows.start : rows.stop + 2, columns.start : columns.stop + 2]
         colors = stroke_colours(guide, stroke, index)
         (x0, y0), (x1, y1) = (
             (float(np.clip(x, -1e6, 1e6)) - columns.start, float(np.clip(y, -1e6, 1e6)) - rows.start)
             for x, y in (ends[0], ends[-1])
         )
-        _measure(np.ascontiguousarray(bordered), colors, distance[rows, columns], x0, y0, x1, y1, radius)
+        _measure(guide, colors, distance, rows, columns, x0, y0, x1, y1, radius)
     return rows, columns
 
 
@@ -72,10 +75,13 @@ def falloff(distance):
 
 
 @kernel
-def _measure(guide, colors, distance, x0, y0, x1, y1, radius):
+def _measure(whole_guide, colors, whole_distance, rows, columns, x0, y0, x1, y1, radius):
     """Shortest ways (8 neighbours) from the way from (x0, y0) to (x1, y1); to a pixel of a more unlike colour the way
-    is longer. guide: of the window of these distances, with its border.
+    is longer. rows, columns: the window, in which the places are counted.
     """
+    # Cut out here: what a slice is to Numba depends on whether it is as wide as the photo.
+    guide = np.ascontiguousarray(whole_guide[rows.start : rows.stop + 2, columns.start : columns.stop + 2])
+    distance = whole_distance[rows, columns]
     height, width = distance.shape
     # Pixels have one index, in rows with the border, which no way is short enough to enter.
     pitch, size = width + 2, (height + 2) * (width + 2)
@@ -92,11 +98,11 @@ def _measure(guide, colors, distance, x0, y0, x1, y1, radius):
     pixels, after, count, per_step = np.empty(most, np.int32), np.empty(most, np.int32), 0, np.float32(radius)
     for k in range(steps + 1):
         x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
-        column, row = nearest_pixel(x), nearest_pixel(y)
+        column, row = nearest_pixel(x + HALF_UP_PX), nearest_pixel(y + HALF_UP_PX)
         if 0 <= row < height and 0 <= column < width:
             # Seeds of the ways: the exact distance from the path, in radii.
             seed, at = np.float32(hypot(column - x, row - y) / radius), (row + 1) * pitch + column + 1
-            if seed < away[at]:
+            if seed < away[at] - SAME:
                 away[at], bucket = seed, int(seed * per_step)
                 bucket_of[at], pixels[count], after[count], first[bucket] = bucket, at, first[bucket], count
                 count += 1

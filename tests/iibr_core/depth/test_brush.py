@@ -8,13 +8,21 @@ from math import ceil, floor, hypot
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
+from iibr_core.depth.editing.canvas import DepthCanvas, _blend, _move, apply_edits
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
 from iibr_core.depth.editing.smoothing import smooth_within_contours
-from iibr_core.depth.editing.stroke_distance import CONTOUR_CONTRAST, falloff, stroke_distance
+from iibr_core.depth.editing.stroke_distance import (
+    CONTOUR_CONTRAST,
+    HALF_UP_PX,
+    SAME,
+    _measure,
+    falloff,
+    stroke_distance,
+)
+from iibr_core.depth.editing.surface import _find_edges
 from iibr_core.depth.editing.touched_colors import (
     CUBES,
     GUIDE_STEPS,
@@ -62,9 +70,9 @@ def slow_step(photo: np.ndarray, stroke: Stroke, index: int, distance: np.ndarra
     radius, waiting = stroke.radius * width, []
     for share in np.linspace(0, 1, max(ceil(2 * np.hypot(*(ends[-1] - ends[0]))), 1) + 1):
         x, y = ends[0] + share * (ends[-1] - ends[0])
-        row, column = floor(y + 0.5), floor(x + 0.5)
+        row, column = floor(y + HALF_UP_PX + 0.5), floor(x + HALF_UP_PX + 0.5)
         seed = hypot(column - x, row - y) / radius
-        if seed < distance[row, column]:
+        if seed < distance[row, column] - SAME:
             distance[row, column] = seed
             waiting.append((seed, row, column))
     heapq.heapify(waiting)
@@ -89,6 +97,8 @@ def slow_step(photo: np.ndarray, stroke: Stroke, index: int, distance: np.ndarra
 
 
 @settings(max_examples=30)
+@example(0, 0.25, [(0.5, 0.21875), (0.125, 0.75)])
+@example(1, 0.125, [(0.5, 0.2193173144942801), (0.5, 0.5), (0.5, 0.2193173144942801)])
 @given(
     st.integers(0, 1000),
     st.floats(0.05, 0.25),
@@ -282,3 +292,12 @@ def test_sizes_must_agree_and_something_must_be_known() -> None:
         DepthCanvas(plain_photo(), np.zeros((3, 3), np.float32))
     with pytest.raises(InputError, match="no disparity is known"):
         apply_edits(plain_photo(), np.full((HEIGHT, WIDTH), np.nan, np.float32), DepthEdits(strokes=(dab(),)))
+
+
+def test_strokes_of_all_sizes_need_the_kernels_that_were_prepared() -> None:
+    for shape, radius in (((4, 4), 0.1), ((HEIGHT, WIDTH), 0.05), ((HEIGHT, 3), 0.25)):
+        photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
+        for tool in BRUSH_TOOLS:
+            apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, radius=radius),)))
+    for kernel in (_move, _blend, _measure, _find_edges):
+        assert len(kernel.signatures) == 1, kernel
