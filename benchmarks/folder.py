@@ -10,6 +10,7 @@ resident, after every step.
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import tempfile
 import time
@@ -96,13 +97,15 @@ def main() -> None:
     print(f"{len(took)} steps from photo to photo, each looked at for {options.dwell:g} s")
     print(
         f"first picture: median {statistics.median(seconds):.2f} s ({statistics.median(processor):.2f} s of processor"
-        f" time), 9 of 10 within {seconds[int(0.9 * (len(seconds) - 1))]:.2f} s, the slowest {seconds[-1]:.2f} s"
+        f" time), 95 of 100 within {seconds[int(0.95 * (len(seconds) - 1))]:.2f} s, the slowest {seconds[-1]:.2f} s"
     )
     half = len(tail) // 2 or 1
     early, late = statistics.median(tail[:half]), statistics.median(tail[half:] or tail)
     print(
         f"memory: median {early:.0f} MiB in the first half, {late:.0f} MiB in the second, {max(tail):.0f} MiB at most"
     )
+    if hasattr(os, "getloadavg"):
+        print(f"load of the machine at the end, this program included: {os.getloadavg()[1]:.1f}")
 
 
 if __name__ == "__main__":

@@ -31,8 +31,8 @@ from viewer.model.state.folder import ShowFilmstrip
 from viewer.model.state.notices import Notice
 from viewer.model.state.scene import Source, source_beside
 
-SKETCHES_FIRST = 2
-"""A photo and its next are there in small before all of it is read: who goes on quickly meets no work to be stopped."""
+SKETCHES_FIRST = 3
+"""A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work."""
 
 
 class SceneLoader:

@@ -1,5 +1,7 @@
 """A photo made smaller while it is read: the same as from all its rows at once, to the bit, however few are there."""
 
+import itertools
+
 import numpy as np
 import OpenImageIO as oiio
 import pytest
@@ -8,6 +10,7 @@ from iibr_core.formats.images import downsampling, oiio_reader
 from iibr_core.formats.images.downsampling import downsampled_linear
 from iibr_core.formats.images.oiio_reader import PictureRows, read_raster
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError
 
 KINDS = {
@@ -72,3 +75,12 @@ def test_a_damaged_end_is_told_while_rows_are_read(tmp_path):
     path.write_bytes(path.read_bytes()[:-60_000])
     with pytest.raises(InputError, match=r"a\.tif"):
         read_photo(path, 1000)
+
+
+def test_a_file_that_nobody_wants_any_more_is_not_read_to_its_end(tmp_path, monkeypatch):
+    path = stored_file(tmp_path / "a.jpg")
+    monkeypatch.setattr(downsampling, "MOST_ROWS_PIXELS", 1000)
+    asked = itertools.count()
+    with pytest.raises(Cancelled):
+        read_photo(path, 1000, should_stop=lambda: next(asked) == 3)
+    assert next(asked) == 4
