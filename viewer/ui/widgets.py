@@ -11,6 +11,7 @@ from viewer.model.layout import Layout
 
 LABEL_WIDTH = 92.0
 GRIP_WIDTH = 12.0
+TOOLTIP_WIDTH = 260.0
 
 
 def label(text: str, layout: Layout, tip: str = "") -> None:
@@ -135,17 +136,39 @@ def gap(layout: Layout, units: float = 4.0) -> None:
 
 
 def tooltip(text: str, layout: Layout) -> None:
-    """Words that come up while the pointer rests on the last item, beside the panel: they must not hide its widgets."""
+    """Words that come up while the pointer rests on the last item, beside the panel or below the prompt that it is in:
+    they must not hide its widgets.
+    """
     if text and imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
-        is_low = imgui.get_item_rect_max().y > 0.75 * layout.window.height
-        y = imgui.get_item_rect_max().y if is_low else imgui.get_item_rect_min().y
-        corner = imgui.ImVec2(layout.panel.x - 4 * layout.ui_scale, min(y, layout.window.height))
-        imgui.set_next_window_pos(corner, 0, imgui.ImVec2(1, 1 if is_low else 0))
+        corner, pivot = _place_beside_panel(layout) if _is_in_panel(layout) else _place_below_window(layout)
+        imgui.set_next_window_pos(corner, 0, pivot)
         imgui.begin_tooltip()
-        imgui.push_text_wrap_pos(260 * layout.ui_scale)
+        imgui.push_text_wrap_pos(TOOLTIP_WIDTH * layout.ui_scale)
         imgui.text(text)
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
+
+
+def _is_in_panel(layout: Layout) -> bool:
+    return bool(imgui.get_window_pos().x >= layout.panel.x)
+
+
+def _place_beside_panel(layout: Layout) -> tuple[imgui.ImVec2, imgui.ImVec2]:
+    """As high as the last item; (where, which of the tooltip's corners, as shares of it)."""
+    is_low = imgui.get_item_rect_max().y > 0.75 * layout.window.height
+    y = imgui.get_item_rect_max().y if is_low else imgui.get_item_rect_min().y
+    corner = imgui.ImVec2(layout.panel.x - 4 * layout.ui_scale, min(y, layout.window.height))
+    return corner, imgui.ImVec2(1, 1 if is_low else 0)
+
+
+def _place_below_window(layout: Layout) -> tuple[imgui.ImVec2, imgui.ImVec2]:
+    """Under the last item; above the window where there is more room."""
+    room = layout.window.width - TOOLTIP_WIDTH * layout.ui_scale - 2 * imgui.get_style().window_padding.x
+    position, x = imgui.get_window_pos(), min(imgui.get_item_rect_min().x, room)
+    bottom, space = position.y + imgui.get_window_height(), 4 * layout.ui_scale
+    if layout.window.height - bottom < position.y:
+        return imgui.ImVec2(x, position.y - space), imgui.ImVec2(0, 1)
+    return imgui.ImVec2(x, bottom + space), imgui.ImVec2(0, 0)
 
 
 def last_part(path: str) -> str:

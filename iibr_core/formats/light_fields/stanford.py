@@ -24,6 +24,7 @@ NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_(\d{{1,3}})_({NUMBER})_({NUMBER})_?$")
 RENDERED_NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_(\d{{1,3}})_({NUMBER})_({NUMBER})_({NUMBER})_({NUMBER})$")
 MOST_STRAY = 0.5
 """A camera farther off its place in the grid than this, in view steps: the positions mean something else."""
+TOLD_STRAY = 0.005
 CONFIG, MOST_CONFIG_BYTES = "config.cfg", 1 << 16
 FOCUS_DISTANCE = "focus-distance"
 """Of light-field-renderer's config: where to begin, the least and the greatest, in metres."""
@@ -114,7 +115,8 @@ def _lay_out(index: np.ndarray, position: np.ndarray) -> _Layout:
     if stray > MOST_STRAY:
         note = f"Camera positions lie up to {stray:.1f} view steps off the grid: a regular one is assumed."
         return _Layout(index * usual, usual, step, note)
-    note = f"Viewpoints from the names; cameras stand up to {stray:.2f} view steps off a regular grid."
+    note = "Viewpoints from the names"
+    note += f"; cameras stand up to {stray:.2f} view steps off a regular grid." if stray >= TOLD_STRAY else "."
     return _Layout(offsets, directions, step, note)
 
 

@@ -102,6 +102,7 @@ def test_rows_of_stanford_count_upwards_on_disk_and_downwards_here(tmp_path: Pat
     assert places["out_02_00"] == (0, 0)
     assert places["out_00_03"] == (2, 3)
     assert step_length(scene) == pytest.approx(1)
+    assert "Viewpoints from the names." in scene.notes, "no stray of 0.00"
     dark = {view.path.stem[:9]: read_stored_view(scene, *view.place).mean() for view in scene.views if view.place}
     assert dark["out_00_00"] < dark["out_00_01"] < dark["out_02_00"]
 
@@ -222,6 +223,7 @@ def test_columns_of_stanford_go_where_the_camera_went(tmp_path: Path) -> None:
     assert places["out_02_02"][0] == (0, 0)
     first, last = (places[f"out_{k:02d}_{k:02d}"][1] for k in (0, 2))
     assert (last.s - first.s, last.t - first.t) == pytest.approx((-2, -1.8))
+    assert any("stand up to 0.10 view steps off" in note for note in scene.notes)
 
 
 def write_rendered(folder: Path, config: str = "", focal_mm: float = 50.0) -> Path:

@@ -13,7 +13,7 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver
 from viewer.app.window_slot import STEP
-from viewer.model.actions import AskToSave, HidePanel, Notify, OpenPath, ShowPrompt, StopWork
+from viewer.model.actions import AskToSave, HidePanel, Notify, OpenPath, SetFontScale, ShowPrompt, StopWork
 from viewer.model.commands import COMMANDS
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.exporting import AskToExport, ExportPrompt
@@ -76,6 +76,18 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
         assert tip.hidden_frames_can_skip_items <= 0, button
         viewer.send("mousemove", *viewer.position(0.1, 0.1))
         viewer.until_idle()
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) -> None:
+    viewer.app.do(SetFontScale(scale), ShowPrompt(ExportPrompt("sbs", "a.png")))
+    viewer.until_idle()
+    viewer.find("##Eyes", "prompt ExportPrompt")
+    viewer.until_idle()
+    tip, prompt = (imgui.internal.find_window_by_name(name) for name in ("##Tooltip_00", "prompt ExportPrompt"))
+    assert tip.active
+    assert tip.pos.y >= prompt.pos.y + prompt.size.y or tip.pos.y + tip.size.y <= prompt.pos.y
+    assert 0 <= tip.pos.x <= viewer.app.layout().window.width - tip.size.x
 
 
 def test_up_stays_at_the_first_command_and_typing_begins_there_again(viewer: Driver) -> None:

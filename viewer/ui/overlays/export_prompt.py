@@ -92,7 +92,7 @@ def _keys(options: ExportOptions, asked: _Asked) -> ExportOptions:
 def _eyes(options: ExportOptions, asked: _Asked) -> ExportOptions:
     limits = 0.0, float(max(asked.scene.grid.columns - 1, 1))
     tip = "View steps from eye to eye. What is in focus lies in the screen."
-    eyes = slider("Eyes", asked.settings.eyes, limits, "%.1f apart", asked.layout, tip)
+    eyes = slider("Eyes", asked.settings.eyes, limits, "%.1f views apart", asked.layout, tip)
     return options if eyes is None else replace(options, eyes=eyes)
 
 

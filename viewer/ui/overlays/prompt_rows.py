@@ -68,7 +68,7 @@ def focus_on_appearing() -> None:
 
 def choice_row(name: str, chosen: Choice, words: Mapping[Choice, str]) -> Choice:
     """One of these, by its words."""
-    if imgui.begin_combo(f"##{name}", words[chosen]):
+    if imgui.begin_combo(f"##{name}", words[chosen], imgui.ComboFlags_.height_large):
         for choice, text in words.items():
             if imgui.selectable(text, choice == chosen)[0]:
                 chosen = choice
