@@ -103,6 +103,8 @@ def test_it_is_asked_for_by_key_and_says_what_is_wrong(viewer: Driver, tmp_path:
         (tmp_path / "a.png", "gif"),
         (tmp_path / "scene.png", "anaglyph"),
     ):
+        app.do(ShowPrompt(None))
+        viewer.until_idle()  # or the field that is typed in would keep its own text
         app.do(DoTask(ExportTask(kind, str(path))))
         viewer.until(lambda app: not app.state.tasks)
         asked = app.state.prompt
