@@ -11,6 +11,7 @@ from collections import deque
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.gloss.settings import Gloss
@@ -20,6 +21,7 @@ from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.gpu.context import GLContext
+from viewer.gpu.light_field_texture import Box
 from viewer.gpu.refocus.lens import TargetWindow
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.render_settings import RenderSettings
@@ -113,13 +115,16 @@ class SceneView:
         assert scene is not None
         assert centre is not None
         assert field is not None
-        far, near = field.range_px
-        if not self._is_preview or disparity.min() < far or disparity.max() > near:
+        shown = self._disparities.get(CENTRE) if self._is_preview else None
+        differs = None if shown is None else shown != disparity
+        if differs is None or _is_beyond(disparity[differs], field.range_px):
             self._open_field(scene, PREVIEW_GRID)
             self.views_uploaded, self._is_final = 1, {scene.grid.centre: True}
             self._is_preview = True
             self._waiting.clear()
-        self.renderer.upload_view(0, 0, centre.colors, disparity)
+            self.renderer.upload_view(0, 0, centre.colors, disparity)
+        elif differs.any():
+            self.renderer.change_disparity(0, 0, disparity, _box_around(differs))
         self._disparities = {CENTRE: disparity}
         self.previews += 1
 
@@ -301,6 +306,17 @@ class SceneView:
     def release(self) -> None:
         """Free the GL objects."""
         self.renderer.release()
+
+
+def _is_beyond(values: FloatImage, range_px: tuple[float, float]) -> bool:
+    far, near = range_px
+    return bool(values.size and (values.min() < far or values.max() > near))
+
+
+def _box_around(marks: NDArray[np.bool_]) -> Box:
+    """The least rows and columns that hold all marks, of which there are some."""
+    rows, columns = (np.flatnonzero(marks.any(axis)) for axis in (1, 0))
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def window_of(part: Rect) -> TargetWindow:

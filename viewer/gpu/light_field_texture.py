@@ -25,6 +25,9 @@ HALF_MAX = float(np.finfo(np.float16).max)
 BLOCK_PX = 16
 """Side of the squares whose nearest and farthest disparity is kept, to tell quickly what a part of a view contains."""
 
+Box = tuple[slice, slice]
+"""Rows and columns of pixels."""
+
 RANGE_MARGIN = 0.05
 """Views generated later may reach a little beyond the first one's disparity range."""
 
@@ -94,18 +97,36 @@ class LightFieldTexture:
             return
         keeps_disparity = disparity is not None and self.disparities.size == self.colors.size
         if disparity is not None and keeps_disparity:
-            # Half floats hold no more, and differences of the largest floats are infinite.
-            disparity = np.clip(disparity, -HALF_MAX, HALF_MAX)
             if not self.has_disparity.any():
-                self.range_px = _range_of(disparity)
-            half = disparity.astype(np.float16)
-            self.disparities.write(half, self._viewport(row, column))
-            blocks = _block_ranges(half)
-            self.blocks.write(blocks, (0, 0, self.layer(row, column), blocks.shape[1], blocks.shape[0], 1))
-        self._fill_texels(colors, disparity if keeps_disparity else None)
-        self.colors.write(self._texels, self._viewport(row, column))
+                self.range_px = _range_of(_finite_half(disparity))
+            self._store_disparity(row, column, disparity, (slice(0, self.height), slice(0, self.width)))
+        else:
+            self._texels[..., 3] = 0
+        np.copyto(self._texels[..., :3], _root_of_linear(colors, self.hdr), casting="same_kind")
+        self.colors.write(self._texels, (0, 0, self.layer(row, column), self.width, self.height, 1))
         self.present[row, column], self.has_disparity[row, column] = True, keeps_disparity
         self.uploads[row, column] += 1
+
+    def change_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
+        """Store another disparity (H, W) of the view that was uploaded last, whose colours stay. box: outside of it
+        nothing changed.
+        """
+        box = _whole_blocks(box[0], self.height), _whole_blocks(box[1], self.width)
+        self._store_disparity(row, column, disparity, box)
+        self.colors.write(np.ascontiguousarray(self._texels[box]), self._viewport(row, column, box))
+        self.uploads[row, column] += 1
+
+    def _store_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
+        """Of whole blocks, but at the borders of the view; colours' alpha is left to be written."""
+        values = _finite_half(disparity[box])
+        self.disparities.write(values.astype(np.float16), self._viewport(row, column, box))
+        blocks = _block_ranges(values)
+        top, left = (span.start // BLOCK_PX for span in box)
+        self.blocks.write(blocks, (left, top, self.layer(row, column), blocks.shape[1], blocks.shape[0], 1))
+        far, near = self.range_px
+        top_value = 1.0 if self.hdr else 255.0
+        depth = np.clip((values - far) * (top_value / (near - far)), 0, top_value)
+        np.copyto(self._texels[(*box, 3)], depth if self.hdr else np.rint(depth), casting="unsafe")
 
     def snapshot(self) -> LightFieldTexture:
         """The same arrays, with the views that are there now: those that come later are not seen in it."""
@@ -121,8 +142,10 @@ class LightFieldTexture:
         if self.gloss is not None:
             self.gloss.release()
 
-    def _viewport(self, row: int, column: int) -> tuple[int, int, int, int, int, int]:
-        return 0, 0, self.layer(row, column), self.width, self.height, 1
+    def _viewport(self, row: int, column: int, box: Box) -> tuple[int, int, int, int, int, int]:
+        rows, columns = box
+        size = columns.stop - columns.start, rows.stop - rows.start
+        return columns.start, rows.start, self.layer(row, column), *size, 1
 
     def _check(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         if not (0 <= row < self.grid.rows and 0 <= column < self.grid.columns):
@@ -131,16 +154,6 @@ class LightFieldTexture:
         if colors.shape != (*size, 3) or (disparity is not None and disparity.shape != size):
             given = colors.shape, None if disparity is None else disparity.shape
             raise ValueError(f"view ({row}, {column}): colours and disparity are {given}, the field's size is {size}")
-
-    def _fill_texels(self, colors: StoredColors, disparity: FloatImage | None) -> None:
-        np.copyto(self._texels[..., :3], _root_of_linear(colors, self.hdr), casting="same_kind")
-        far, near = self.range_px
-        top = 1.0 if self.hdr else 255.0
-        depth: NDArray[np.float32] | float = 0.0
-        if disparity is not None and near > far:
-            depth = np.clip((disparity - far) * (top / (near - far)), 0, top)
-            depth = depth if self.hdr else np.rint(depth)
-        np.copyto(self._texels[..., 3], depth, casting="unsafe")
 
 
 def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) -> None:
@@ -190,12 +203,26 @@ def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:
     return _ROOT_FROM_SRGB[colors.view(np.uint8)]
 
 
-def _block_ranges(disparity: NDArray[np.float16]) -> NDArray[np.float16]:
-    """(blocks down, blocks across, 2): least and greatest value of each square."""
-    values = disparity.astype(np.float32)  # half floats compare slowly
-    rows, columns = np.arange(0, values.shape[0], BLOCK_PX), np.arange(0, values.shape[1], BLOCK_PX)
-    ends = [end.reduceat(end.reduceat(values, rows, axis=0), columns, axis=1) for end in (np.minimum, np.maximum)]
-    return np.ascontiguousarray(np.stack(ends, axis=-1), np.float16)
+def _finite_half(disparity: FloatImage) -> FloatImage:
+    """Half floats hold no more, and differences of the largest floats are infinite."""
+    return np.clip(disparity, -HALF_MAX, HALF_MAX)
+
+
+def _whole_blocks(span: slice, size: int) -> slice:
+    """The pixels of all blocks that a span of so many pixels touches."""
+    return slice(span.start // BLOCK_PX * BLOCK_PX, min(-(-span.stop // BLOCK_PX) * BLOCK_PX, size))
+
+
+def _block_ranges(disparity: FloatImage) -> NDArray[np.float16]:
+    """(blocks down, blocks across, 2): least and greatest value of each square, those at the border cut off."""
+    below, beside = (-size % BLOCK_PX for size in disparity.shape)
+    values = np.pad(disparity, ((0, below), (0, beside)), "edge")
+    down, across = (size // BLOCK_PX for size in values.shape)
+    ranges = np.empty((down, across, 2), np.float16)
+    for k, end in enumerate((np.minimum, np.maximum)):
+        rows = end.reduce(values.reshape(down, BLOCK_PX, -1), axis=1)
+        ranges[..., k] = end.reduce(rows.reshape(down, across, BLOCK_PX), axis=2)
+    return ranges
 
 
 def _range_of(disparity: FloatImage) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.photo import size_within
 from iibr_core.types import GridShape, ImageSize, InputError
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import LightFieldTexture, check_fits
+from viewer.gpu.light_field_texture import Box, LightFieldTexture, check_fits
 
 GRID = GridShape(2, 3)
 
@@ -49,6 +49,38 @@ def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl: GLContext) -> 
     assert field.present.sum() == 2
     field.release()
     once.release()
+
+
+@pytest.mark.parametrize("hdr", [False, True])
+@pytest.mark.parametrize("box", [np.s_[0:37, 0:53], np.s_[5:6, 7:8], np.s_[15:33, 20:53], np.s_[36:37, 30:49]])
+def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl: GLContext, box: Box, hdr: bool) -> None:
+    random = np.random.default_rng(0)
+    colors = random.integers(0, 255, (37, 53, 3)).astype(np.float16 if hdr else np.uint8)
+    before = random.normal(size=(37, 53)).astype(np.float32)
+    after = before.copy()
+    after[box] = random.uniform(-2, 2, after[box].shape)
+    changed, anew = (LightFieldTexture(gl.ctx, GRID, 53, 37, hdr, with_disparity=True) for _ in range(2))
+    for field in (changed, anew):
+        field.upload(1, 2, colors, before)
+    changed.change_disparity(1, 2, after, box)
+    anew.upload(1, 2, colors, after)
+    for name in ("colors", "disparities", "blocks"):
+        assert getattr(changed, name).read() == getattr(anew, name).read(), name
+    assert changed.uploads.tolist() == anew.uploads.tolist()
+    changed.release()
+    anew.release()
+
+
+def test_blocks_know_the_least_and_the_greatest_disparity_in_them(gl: GLContext) -> None:
+    field = LightFieldTexture(gl.ctx, GRID, 53, 37, hdr=False, with_disparity=True)
+    disparity = np.random.default_rng(0).normal(size=(37, 53)).astype(np.float32)
+    field.upload(0, 0, np.zeros((37, 53, 3), np.uint8), disparity)
+    blocks = np.frombuffer(field.blocks.read(), np.float16).reshape(6, 3, 4, 2)[0]
+    for row in range(3):
+        for column in range(4):
+            square = disparity[16 * row : 16 * row + 16, 16 * column : 16 * column + 16].astype(np.float16)
+            assert blocks[row, column].tolist() == [square.min(), square.max()]
+    field.release()
 
 
 def test_stray_disparities_do_not_stretch_the_range(gl: GLContext) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
@@ -116,6 +116,13 @@ class Renderer:
         if 0 <= row < field.grid.rows and 0 <= column < field.grid.columns and field.present[row, column]:
             self._stop_picture()
         field.upload(row, column, colors, disparity)
+        if not self.is_renewing:
+            self._accumulation = None
+
+    def change_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
+        """Replace the disparity of the view uploaded last; see LightFieldTexture.change_disparity."""
+        self._stop_picture()
+        self._fields.loaded.change_disparity(row, column, disparity, box)
         if not self.is_renewing:
             self._accumulation = None
 
