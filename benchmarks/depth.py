@@ -1,16 +1,13 @@
 """What refinement of depth edges gains, what it costs, and how good the guess without a model is.
 
-    python -m benchmarks.depth --data DATA --yardsticks BENCH [--out docs/depth.md]
+    python -m benchmarks.depth --data DATA [--out docs/depth.md]
 
-DATA holds hci_antinous and the Middlebury pairs; BENCH holds judge_views.py, which judges what `iibr generate` writes.
+DATA holds hci_antinous and the Middlebury pairs. What refinement gains on them stands in docs/figures.md.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -33,9 +30,6 @@ from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import Disparity, FloatImage, GridShape, ImageSize, Photo, ViewOffset
 
-SOFT = {"antinous-blur1": 40.5, "antinous-blur2": 39.0, "antinous-blur4": 36.0, "antinous-half": 40.5}
-"""Scenes with soft disparity, and the PSNR (dB) that refinement must reach."""
-EXACT = ("antinous", "teddy", "moebius", "motorcycle")
 HELD_OUT = range(6, 14)
 """Procedural scenes that no choice was made by."""
 FAULTS: dict[str, Callable[[FloatImage], FloatImage]] = {
@@ -55,47 +49,27 @@ NOTE = (
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True)
-    parser.add_argument("--yardsticks", type=Path, required=True)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     lines = []
-    for line in report(options.data, options.yardsticks):
+    for line in report(options.data):
         lines.append(line)
         print(line, flush=True)
     if options.out:
         options.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def report(data: Path, yardsticks: Path) -> Iterator[str]:
+def report(data: Path) -> Iterator[str]:
     yield from (
         "# Depth: refined edges, and the guess without a model",
         "",
         f"{made_by('benchmarks.depth')}.",
         "",
     )
-    yield from refinement(data, yardsticks)
+    yield from ("## Refinement", "", "Of soft maps of antinous: [figures](figures.md).", "")
     yield from procedural()
     yield from seconds()
     yield from guess_table(data)
-
-
-def refinement(data: Path, yardsticks: Path) -> Iterator[str]:
-    def psnr_with(switch: str) -> dict[str, float]:
-        iibr = Path(sys.executable).parent / "iibr"
-        command = [sys.executable, yardsticks / "judge_views.py", *SOFT, *EXACT, "--iibr", iibr, "--data", data]
-        run = subprocess.run([*map(str, command), f"--extra=--refine {switch}"], capture_output=True, text=True)
-        return {line.split()[0]: float(found[1]) for line in run.stdout.splitlines() if (found := FULL.search(line))}
-
-    off, on = psnr_with("off"), psnr_with("on")
-    yield from ("## Refinement", "", "PSNR of views generated from one photo and its disparity (judge_views.py).", "")
-    yield from ("| scene | `--refine off` | on | figure | holds |", "| --- | --- | --- | --- | --- |")
-    for name in (*SOFT, *EXACT):
-        least = SOFT.get(name, off[name] - 0.1)
-        yield f"| {name} | {off[name]:.2f} | {on[name]:.2f} | >= {least:.2f} | {yes(on[name] >= least)} |"
-    yield ""
-
-
-FULL = re.compile(r"iibr full ([\d.]+)")
 
 
 def procedural() -> Iterator[str]:
@@ -109,8 +83,11 @@ def procedural() -> Iterator[str]:
         for name, spoil in FAULTS.items():
             soft = spoil(disparity)
             rows[name].append((views_psnr(colors, soft, truth, 9), views_psnr(colors, refine(colors, soft), truth, 9)))
-    yield from (f"The same on {len(HELD_OUT)} procedural scenes of {size[1]}x{size[0]} that no choice was made by:", "")
-    yield from ("| disparity | off | on |", "| --- | --- | --- |")
+    yield from (
+        f"PSNR of views of {len(HELD_OUT)} procedural scenes of {size[1]}x{size[0]} that no choice was made by:",
+        "",
+    )
+    yield from ("| disparity | `--refine off` | on |", "| --- | --- | --- |")
     for name, pairs in rows.items():
         yield "| {} | {:.2f} | {:.2f} |".format(name, *np.mean(pairs, axis=0))
     yield ""

@@ -14,7 +14,6 @@ import platform
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -84,7 +83,7 @@ def measure(
 ) -> Bench:
     """Everything, with a bar on stderr. scenes: with true views. inputs: fields that are made in several ways.
 
-    What the plan predicts is judged on scenes that no constant was fitted to; on one if it must be quick.
+    What the plan predicts is judged on scenes that no constant was fitted to; on the first input if it must be quick.
     """
     from benchmarks.prediction import judged_scenes
     from benchmarks.provenance import made_by
@@ -97,7 +96,7 @@ def measure(
     qualities: tuple[Quality, ...] = ("fast", "balanced") if quick else ("fast", "balanced", "exact")
     with headless_gl() as gl, show_progress("measuring") as show:
         figures, drawings = measure_scenes(scenes, repeats, gl, show)
-        unseen = list(islice(judged_scenes(data), 1 if quick else None))
+        unseen = inputs[:1] if quick else list(judged_scenes(data))
         predicted = tuple(f for one in unseen for f in predict([one], qualities, repeats, show))
         growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
         targets = tuple(all_targets(scenes, inputs, figures, predicted, 0 if quick else repeats, show))
