@@ -37,11 +37,11 @@ MOST_PARALLAX_PX = 1e6
 
 RAY_BYTES, STATISTICS_BYTES = 21, 12
 """Of one pixel of one source image: colours, disparity, coverage, flag (`RaySet`); its statistics."""
-WORKING_BYTES = 18
-"""Of one pixel of a view in the making: float colours, disparity, flags."""
+WORKING_BYTES = 42
+"""Of one pixel of a view in the making: float colours, with and without specks, disparity, flags."""
 CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
 """Of one pixel of the band of rows in the making: its candidates and weights; hypotheses and features if ambiguous."""
-DRAFT_BYTES, UNDECIDED_BYTES = 8, 68
+DRAFT_BYTES, UNDECIDED_BYTES = 11, 68
 """Of one pixel of a draft: the view as it is stored; of one that the transformer is still to be asked for, more."""
 NUMBER_BYTES, HOLE_BYTES = 5, 160
 """Of one pixel of a view while its holes are filled; of one in a hole, more: what surrounds it in all directions."""

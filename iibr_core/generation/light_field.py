@@ -107,7 +107,10 @@ def _generate_views(
         room = draft_bytes or 0 if quality == "balanced" else 0
 
         def start(offset: ViewOffset) -> Draft:
-            return views.draft(offset) if room > 0 else Draft(views.make(offset), [])
+            if room > 0:
+                return views.draft(offset)
+            made = views.make(offset)
+            return Draft(made, made.colors, [])
 
         for draft in synthesis.side_by_side(start, nearest_first(inner, nearest_to)):
             if draft.undecided:

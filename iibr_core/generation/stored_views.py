@@ -6,13 +6,15 @@ made again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from iibr_core.color import stored_from_encoded
+from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.specks import without_specks
 from iibr_core.rendering.view_synthesis import RenderedView, ShownBefore, ViewSynthesis
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
@@ -20,15 +22,19 @@ from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, Vie
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A view in closed form, and its rays that the transformer is still to be asked for: see `ViewSynthesis`."""
+    """A view in closed form, and its rays that the transformer is still to be asked for: see `ViewSynthesis`.
+
+    with_specks: its colours, stored, before its specks were taken out.
+    """
 
     update: ViewUpdate
+    with_specks: StoredColors
     undecided: list[UndecidedRays]
 
     @property
     def nbytes(self) -> int:
         """Memory it takes."""
-        view = (self.update.colors, self.update.disparity, self.update.inpainted)
+        view = (self.update.colors, self.with_specks, self.update.disparity, self.update.inpainted)
         return sum(part.nbytes for part in view if part is not None) + sum(part.nbytes for part in self.undecided)
 
 
@@ -49,26 +55,45 @@ class StoredViews:
     def draft(self, offset: ViewOffset) -> Draft:
         """A view in closed form, final where nothing is left to be decided."""
         view, undecided = self._synthesis.render_draft(self._rays, offset)
-        return Draft(self.update(offset, view, is_final=not undecided), undecided)
+        stored = self._stored(view)
+        return Draft(self._update(offset, stored, view.disparity, view.inpainted, not undecided), stored, undecided)
 
     def finish(self, draft: Draft) -> ViewUpdate:
         """The final view: its undecided rays are written over, the draft itself stays as it is."""
-        drafted = draft.update
-        assert drafted.disparity is not None
-        assert drafted.inpainted is not None
-        colors, disparity, inpainted = drafted.colors.copy(), drafted.disparity.copy(), drafted.inpainted.copy()
+        assert draft.update.disparity is not None
+        assert draft.update.inpainted is not None
+        stored, disparity = draft.with_specks.copy(), draft.update.disparity.copy()
+        inpainted = draft.update.inpainted.copy()
         for part in draft.undecided:
             decided = self._synthesis.decide(self._rays, part)
             at = np.unravel_index(decided.pixel, self._rays.view_size)
-            colors[at] = stored_from_encoded(decided.colors, self._is_hdr)
+            stored[at] = stored_from_encoded(decided.colors, self._is_hdr)
             disparity[at], inpainted[at] = decided.disparity, decided.inpainted
-        return replace(drafted, colors=colors, disparity=disparity, inpainted=inpainted, is_final=True)
+        offset = self._grid.offset(draft.update.row, draft.update.column)
+        return self._update(offset, stored, disparity, inpainted, True)
 
     def update(self, offset: ViewOffset, view: RenderedView, is_final: bool = True) -> ViewUpdate:
-        """A rendered view as it is stored."""
-        colors = encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
+        """A rendered view as it is stored, its specks taken out."""
+        return self._update(offset, self._stored(view), view.disparity, view.inpainted, is_final)
+
+    def _stored(self, view: RenderedView) -> StoredColors:
+        return encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
+
+    def _update(
+        self,
+        offset: ViewOffset,
+        stored: StoredColors,
+        disparity: FloatImage,
+        inpainted: NDArray[np.bool_],
+        is_final: bool,
+    ) -> ViewUpdate:
+        """Specks are told from colours as they are stored: so a draft that was finished is what was made at once."""
+        settled = without_specks(
+            self._rays, offset, encoded_from_stored(stored), disparity, inpainted, self._should_stop, 1
+        )
+        colors = encode_for_storage(settled, self._is_hdr, self._should_stop, 1)
         (v, u), (t, s) = self._grid.centre, offset
-        return ViewUpdate(v + round(t), u + round(s), colors, view.disparity, view.inpainted, is_final)
+        return ViewUpdate(v + round(t), u + round(s), colors, disparity, inpainted, is_final)
 
 
 def encode_for_storage(

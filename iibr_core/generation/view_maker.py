@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from types import TracebackType
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
@@ -11,6 +12,7 @@ from iibr_core.generation.light_field import transformer_for
 from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.specks import without_specks
 from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
 from iibr_core.types import FloatImage, Quality, ViewOffset
 
@@ -52,7 +54,7 @@ class ViewMaker:
         try:
             start = time.perf_counter()
             for offset, view in render_outer_views(self._rays, self.outer, self._should_stop, slots=self._slots):
-                self._first[offset] = view, 1e3 * (time.perf_counter() - start)
+                self._first[offset] = self._settled(offset, view), 1e3 * (time.perf_counter() - start)
                 start = time.perf_counter()
         except BaseException:
             self.__exit__(None, None, None)
@@ -74,13 +76,21 @@ class ViewMaker:
         if quality == "fast" and offset in self._first:
             return self._first[offset]
         start = time.perf_counter()
-        view = self._syntheses[quality].render(self._rays, offset)
+        view = self._settled(offset, self._syntheses[quality].render(self._rays, offset))
         return view, 1e3 * (time.perf_counter() - start)
 
     def views(self, quality: Quality, offsets: Iterable[ViewOffset]) -> Iterator[RenderedView]:
         """Views at these offsets, in their order, several at a time, as `generate` makes them."""
         synthesis = self._syntheses[quality]
-        return synthesis.side_by_side(lambda offset: synthesis.render_alone(self._rays, offset), offsets)
+        return synthesis.side_by_side(
+            lambda offset: self._settled(offset, synthesis.render_alone(self._rays, offset), 1), offsets
+        )
+
+    def _settled(self, offset: ViewOffset, view: RenderedView, threads: int | None = None) -> RenderedView:
+        colors = without_specks(
+            self._rays, offset, view.colors, view.disparity, view.inpainted, self._should_stop, threads
+        )
+        return replace(view, colors=colors)
 
 
 def quantise_as_stored(colors: FloatImage) -> FloatImage:

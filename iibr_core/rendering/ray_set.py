@@ -60,14 +60,16 @@ class RaySet:
         surface_step: float,
         farthest_views: float = 1.0,
         margins: Margins = NO_MARGINS,
+        photo_detail: FloatImage | None = None,
     ) -> None:
         """size: of the images, margins: of them around every view. surface_step: disparities closer than this are one
-        surface for look-ups. farthest_views: the largest view offset that will be rendered.
+        surface for look-ups. farthest_views: the largest view offset that will be rendered. photo_detail: see there.
         """
         self._count = 0
         self._margins = margins
         self._surface_step = surface_step
         self._farthest_views = farthest_views
+        self._photo_detail = photo_detail
         self._statistics: DisparityStatistics | None = None
         self._soft_cells = np.zeros((0, 0, 0), np.bool_)
         self._surveying = threading.Lock()
@@ -219,6 +221,15 @@ class RaySet:
     def photo_disparity(self) -> FloatImage:
         """(H, W) disparity of the photo, as large as views."""
         return np.ascontiguousarray(self.in_view(self._disparity[0]))
+
+    @property
+    def photo_detail(self) -> FloatImage:
+        """(H, W), as large as images: how far the photo's pixels stand out (`specks.measure_detail`). ValueError where
+        the set was made without.
+        """
+        if self._photo_detail is None:
+            raise ValueError("these rays are no photo's: make them by rays_of_photo")
+        return self._photo_detail
 
     def _not_in_front(
         self, offset: ViewOffset, disparity: FloatImage, coverage: FloatImage, should_stop: ShouldStop

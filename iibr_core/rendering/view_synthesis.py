@@ -27,6 +27,7 @@ from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
 from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
+from iibr_core.rendering.specks import measure_detail
 from iibr_core.rendering.undecided_rays import find_undecided_rays
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
@@ -124,7 +125,8 @@ def rays_of_photo(
     colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop)
     centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
-    rays = RaySet(2 + more, image_size(disparity), OWN_SURFACE_PX / farthest_views, farthest_views, margins)
+    detail = measure_detail(colors, should_stop)
+    rays = RaySet(2 + more, image_size(disparity), OWN_SURFACE_PX / farthest_views, farthest_views, margins, detail)
     rays.add(centre, own, disparity, np.ones_like(disparity), should_stop)
     if coverage.any():
         rays.add(centre, fringe, fringe_disparity, coverage, should_stop)

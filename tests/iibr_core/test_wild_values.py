@@ -44,6 +44,7 @@ from iibr_core.rendering import (
     mixed_pixels,
     occlusion,
     resampling,
+    specks,
     undecided_rays,
 )
 from iibr_core.rendering.gloss import environment, geometry, shading, surface
@@ -167,6 +168,11 @@ def dense(values):
 def rendered(offset, value=0.5):
     with ViewSynthesis(keeps_entropy=True) as synthesis:
         return synthesis.render(rays(value), offset)
+
+
+def settled(value):
+    view = rendered(ViewOffset(0.5, 1.0), value)
+    return specks.without_specks(rays(value), ViewOffset(0.5, 1.0), view.colors, view.disparity, view.inpainted)
 
 
 def large_picture(value):
@@ -387,6 +393,8 @@ FINITE = {
         image(0.5), known(v), 0.5
     )[:2],
     "rendering.lens_light.draw_large": lambda v, _: large_picture(v),
+    "rendering.specks.measure_detail": lambda v, _: specks.measure_detail(image(v)),
+    "rendering.specks.without_specks": lambda v, _: settled(v),
     "rendering.large_views.views_of_tile": lambda v, _: tile_views(v),
     "rendering.occlusion.covered_share": lambda v, _: occlusion.covered_share(np.nan_to_num(shares(v))),
     "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),

@@ -147,6 +147,7 @@ class ComparisonJob:
     ) -> RenderedView:
         """The view by the ray set of the scene's plan, or at the ground truth's places; the middle one is the photo."""
         from iibr_core.generation.light_field import ray_set, transformer_for
+        from iibr_core.rendering.specks import without_specks
         from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis
 
         loaded, plan = inputs.loaded, inputs.plan
@@ -171,7 +172,10 @@ class ComparisonJob:
         with ViewSynthesis(
             should_stop, transformer, every, keeps_entropy=keeps_entropy, inpainter=inpainter
         ) as synthesis:
-            return synthesis.render(self._rays, plan.grid.offset(*request.view))
+            offset = plan.grid.offset(*request.view)
+            view = synthesis.render(self._rays, offset)
+        colors = without_specks(self._rays, offset, view.colors, view.disparity, view.inpainted, should_stop)
+        return replace(view, colors=colors)
 
 
 class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):

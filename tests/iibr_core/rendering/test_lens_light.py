@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from iibr_core.generation.light_field import ray_set
 from iibr_core.rendering import large_views
 from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.rendering.lens_light import LargeLens, LensSample, bring_to, draw_large, mean_of_areas
+from iibr_core.rendering.specks import without_specks
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import Disparity, ImageSize, Photo, ViewOffset, image_size
@@ -38,15 +40,17 @@ def test_tiles_cover_a_part_once() -> None:
 def test_a_view_in_tiles_is_the_view_made_at_once(side: int) -> None:
     photo = large()
     with ViewSynthesis() as synthesis:
-        expected = synthesis.render(rays_of_photo(photo.pixels, photo.disparity, 1.5, 0), OFFSET)
+        rays = rays_of_photo(photo.pixels, photo.disparity, 1.5, 0)
+        expected = synthesis.render(rays, OFFSET)
         seen = np.empty_like(photo.pixels)
         for tile in tiles_of(whole(photo.size), side):
             (view,) = views_of_tile(photo, tile, [OFFSET], synthesis)
             seen[tile.slices] = view.colors
-    # What nobody sees is filled tile by tile.
-    known = ~expected.occluded
-    assert known.mean() > 0.9
-    assert np.abs(seen - expected.colors)[known].max() < 0.02
+    colors = without_specks(rays, OFFSET, expected.colors, expected.disparity, expected.inpainted)
+    # What nobody sees is filled tile by tile; beside it specks are told by it.
+    known = ~ndimage.binary_dilation(expected.occluded, np.ones((3, 3)))
+    assert known.mean() > 0.85
+    assert np.abs(seen - colors)[known].max() < 0.02
 
 
 def test_holes_show_what_the_smaller_light_field_shows() -> None:

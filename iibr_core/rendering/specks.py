@@ -1,0 +1,148 @@
+"""Specks: single pixels of a view that stand out though the photo's own do not.
+
+Beside depth edges a map's errors tear rays off their surface: alone among others, they catch the eye. A ray that stands
+out from what surrounds it in the view by far more than it does in the photo was torn off, and takes the median of what
+surrounds it. Thin things stand out in the photo, too, and stay; so does all that lies within one surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.resampling import OWN_SURFACE_PX
+from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.types import FloatImage, ViewOffset, image_size
+
+STANDS_OUT = 0.03
+"""So much, in sRGB-encoded values, no ray may differ from the median of its 3x3 pixels; and STANDS_OUT_TIMES what it
+does in the photo.
+"""
+STANDS_OUT_TIMES = 2.0
+ALONE = 0.1
+"""With what was inpainted the photo has nothing to compare: it may differ by so much, and more where any of its eight
+neighbours is ALIKE, closer than this to it.
+"""
+ALIKE = 0.05
+
+
+def measure_detail(photo: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
+    """(H, W): how far each pixel of a photo (H, W, 3) is, in any channel, from the median of its 3x3 pixels.
+
+    Raises Cancelled once should_stop is true.
+    """
+    detail = np.empty(photo.shape[:2], np.float32)
+    in_bands(lambda first, last: _measure(photo, first, last, detail), image_size(detail), should_stop)
+    return detail
+
+
+def without_specks(
+    rays: RaySet,
+    offset: ViewOffset,
+    colors: FloatImage,
+    disparity: FloatImage,
+    inpainted: NDArray[np.bool_],
+    should_stop: ShouldStop = never,
+    threads: int | None = None,
+) -> FloatImage:
+    """The colours (H, W, 3), sRGB-encoded, of a view made of the rays of a photo, without its specks.
+
+    disparity, inpainted (H, W): as in `RenderedView`. threads: None for all. Raises Cancelled once should_stop is true.
+    """
+    detail, edge_level = rays.photo_detail, rays.arrays[4][0]
+    limit, parallax = rays.edge_limits(offset)[0], np.float32(max(map(abs, offset)))
+    settled = np.empty_like(colors)
+    in_bands(
+        lambda first, last: _settle(
+            colors, disparity, inpainted, detail, edge_level, limit, parallax,
+            rays.margins.top, rays.margins.left, *offset, first, last, settled,
+        ),
+        image_size(disparity), should_stop, threads,
+    )  # fmt: skip
+    return settled
+
+
+@kernel
+def _measure(photo, first, last, detail):
+    for y in range(first, last):
+        for x in range(photo.shape[1]):
+            detail[y, x] = 0.0
+            for channel in range(3):
+                stands_out = abs(photo[y, x, channel] - _median(photo, y, x, channel))
+                # Of what is infinite nobody can say; NaN fails the comparison.
+                if detail[y, x] < stands_out < np.inf:
+                    detail[y, x] = stands_out
+
+
+@kernel
+def _settle(
+    colors, disparity, inpainted, detail, edge_level, limit, parallax, top, left, t, s, first, last, settled
+):  # fmt: skip
+    """Rows [first, last) of `without_specks`. limit, parallax: a ray is beside a depth edge if the photo's edge_level
+    is above the one, or its view has steps of more than OWN_SURFACE_PX there, at the other, px per disparity.
+    """
+    height, width = disparity.shape
+    lowest, rightmost = detail.shape[0] - 1, detail.shape[1] - 1
+    settled[first:last] = colors[first:last]
+    for y in range(first, last):
+        above, below = max(y - 1, 0), min(y + 1, height - 1)
+        for x in range(width):
+            d = disparity[y, x]
+            v, u = min(max(y + d * t + top, 0.0), lowest), min(max(x + d * s + left, 0.0), rightmost)
+            if not inpainted[y, x] and edge_level[nearest_pixel(v), nearest_pixel(u)] <= limit:
+                before, after = disparity[y, max(x - 1, 0)], disparity[y, min(x + 1, width - 1)]
+                step = max(abs(before - d), abs(after - d), abs(disparity[above, x] - d), abs(disparity[below, x] - d))
+                if step * parallax <= OWN_SURFACE_PX:
+                    continue
+            red, green, blue = _median(colors, y, x, 0), _median(colors, y, x, 1), _median(colors, y, x, 2)
+            stands_out = max(abs(colors[y, x, 0] - red), abs(colors[y, x, 1] - green), abs(colors[y, x, 2] - blue))
+            if inpainted[y, x]:
+                is_speck = stands_out > ALONE and _is_alone(colors, y, x)
+            else:
+                is_speck = stands_out > STANDS_OUT + STANDS_OUT_TIMES * _interpolated(detail, v, u)
+            if is_speck:
+                settled[y, x, 0], settled[y, x, 1], settled[y, x, 2] = red, green, blue
+
+
+@kernel
+def _median(colors, y, x, channel):
+    """Of the 3x3 pixels around one, those at the border repeated: of the greatest low, the middle middle and the least
+    high value of its rows.
+    """
+    above, below = max(y - 1, 0), min(y + 1, colors.shape[0] - 1)
+    left, right = max(x - 1, 0), min(x + 1, colors.shape[1] - 1)
+    low, middle, high = _ordered(colors[y, left, channel], colors[y, x, channel], colors[y, right, channel])
+    upper = _ordered(colors[above, left, channel], colors[above, x, channel], colors[above, right, channel])
+    lower = _ordered(colors[below, left, channel], colors[below, x, channel], colors[below, right, channel])
+    low, high = max(low, upper[0], lower[0]), min(high, upper[2], lower[2])
+    return _ordered(low, _ordered(upper[1], middle, lower[1])[1], high)[1]
+
+
+@kernel
+def _ordered(a, b, c):
+    return min(a, b, c), max(min(a, b), min(max(a, b), c)), max(a, b, c)
+
+
+@kernel
+def _interpolated(image, y, x):
+    """Of an image (H, W), within it, between four pixels."""
+    row, column = int(y), int(x)
+    below, right = min(row + 1, image.shape[0] - 1), min(column + 1, image.shape[1] - 1)
+    down, across = y - row, x - column
+    upper = (1 - across) * image[row, column] + across * image[row, right]
+    return (1 - down) * upper + down * ((1 - across) * image[below, column] + across * image[below, right])
+
+
+@kernel
+def _is_alone(colors, y, x):
+    """Whether none of the eight pixels around is ALIKE."""
+    for row in range(max(y - 1, 0), min(y + 2, colors.shape[0])):
+        for column in range(max(x - 1, 0), min(x + 2, colors.shape[1])):
+            difference = 0.0
+            for channel in range(3):
+                difference = max(difference, abs(colors[row, column, channel] - colors[y, x, channel]))
+            if difference < ALIKE and (row != y or column != x):
+                return False
+    return True

@@ -1,0 +1,126 @@
+"""Specks are found and taken out; what stands out in the photo, too, stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.resampling import OWN_SURFACE_PX
+from iibr_core.rendering.specks import ALIKE, ALONE, STANDS_OUT, STANDS_OUT_TIMES, measure_detail, without_specks
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.types import ImageSize, ViewOffset
+from tests.iibr_core.scenes import smooth_texture, square_before_wall
+
+OFFSET = ViewOffset(-0.5, 1.5)
+
+
+def median(colors: np.ndarray) -> np.ndarray:
+    return ndimage.median_filter(colors, (3, 3, 1), mode="nearest")
+
+
+def slowly(
+    rays: RaySet, colors: np.ndarray, disparity: np.ndarray, inpainted: np.ndarray, detail: np.ndarray
+) -> np.ndarray:
+    """The same, pixel by pixel; views of a photo without margins."""
+    settled, medians, parallax = colors.copy(), median(colors), max(map(abs, OFFSET))
+    height, width = disparity.shape
+    for y, x in np.ndindex(height, width):
+        v, u = np.clip(np.array([y, x]) + disparity[y, x] * np.array(OFFSET), 0, [height - 1, width - 1])
+        around = [
+            (row, column)
+            for row in range(max(y - 1, 0), min(y + 2, height))
+            for column in range(max(x - 1, 0), min(x + 2, width))
+        ]
+        beside = [disparity[at] for at in around if abs(at[0] - y) + abs(at[1] - x) == 1]
+        is_torn = rays.arrays[4][0][int(v + 0.5), int(u + 0.5)] > rays.edge_limits(OFFSET)[0]
+        is_torn |= max(abs(d - disparity[y, x]) for d in beside) * parallax > OWN_SURFACE_PX
+        own = ndimage.map_coordinates(detail.astype(float), [[v], [u]], order=1, mode="nearest")[0]
+        stands_out = np.abs(colors[y, x] - medians[y, x]).max()
+        alone = all(np.abs(colors[at] - colors[y, x]).max() >= ALIKE for at in around if at != (y, x))
+        if inpainted[y, x]:
+            is_speck = stands_out > ALONE and alone
+        else:
+            is_speck = is_torn and stands_out > STANDS_OUT + STANDS_OUT_TIMES * own
+        if is_speck:
+            settled[y, x] = medians[y, x]
+    return settled
+
+
+def test_the_kernel_is_its_slow_twin() -> None:
+    rng = np.random.default_rng(5)
+    photo = np.clip(smooth_texture(30, 40) + rng.normal(0, 0.01, (30, 40, 3)), 0, 1).astype(np.float32)
+    values = np.where((np.indices((30, 40)) // 9).sum(0) % 2, 2.0, 0.5).astype(np.float32)
+    rays = rays_of_photo(photo, values, 1.5, 0)
+    detail = measure_detail(photo)
+    np.testing.assert_allclose(detail, np.abs(photo - median(photo)).max(-1), atol=1e-6)
+    with ViewSynthesis() as synthesis:
+        view = synthesis.render(rays, OFFSET)
+    colors = np.where(rng.random((30, 40, 1)) < 0.1, rng.random((30, 40, 3)), view.colors).astype(np.float32)
+    settled = without_specks(rays, OFFSET, colors, view.disparity, view.inpainted)
+    np.testing.assert_allclose(settled, slowly(rays, colors, view.disparity, view.inpainted, detail), atol=1e-5)
+    changed = (settled != colors).any(-1)
+    assert changed[view.inpainted].any()
+    assert changed[~view.inpainted].any()
+
+
+def test_pixels_whose_disparity_is_the_other_surfaces_are_specks() -> None:
+    """Lone front pixels that move with the wall, lone wall pixels that move with the front."""
+    photo, disparity = square_before_wall(60, 80, front=4.0)
+    near = disparity.values > 2
+    beside = ndimage.binary_dilation(near, iterations=2) & ~ndimage.binary_erosion(near, iterations=2)
+
+    def with_and_without(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rays = rays_of_photo(photo.pixels, values, 1.5, 0)
+        with ViewSynthesis() as synthesis:
+            view = synthesis.render(rays, OFFSET)
+        return view.colors, without_specks(rays, OFFSET, view.colors, view.disparity, view.inpainted)
+
+    truth, settled = with_and_without(disparity.values)
+    errors = []
+    for seed in range(4):
+        swapped = beside & (np.random.default_rng(seed).random(near.shape) < 0.05)
+        views = with_and_without(np.where(swapped, 4.0 - disparity.values, disparity.values).astype(np.float32))
+        errors.append([((colors - truth) ** 2).mean() for colors in views])
+    with_specks, without = np.mean(errors, axis=0)
+    assert without < 0.75 * with_specks
+    assert ((settled - truth) ** 2).mean() < 0.01 * with_specks
+
+
+def test_a_thin_wire_stays() -> None:
+    photo = np.full((40, 60, 3), 0.8, np.float32)
+    values = np.zeros((40, 60), np.float32)
+    rows, columns = np.arange(40), np.arange(40) // 2 + 15
+    photo[rows, columns], values[rows, columns] = 0.1, 3.0
+    rays = rays_of_photo(photo, values, 1.5, 0)
+    with ViewSynthesis() as synthesis:
+        view = synthesis.render(rays, ViewOffset(0.0, 1.0))
+    settled = without_specks(rays, ViewOffset(0.0, 1.0), view.colors, view.disparity, view.inpainted)
+    wire = view.disparity > 2.5
+    assert wire.sum() >= 38
+    assert (settled[wire] == view.colors[wire]).all()
+
+
+def test_the_photos_own_view_stays() -> None:
+    rng = np.random.default_rng(3)
+    photo = rng.random((20, 30, 3)).astype(np.float32)
+    values = rng.integers(0, 3, (20, 30)).astype(np.float32)
+    rays = rays_of_photo(photo, values, 1.0, 0)
+    nothing = np.zeros((20, 30), np.bool_)
+    assert (without_specks(rays, ViewOffset(0.0, 0.0), photo, values, nothing) == photo).all()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2)])
+def test_tiny_photos(size: tuple[int, int]) -> None:
+    photo, values = np.ones((*size, 3), np.float32), np.ones(size, np.float32)
+    rays = rays_of_photo(photo, values, 1.0, 0)
+    view = without_specks(rays, ViewOffset(0.0, 1.0), photo, values, np.zeros(size, np.bool_))
+    assert (view == 1).all()
+
+
+def test_rays_of_no_photo_say_so() -> None:
+    rays = RaySet(1, ImageSize(4, 5), 0.5)
+    rays.add(ViewOffset(0.0, 0.0), *(np.ones((4, 5, *more), np.float32) for more in ((3,), (), ())))
+    with pytest.raises(ValueError, match="rays_of_photo"):
+        _ = rays.photo_detail
