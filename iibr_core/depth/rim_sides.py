@@ -22,6 +22,9 @@ RIM_PX = 2
 """A rim: pixels with at most so many others between them and a step."""
 REACH_PX, SPREAD_PX = 7, 3.5
 """Pixels within so many, each way, tell both surfaces' colours; standard deviation of their weights by distance."""
+_STEPS = np.arange(-REACH_PX, REACH_PX + 1)
+NEARNESS = np.exp(-0.5 * (_STEPS[:, None] ** 2 + _STEPS**2) / SPREAD_PX**2)
+"""Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1), the pixel itself in the middle."""
 TRUST = np.array([0.15, 0.35, 0.7, 1.0], np.float32)
 """Their weights by how many pixels lie between them and a step: rims are mixed, or on the wrong side themselves."""
 FILLED_TRUST = 0.2
@@ -176,7 +179,7 @@ def _weigh_colors(colors, values, unknown, distance, least_edge, alike, pixels):
                 # Neither of the two surfaces, or the pixel itself.
                 if min(to_own, to_other) > half or (v == y and u == x):
                     continue
-                w = exp(-0.5 * ((v - y) ** 2 + (u - x) ** 2) / SPREAD_PX**2) * TRUST[distance[v, u]]
+                w = NEARNESS[v - y + REACH_PX, u - x + REACH_PX] * TRUST[distance[v, u]]
                 w *= FILLED_TRUST if unknown[v, u] else 1.0
                 apart = 0.0
                 for c in range(3):
