@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
 from pathlib import Path
 
+import pytest
+from imgui_bundle import imgui
+
+from tests.viewer.conftest import headless_with_scene
+from viewer.model.actions import ShowPrompt
 from viewer.model.commands import COMMANDS
+from viewer.model.layout import ScreenSize
 from viewer.ui.overlays.prompts import MOUSE
 
 README = Path(__file__).parents[2] / "README.md"
@@ -14,9 +21,8 @@ def told_keys() -> set[str]:
     """What the first column of the table names."""
     lines = README.read_text("utf-8").splitlines()
     start = lines.index("| in the window | |") + 2
-    rows = [line for line in lines[start : start + 60] if line.startswith("|")]
-    ends = next((i for i, line in enumerate(lines[start:]) if not line.startswith("|")), len(rows))
-    cells = [row.split(" | ")[0].removeprefix("| ") for row in lines[start : start + ends]]
+    rows = takewhile(lambda line: line.startswith("|"), lines[start:])
+    cells = [row.split(" | ")[0].removeprefix("| ") for row in rows]
     return {key.strip().replace("\\\\", "\\") for cell in cells for key in cell.split(", ")}
 
 
@@ -25,7 +31,20 @@ def test_the_table_names_every_key_and_gesture_and_no_other() -> None:
     assert told_keys() == keys | {gesture for gesture, _ in MOUSE}
 
 
-def test_the_help_shows_every_command_that_has_a_key() -> None:
-    """It is made of the same table: what it shows of each is its first chord and its name, both distinct."""
-    shown = [(command.chords[0].words, command.name) for command in COMMANDS if command.chords]
-    assert len({key for key, _ in shown}) == len({name for _, name in shown}) == len(shown) > 20
+def test_the_help_shows_them_all_and_what_they_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+    build = imgui.text_wrapped
+
+    def note(words: str) -> None:
+        shown.append(words)
+        build(words)
+
+    with headless_with_scene(tmp_path) as viewer:
+        viewer.do(ShowPrompt("help"))
+        monkeypatch.setattr(imgui, "text_wrapped", note)
+        viewer.screen(ScreenSize(1280, 800))
+    last_frame = shown[len(shown) - 1 - shown[::-1].index(MOUSE[0][0]) :]
+    told = dict(zip(last_frame[::2], last_frame[1::2], strict=True))
+    assert {key for keys in told for key in keys.split(", ")} == told_keys()
+    commands = {command.name.rstrip("…") for command in COMMANDS if command.chords}
+    assert set(told.values()) == commands | {meaning for _, meaning in MOUSE}

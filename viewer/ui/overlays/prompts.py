@@ -123,7 +123,7 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case "quit":
             return _quit(layout)
         case "help":
-            keys = ((command.chords[0].words, command.name) for command in COMMANDS if command.chords)
+            keys = ((", ".join(chord.words for chord in c.chords), c.name) for c in COMMANDS if c.chords)
             return _help(layout, [*MOUSE, *keys], imgui.TableFlags_.scroll_y)
         case "welcome":
             return _help(layout, [*MOUSE[:FIRST_GESTURES], ("F1", "All of mouse and keys")])
