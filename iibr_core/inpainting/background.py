@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, rims_of_holes
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.inpainting.rim_lines import find_lines, line_weight, mixed_beside
-from iibr_core.inpainting.rim_texture import mirror_texture
+from iibr_core.inpainting.rim_texture import carry_texture
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage, ViewOffset, image_size
@@ -102,7 +102,7 @@ def _fill_view(
         lambda part: _agree(disparity, hole, pixels[part], changed[part]),
         lambda part: _write_disparity(changed[part], pixels[part], disparity),
         *chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX),
-        lambda part: mirror_texture(colors, disparity, hole, pixels[part], known[part], one_surface, changed[part]),
+        lambda part: carry_texture(colors, disparity, mixed, pixels[part], one_surface, changed[part]),
         lambda part: _add_texture(changed[part], pixels[part], colors),
     ]  # fmt: skip
     in_pieces(
