@@ -30,11 +30,9 @@ def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> s
     """
     bridge = Bridge() if settings.show else None  # before anything is drawn, for there may be none
     quilt = _quilt_of(source.scene, settings.device)
-    frame = ScreenSize(quilt.tile.width, quilt.tile.height)
-    drawn = (
-        draw_framed(source, RenderSettings(picture.optics, frame, picture.part), quilt.aspect)
-        for picture in side_pictures(source.scene, source.optics, quilt.views, settings.eyes)
-    )
+    tile = RenderSettings(source.optics, ScreenSize(quilt.tile.width, quilt.tile.height))
+    pictures = side_pictures(source.scene, tile, quilt.views, settings.eyes)
+    drawn = (draw_framed(source, picture, quilt.aspect) for picture in pictures)
     write_with_metadata(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")), source)
     return bridge.show_quilt(path, quilt) if bridge is not None else None
 

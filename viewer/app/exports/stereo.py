@@ -47,11 +47,9 @@ def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1, 
     Raises InputError where what is in focus cannot be held still, Cancelled once the export should stop.
     """
     width, height = settings.size
-    frame = ScreenSize(max(width // squeeze, 1), height)
-    drawn = (
-        draw_framed(source, RenderSettings(eye.optics, frame, eye.part, color_space=color_space), width / height)
-        for eye in side_pictures(source.scene, source.optics, 2, settings.eyes)
-    )
+    both = RenderSettings(source.optics, ScreenSize(max(width // squeeze, 1), height), color_space=color_space)
+    eyes = side_pictures(source.scene, both, 2, settings.eyes)
+    drawn = (draw_framed(source, eye, width / height) for eye in eyes)
     left, right = source.watched(drawn, 2, "drawing")
     return left, right
 

@@ -49,8 +49,8 @@ def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
     near = source.scene.disparity_range_px[1]
     places = {}
     for focus in (0.0, near):
-        eyes = side_pictures(source.scene, Optics(focus_disparity=focus), 2, 2.0)
-        drawn = [source.draw(RenderSettings(eye.optics, ScreenSize(288, 192), eye.part)).astype(int) for eye in eyes]
+        both = RenderSettings(Optics(focus_disparity=focus), ScreenSize(288, 192))
+        drawn = [source.draw(eye).astype(int) for eye in side_pictures(source.scene, both, 2, 2.0)]
         left, right = map(left_edge_of_square, drawn)
         places[focus] = left - right
     assert places[near] == pytest.approx(0, abs=0.4)
@@ -59,7 +59,7 @@ def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
 
 def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:
     with pytest.raises(InputError, match="too much to be held still"):
-        side_pictures(source.scene, Optics(focus_disparity=30.0), 2, 2.0)
+        side_pictures(source.scene, RenderSettings(Optics(focus_disparity=30.0), ScreenSize(96, 64)), 2, 2.0)
 
 
 @pytest.mark.parametrize("name", DEVICES)
