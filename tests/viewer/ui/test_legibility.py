@@ -13,8 +13,10 @@ from imgui_bundle import imgui
 
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import SetFontScale, SetUnits
+from viewer.background.model_download import list_models
+from viewer.model.actions import SetFontScale, SetUnits, ShowPrompt
 from viewer.model.layout import PANEL_WIDTH, ScreenSize
+from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     ApertureShape,
@@ -24,8 +26,10 @@ from viewer.model.state.optics import (
     SetTilt,
 )
 from viewer.model.state.preferences import SECTIONS, Theme, Units
+from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.style import Color, palette_of
 
+WINDOW = ScreenSize(1280, 800)
 LEAST_CONTRAST = 4.5
 SCALES = (0.6, 0.8, 1.0, 1.33, 2.0)
 SLACK_PX = 1.0
@@ -48,7 +52,7 @@ class Item:
 
 def words_of(kind: str, arguments: tuple[Any, ...]) -> str:
     if kind in ("slider_float", "slider_int"):
-        value, form = arguments[1], arguments[4]
+        value, form = arguments[1], arguments[4] if len(arguments) > 4 else "%d"
         return str(form % value if form.replace("%%", "").count("%") else form.replace("%%", "%"))
     return str(arguments[1] if kind == "begin_combo" else arguments[0]).partition("##")[0]
 
@@ -111,6 +115,44 @@ def test_no_widget_is_cut_and_none_lies_over_another(
         across = min(one.right, other.right) - max(one.left, other.left)
         down = min(one.bottom, other.bottom) - max(one.top, other.top)
         assert min(across, down) <= SLACK_PX, f"{one} lies over {other}"
+
+
+PROMPTS: dict[str, Prompt] = {
+    "help": "help",
+    "welcome": "welcome",
+    "quit": "quit",
+    "palette": PalettePrompt(),
+    "save": SavePrompt("a.jpg", ScreenSize(48, 32), problem="There is no such folder: choose another one, or make it."),
+    "path": PathPrompt("photo"),
+    "export": ExportPrompt("mp4", "a.mp4"),
+    "models": list_models(),
+}
+
+
+@pytest.mark.parametrize("scale", [0.6, 1.0, 2.0])
+@pytest.mark.parametrize("name", PROMPTS)
+def test_prompts_fit_the_window_and_their_words_fit_them(
+    viewer: HeadlessViewer, items: list[Item], monkeypatch: pytest.MonkeyPatch, name: str, scale: float
+) -> None:
+    ended: list[tuple[float, ...]] = []
+    end = imgui.end
+
+    def note_and_end() -> None:
+        corner, size = imgui.get_window_pos(), imgui.get_window_size()
+        if imgui.internal.get_current_window_read().name.startswith("prompt"):
+            ended.append((corner.x, corner.y, corner.x + size.x, corner.y + size.y, imgui.get_scroll_max_x()))
+        end()
+
+    monkeypatch.setattr(imgui, "end", note_and_end)
+    viewer.do(SetFontScale(scale), ShowPrompt(PROMPTS[name]))
+    viewer.screen(WINDOW)
+    left, top, right, bottom, hidden = ended[-1]
+    assert (left >= 0, top >= 0, right <= WINDOW.width, bottom <= WINDOW.height) == (True,) * 4, ended[-1]
+    assert hidden == 0, "cut at the right"
+    within = [item for item in items if left <= item.left < right and top <= item.top < bottom]
+    assert within
+    for item in within:
+        assert item.kind not in WORDS_INSIDE or item.words_width <= item.right - item.left + SLACK_PX, item
 
 
 def test_widgets_are_watched(items: list[Item], tmp_path: Path) -> None:
