@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -33,6 +34,9 @@ from viewer.model.state.scene import Source, source_beside
 
 SKETCHES_FIRST = 3
 """A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work."""
+
+TAKE_BUDGET_S = 0.006
+"""A turn: making room for a scene, and then for all its views, is too much for one frame."""
 
 
 class SceneLoader:
@@ -70,10 +74,13 @@ class SceneLoader:
         self._worker.eye = eye
 
     def take_results(self, state: AppState) -> list[Action]:
-        """The worker's results, as actions; the one place where they arrive."""
+        """The worker's results, as actions, for about TAKE_BUDGET_S, at least one; the one place where they arrive."""
         actions = self._show_sketch(state)
+        end = time.perf_counter() + TAKE_BUDGET_S
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._take(result, state)
+            if time.perf_counter() >= end:
+                break
         return actions
 
     def preview_depth(self, state: AppState) -> list[Action]:
