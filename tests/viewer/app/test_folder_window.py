@@ -156,6 +156,16 @@ def test_a_photo_that_cannot_be_read_has_its_name_in_the_filmstrip(open_window: 
     shows(driver, "photo2")
 
 
+def test_one_goes_on_from_a_folder_whose_first_photo_cannot_be_read(open_window: Opener, tmp_path: Path) -> None:
+    (tmp_path / "photo0.jpg").write_bytes(b"no photo")
+    write_scene(tmp_path, "photo1")
+    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver.until(lambda app: app.state.folder is not None)
+    assert driver.app.state.scene is None
+    driver.send("key", "Page_Down")
+    shows(driver, "photo1")
+
+
 def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:
     viewer.press("photo photo2.png", "filmstrip")
     shows(viewer, "photo2")

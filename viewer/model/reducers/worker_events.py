@@ -38,7 +38,7 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
             shown = state.progress if state.stopped == state.generation else progress
             return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
-            return _leave_job(add_notice(_mark_unreadable(state), notice_in_window(message, is_error=True)))
+            return _fail_to_open(add_notice(state, notice_in_window(message, is_error=True)))
 
 
 def stop_work(state: AppState) -> AppState:
@@ -124,13 +124,18 @@ def _offers(scene: Scene) -> tuple[Notice, ...]:
     return (Notice(words.strip(), offer=settings),)
 
 
-def _mark_unreadable(state: AppState) -> AppState:
-    """The state that knows that the photo stepped to does not open, if nothing of it is shown."""
+def _fail_to_open(state: AppState) -> AppState:
+    """The state after a file did not open. A photo that was stepped to is passed by from now on; where nothing else is
+    open, one may go on to those beside it.
+    """
     folder, source, scene = state.folder, state.source, state.scene
-    is_shown = scene is not None and scene.source is source
-    if folder is None or source is None or is_shown or not is_stepped_to(folder, source):
-        return state
-    return replace(state, folder=replace(folder, unreadable=folder.unreadable | {folder.stepped_to}))
+    if source is None or (scene is not None and scene.source is source):
+        return _leave_job(state)
+    if scene is None:
+        state = replace(state, tasks=(*state.tasks, ListFolderTask(str(PurePath(source.path).parent))))
+    elif folder is not None and is_stepped_to(folder, source):
+        state = replace(state, folder=replace(folder, unreadable=folder.unreadable | {folder.stepped_to}))
+    return _leave_job(state)
 
 
 def _leave_job(state: AppState) -> AppState:
