@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from viewer.model.layout import Layout
 
 LABEL_WIDTH = 92.0
-GRIP_WIDTH = 12.0
+GRIP_WIDTH, GRIP_HEIGHT = 12.0, 4.0
 TOOLTIP_WIDTH = 260.0
 
 
@@ -66,13 +66,13 @@ def _draw_grip(value_and_limits: tuple[float, ...], layout: Layout) -> None:
     value, low, high = value_and_limits
     corner, far = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     share = min(max((value - low) / (high - low), 0.0), 1.0) if high > low else 0.0
-    grip, thin, thick = GRIP_WIDTH * layout.ui_scale, 2 * layout.ui_scale, 4 * layout.ui_scale
+    grip, thick = GRIP_WIDTH * layout.ui_scale, GRIP_HEIGHT * layout.ui_scale
     x = corner.x + share * (far.x - corner.x - grip)
     is_held = imgui.is_item_active() or imgui.is_item_hovered()
     color = imgui.get_color_u32(imgui.Col_.check_mark if is_held else imgui.Col_.button_active)
     draw = imgui.get_window_draw_list()
-    draw.add_rect_filled(imgui.ImVec2(corner.x, far.y - thin), imgui.ImVec2(x, far.y), color)
-    draw.add_rect_filled(imgui.ImVec2(x, far.y - thick), imgui.ImVec2(x + grip, far.y), color, thin)
+    draw.add_rect_filled(imgui.ImVec2(corner.x, far.y - thick / 2), imgui.ImVec2(x, far.y), color)
+    draw.add_rect_filled(imgui.ImVec2(x, far.y - thick), imgui.ImVec2(x + grip, far.y), color, thick / 2)
 
 
 def checkbox(text: str, is_on: bool, layout: Layout, tip: str = "") -> bool | None:

@@ -95,6 +95,19 @@ def test_a_click_focuses_on_the_surface_under_it(viewer: Driver) -> None:
         viewer.until_idle()
 
 
+def test_the_first_click_is_seen_and_says_what_it_opened_once(viewer: Driver) -> None:
+    """Through a pinhole it would change nothing."""
+    before = viewer.image()
+    for place in ((0.5, 0.5), (0.1, 0.1)):
+        focus = viewer.app.state.optics.focus_disparity
+        viewer.send("mousemove", *viewer.position(*place), "click", 1)
+        viewer.until(lambda app, focus=focus: app.state.optics.focus_disparity != focus)  # type: ignore[misc]
+        viewer.until_idle()
+    assert viewer.app.state.optics.aperture_diameter > 0
+    assert (viewer.image() != before).any()
+    assert ["opened the aperture" in notice.text for notice in viewer.app.state.notices].count(True) == 1
+
+
 def test_a_double_click_resets(viewer: Driver) -> None:
     viewer.send("key", "Right")
     viewer.until(lambda app: app.state.optics.eye == ViewOffset(0, 0.5))

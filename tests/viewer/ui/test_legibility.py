@@ -28,6 +28,7 @@ from viewer.model.state.optics import (
 from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.style import Color, palette_of
+from viewer.ui.widgets import GRIP_HEIGHT
 
 WINDOW = ScreenSize(1280, 800)
 LEAST_CONTRAST = 4.5
@@ -115,6 +116,16 @@ def test_no_widget_is_cut_and_none_lies_over_another(
         across = min(one.right, other.right) - max(one.left, other.left)
         down = min(one.bottom, other.bottom) - max(one.top, other.top)
         assert min(across, down) <= SLACK_PX, f"{one} lies over {other}"
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_the_grip_of_a_slider_lies_below_its_value(viewer: HeadlessViewer, items: list[Item], scale: float) -> None:
+    viewer.do(SetFontScale(scale))
+    viewer.screen(ScreenSize(round(120 + PANEL_WIDTH * scale), 2600))
+    line = min(item.bottom - item.top for item in items if item.kind == "text")
+    sliders = [item.bottom - item.top for item in items if item.kind == "slider_float"]
+    assert sliders
+    assert (min(sliders) - line) / 2 >= GRIP_HEIGHT * scale - SLACK_PX / 2
 
 
 PROMPTS: dict[str, Prompt] = {
