@@ -55,7 +55,7 @@ def photos_within_budget(scene: Scene) -> int:
 
 
 class ReadAhead(Generic[Read]):
-    """Reads what it is told to want, one after the other, and keeps that until it is taken or wanted no more."""
+    """Reads what it is told to want, one after the other, and keeps that as long as it is wanted."""
 
     def __init__(
         self, name: str, wake: Callable[[], None], read: Callable[[WantedPhoto, ShouldStop], Read | None]
@@ -76,8 +76,8 @@ class ReadAhead(Generic[Read]):
         self._take_results()
         self._known = {photo: read for photo, read in self._known.items() if photo in wanted}
         missing = [photo for photo in wanted if photo not in self._known]
-        may_go_on = missing[:1] if missing[:1] == [*wanted[:1]] else missing
-        if self._reading is not None and self._reading not in may_go_on:
+        is_urgent = bool(missing) and missing[0] == wanted[0]
+        if self._reading is not None and self._reading not in (missing[:1] if is_urgent else missing):
             self._thread.cancel()
             self._reading = None
         if self._reading is None and missing and not self._thread.is_lost:
