@@ -54,15 +54,15 @@ class Renderer:
     passes_shown: how many passes of the best picture what is shown is made of; 0: it is softer than that.
     """
 
-    def __init__(self, gl: GLContext, prefilter: bool = True, adaptive: bool = True) -> None:
+    def __init__(self, gl: GLContext) -> None:
         self.gl = gl
         self.ctx = gl.ctx
-        self.prefilter = prefilter
+        self.prefilter = True
         self.report = DrawReport()
         self.passes_shown = 0
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
-        self.adaptive = adaptive
+        self.adaptive = True
         self._fields = OpenField(self.ctx)
         self._screen = ScreenImage(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
