@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.types import ViewOffset
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import (
@@ -39,7 +38,6 @@ from viewer.model.state.optics import (
     ApertureKind,
     ApertureMask,
     ApertureShape,
-    MoveEye,
     SetAperture,
     SetApertureShape,
 )
@@ -124,17 +122,6 @@ def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind
 )
 def test_the_panel_tells(viewer: HeadlessViewer, action: Action) -> None:
     assert in_panel(changed_after(viewer, action)).sum() > ENOUGH_PIXELS
-
-
-def test_a_viewpoint_beyond_the_views_is_marked_in_another_colour(viewer: HeadlessViewer) -> None:
-    def marked() -> int:
-        panel = in_panel(viewer.screen(SIZE)).astype(int)
-        return int((np.abs(panel - np.round(255 * np.array(DARK.warning[:3]))).max(axis=2) < 6).sum())
-
-    viewer.do(MoveEye(ViewOffset(0, 1)))
-    assert marked() == 0
-    viewer.do(MoveEye(ViewOffset(0, 1.4)))
-    assert marked() > ENOUGH_PIXELS
 
 
 def test_light_and_dark(viewer: HeadlessViewer) -> None:

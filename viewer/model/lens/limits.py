@@ -13,8 +13,8 @@ from viewer.model.state.scene import Scene
 
 Record = TypeVar("Record", Optics, ApertureShape)
 
-EYE_MARGIN_VIEWS = 0.5
-"""The viewpoint may leave the grid by at least this much."""
+LONE_VIEW_MARGIN = 0.5
+"""So far, in view steps, the viewpoint may leave a row of one view."""
 
 DEPTH_STRENGTH_LIMIT = 4.0
 SPEED_LIMITS = (0.05, 1.0)
@@ -33,8 +33,10 @@ def clamp(value: float, low: float, high: float) -> float:
 
 
 def eye_margin(views: int) -> float:
-    """How far the viewpoint may leave a row of views on each side, extrapolated: half the row's radius."""
-    return max(EYE_MARGIN_VIEWS, (views - 1) / 4)
+    """How far the viewpoint may leave a row of views on each side: only where it could not move else. Nothing is known
+    of what shows there: outlines are those of pixels, and what they uncover is stretched.
+    """
+    return LONE_VIEW_MARGIN if views == 1 else 0.0
 
 
 def eye_limits(views: int) -> tuple[float, float]:
@@ -52,11 +54,6 @@ def clamp_to_grid(eye: ViewOffset, grid: GridShape) -> ViewOffset:
     """The point of the grid's rectangle nearest to the eye."""
     first, last = grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)
     return ViewOffset(min(max(eye.t, first.t), last.t), min(max(eye.s, first.s), last.s))
-
-
-def is_extrapolated(eye: ViewOffset, grid: GridShape) -> bool:
-    """Whether the viewpoint lies outside the stored views."""
-    return any(not -(views // 2) <= x <= views - 1 - views // 2 for x, views in zip(eye, grid))
 
 
 def dolly_limit(grid: GridShape) -> float:

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.model.actions import Action, PauseMotion, ReturnHome, SetLoop, SetSpeed
 from viewer.model.commands import LOOP_WORDS
 from viewer.model.layout import Layout
-from viewer.model.lens.limits import SPEED_LIMITS, dolly_limit, is_extrapolated
+from viewer.model.lens.limits import SPEED_LIMITS, dolly_limit
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import LOOPS
 from viewer.model.state.optics import SetDolly
@@ -52,12 +52,11 @@ def _loops(state: AppState, layout: Layout) -> list[Action]:
 
 
 def _place(state: AppState, scene: Scene, palette: Palette) -> None:
-    """Where the viewpoint is, in one line that never wraps; amber where the picture is extrapolated."""
+    """Where the viewpoint is, in one line that never wraps."""
     eye = state.optics.eye
-    outside = is_extrapolated(eye, scene.grid)
     s, t = (round(value, 1) + 0.0 for value in (eye.s, eye.t))  # + 0.0 takes the sign of -0.0 away
     words = f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}"
-    imgui.push_style_color(imgui.Col_.text, pack_color(palette.warning if outside else palette.quiet))
+    imgui.push_style_color(imgui.Col_.text, pack_color(palette.quiet))
     imgui.text(words)
     imgui.pop_style_color()
 

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action
 from viewer.model.layout import Layout, Rect
-from viewer.model.lens.limits import clamp_to_grid, eye_limits, is_extrapolated
+from viewer.model.lens.limits import eye_limits
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye
 from viewer.model.state.scene import Scene
@@ -68,18 +68,13 @@ def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float, palette
     _draw_stored(draw, grid, chart, scale, palette)
     _draw_views(draw, state.views_there, grid, chart, scale, palette)
     x, y = chart.point(state.optics.eye)
-    outside = is_extrapolated(state.optics.eye, grid)
-    color = palette.warning if outside else palette.accent
-    if outside:
-        inside = clamp_to_grid(state.optics.eye, grid)
-        draw.add_line(imgui.ImVec2(*chart.point(inside)), imgui.ImVec2(x, y), pack_color(color, 0.7), 1.5 * scale)
-    draw.add_circle_filled(imgui.ImVec2(x, y), 6 * scale, pack_color(color))
+    draw.add_circle_filled(imgui.ImVec2(x, y), 6 * scale, pack_color(palette.accent))
     draw.add_circle(imgui.ImVec2(x, y), 6 * scale, pack_color(palette.panel), 0, 1.5 * scale)
     draw.pop_clip_rect()
 
 
 def _draw_stored(draw: imgui.ImDrawList, grid: GridShape, chart: PadMap, scale: float, palette: Palette) -> None:
-    """The area between the outermost views: what lies beyond is extrapolated."""
+    """The area between the outermost views."""
     left, top = chart.point(grid.offset(0, 0))
     right, bottom = chart.point(grid.offset(grid.rows - 1, grid.columns - 1))
     room = 4 * scale
