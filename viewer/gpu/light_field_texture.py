@@ -117,7 +117,7 @@ class LightFieldTexture:
         self.uploads[row, column] += 1
 
     def _store_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
-        """Of whole blocks, but at the borders of the view; colours' alpha is left to be written."""
+        """Store what lies within a box of whole blocks; the texels' alpha is set, and left to be written."""
         values = _finite_half(disparity[box])
         self.disparities.write(values.astype(np.float16), self._viewport(row, column, box))
         blocks = _block_ranges(values)
