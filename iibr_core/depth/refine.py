@@ -11,6 +11,7 @@ from math import ceil, floor, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.depth.blur_fit import fit_to_blur
 from iibr_core.depth.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
 from iibr_core.depth.edge_profiles import gradient, height_at, walk
 from iibr_core.depth.ridges import SHARES, structure_at
@@ -98,7 +99,8 @@ def _sharpen(
         _refine(values, colors, least_edge, blur.sigma_px, blur.cell_px, softness, first, last, refined)
 
     in_bands(band, image_size(values), should_stop)
-    return refined
+    # Slopes that are only shortened give no map that this could be the blur of.
+    return fit_to_blur(colors, values, refined, blur, least_edge, should_stop) if softness == FINE_STRENGTH else refined
 
 
 def _fill_unknown(colors: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:

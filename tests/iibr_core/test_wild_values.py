@@ -16,7 +16,18 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import crumbs, edge_blur, pictorial_cues, refine, rim_sides, rims, scaling, search, subject
+from iibr_core.depth import (
+    blur_fit,
+    crumbs,
+    edge_blur,
+    pictorial_cues,
+    refine,
+    rim_sides,
+    rims,
+    scaling,
+    search,
+    subject,
+)
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
@@ -90,6 +101,11 @@ def depths(value):
 def known(value):
     """The same for those who take NaN as "nothing here" and no infinity."""
     return np.where(np.isfinite(depths(value)), depths(value), np.float32(np.nan))
+
+
+def soft_cells():
+    """A blur of the whole map."""
+    return edge_blur.EdgeBlur(np.full((2, 2), 1.0, np.float32), 8)
 
 
 def mixed_between_surfaces():
@@ -318,6 +334,10 @@ FINITE = {
     "depth.crumbs.fill_crumbs": lambda v, _: [
         crumbs.fill_crumbs(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
         crumbs.fill_crumbs(image(v), np.where(np.eye(*SIZE), np.float32(9), depths(1.0)), 0.5, never),
+    ],
+    "depth.blur_fit.fit_to_blur": lambda v, _: [
+        blur_fit.fit_to_blur(image(v), depths(1.0), depths(0.5), soft_cells(), 0.1),
+        blur_fit.fit_to_blur(image(0.5), np.nan_to_num(depths(v)), np.nan_to_num(depths(v)), soft_cells(), 0.1),
     ],
     "depth.rims.settle_rims": lambda v, _: [
         rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),

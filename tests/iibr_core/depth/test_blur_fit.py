@@ -1,0 +1,202 @@
+"""Sharpened maps fitted to the blur that they come from: against slow twins, and what must stay as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iibr_core.depth import blur_fit
+from iibr_core.depth.blur_fit import fit_to_blur
+from iibr_core.depth.edge_blur import EdgeBlur
+from iibr_core.runtime import tiling
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.training.degradation import blur
+from tests.iibr_core.scenes import smooth_texture
+
+SIZE = (96, 128)
+SIGMA = 2.0
+LEAST_EDGE = 0.06
+CELLS = EdgeBlur(np.full((3, 4), SIGMA, np.float32), 32)
+
+
+def disc() -> tuple[np.ndarray, np.ndarray]:
+    """Photo and exact disparity of a disc before a slanted wall, both textured alike but for their tint."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    is_disc = np.hypot(x - 60, y - 45) < 24
+    photo = np.where(is_disc[..., None], smooth_texture(*SIZE, 3) * [1, 0.7, 0.5], smooth_texture(*SIZE, 4) * 0.6)
+    return photo.astype(np.float32), np.where(is_disc, 2.0, 0.2 + 0.002 * x).astype(np.float32)
+
+
+def ragged(exact: np.ndarray) -> np.ndarray:
+    """The map with an outline that is wrong by a pixel, here and there."""
+    rng = np.random.default_rng(5)
+    dy, dx = (np.rint(blur(rng.normal(size=SIZE).astype(np.float32), 1.0) * 4).clip(-1, 1).astype(int) for _ in "yx")
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    is_disc = exact[np.clip(y + dy, 0, SIZE[0] - 1), np.clip(x + dx, 0, SIZE[1] - 1)] > 1.2
+    return np.where(is_disc, 2.0, 0.2 + 0.002 * x).astype(np.float32)
+
+
+def wrong_side(fitted: np.ndarray, exact: np.ndarray) -> int:
+    return int(np.count_nonzero((fitted > 1.2) != (exact > 1.2)))
+
+
+def fit(photo: np.ndarray, values: np.ndarray, sharp: np.ndarray) -> np.ndarray:
+    return fit_to_blur(photo, values, sharp, CELLS, LEAST_EDGE)
+
+
+def test_ragged_outlines_become_whole() -> None:
+    photo, exact = disc()
+    start = ragged(exact)
+    fitted = fit(photo, blur(exact, SIGMA), start)
+    assert wrong_side(start, exact) > 80
+    assert wrong_side(fitted, exact) < 0.4 * wrong_side(start, exact)
+
+
+def test_halos_beside_edges_go() -> None:
+    """What sharpening leaves: the back's rim keeps a share of the front's height."""
+    photo, exact = disc()
+    soft = blur(exact, SIGMA)
+    start = np.where((soft - exact > 0) & (exact < 1.2), exact + np.minimum(soft - exact, 0.2), exact)
+    assert np.abs(start - exact).max() > 0.15
+    assert np.abs(fit(photo, soft, start) - exact).max() < 0.05
+
+
+def test_round_fronts_are_not_raised() -> None:
+    """A ball falls away from the view at its outline; fitted by a flat rim that would look like a loss."""
+    photo, exact = disc()
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    ball = exact + np.where(exact > 1.2, np.sqrt(np.maximum(24**2 - (x - 60) ** 2 - (y - 45) ** 2, 0)) / 24 - 1, 0)
+    ball = ball.astype(np.float32)
+    fitted = fit(photo, blur(ball, SIGMA), ball)
+    inside = blur((exact > 1.2).astype(np.float32), 1.0) > 0.99
+    assert (fitted - ball)[inside].mean() <= 0
+
+
+def test_a_map_that_is_the_blur_of_none_keeps_its_bits() -> None:
+    photo, exact = disc()
+    start = ragged(exact)
+    # Soft as by this blur, but somewhere else than the photo's edges.
+    elsewhere = blur(np.roll(exact, 3, axis=1), SIGMA)
+    np.testing.assert_array_equal(fit(photo, elsewhere, start), start)
+
+
+def test_cells_without_blur_keep_their_bits() -> None:
+    photo, exact = disc()
+    start, sigmas = ragged(exact), np.full((3, 4), SIGMA, np.float32)
+    sigmas[:, :2] = 0
+    fitted = fit_to_blur(photo, blur(exact, SIGMA), start, EdgeBlur(sigmas, 32), LEAST_EDGE)
+    np.testing.assert_array_equal(fitted[:, :64], start[:, :64])
+    assert not np.array_equal(fitted[:, 64:], start[:, 64:])
+    too_wide = EdgeBlur(np.full((3, 4), 1.1 * blur_fit.WIDEST_SIGMA_PX, np.float32), 32)
+    assert fit_to_blur(photo, blur(exact, 5.0), start, too_wide, LEAST_EDGE) is start
+
+
+def test_bands_and_threads_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    photo, exact = disc()
+    soft, start = blur(exact, SIGMA), ragged(exact)
+    once = fit(photo, soft, start)
+    monkeypatch.setattr(tiling, "MOST_BAND_PIXELS", 700)
+    monkeypatch.setattr(tiling, "THREADS", 3)
+    np.testing.assert_array_equal(fit(photo, soft, start), once)
+
+
+def test_it_can_be_cancelled() -> None:
+    photo, exact = disc()
+    answers = iter([False] * 12)
+    with pytest.raises(Cancelled):
+        fit_to_blur(photo, blur(exact, SIGMA), ragged(exact), CELLS, LEAST_EDGE, lambda: next(answers, True))
+
+
+def cells() -> tuple[np.ndarray, np.ndarray, int]:
+    return *blur_fit._taps(CELLS), CELLS.cell_px
+
+
+def full_taps() -> np.ndarray:
+    """(R, R): the blur's whole kernel."""
+    apart = np.abs(np.arange(-6, 7))
+    line = np.exp(-0.5 * (apart / SIGMA) ** 2)
+    return np.outer(line, line) / line.sum() ** 2
+
+
+def window(image: np.ndarray, y: int, x: int) -> np.ndarray:
+    """13 x 13 pixels, the border's going on."""
+    return np.pad(image, 6, mode="edge")[y : y + 13, x : x + 13]
+
+
+def test_what_is_missing_against_a_blur_pixel_by_pixel() -> None:
+    _, exact = disc()
+    values, missing = np.zeros(SIZE, np.float32), np.empty(SIZE, np.float32)
+    blur_fit._find_missing(values, exact, *cells(), 0, 3, missing)
+    for y, x in [(0, 0), (45, 35), (45, 83), (95, 127), (31, 64), (20, 60)]:
+        assert -missing[y, x] == pytest.approx((window(exact, y, x) * full_taps()).sum(), abs=1e-5)
+
+
+def test_clean_shares_against_windows() -> None:
+    _, exact = disc()
+    near, clean = np.zeros(SIZE, np.bool_), np.ones(SIZE, np.float32)
+    blur_fit._mark_near_edges(exact, *cells()[1:], 0.3, 0, SIZE[0], near)
+    blur_fit._find_clean(exact, near, *cells(), 0.3, 0, SIZE[0], clean)
+    for y, x in np.argwhere(near)[::37]:
+        own = np.abs(window(exact, y, x) - exact[y, x]) < 0.3
+        assert clean[y, x] == pytest.approx((own * full_taps()).sum(), abs=1e-5)
+    # Whatever an edge could make unclean is marked.
+    for y, x in np.argwhere(~near)[::97]:
+        assert np.ptp(window(exact, y, x)) < 0.3
+
+
+def test_halos_against_least_squares() -> None:
+    _, exact = disc()
+    rng = np.random.default_rng(1)
+    missing = blur(rng.normal(size=SIZE).astype(np.float32), 3.0)
+    near, clean, lowered = np.zeros(SIZE, np.bool_), np.ones(SIZE, np.float32), exact.copy()
+    blur_fit._mark_near_edges(exact, *cells()[1:], 0.3, 0, SIZE[0], near)
+    blur_fit._find_clean(exact, near, *cells(), 0.3, 0, SIZE[0], clean)
+    blur_fit._lower_halos(exact, missing, clean, near, *cells(), 0.3, 0, SIZE[0], lowered)
+    j, i = np.mgrid[-6:7, -6:7]
+    for y, x in np.argwhere(near)[::23]:
+        share, heights = window(clean, y, x), window(exact, y, x)
+        weight = np.where(np.abs(heights - exact[y, x]) < 0.3, np.maximum(share - blur_fit.CLEAN, 0), 0) * full_taps()
+        if not weight.any():
+            assert lowered[y, x] == exact[y, x]
+            continue
+        value = window(missing, y, x) + (0 if clean[y, x] > blur_fit.MOSTLY_CLEAN else heights - exact[y, x])
+        mean_i, mean_j = (np.average(part, weights=weight) for part in (i, j))
+        # A plane about the clean pixels' middle, its slopes damped as if by two further measurements of none.
+        damping = np.sqrt(blur_fit.SLOPE_DAMPING * weight.sum()) * 6 / blur_fit.REACH_SIGMAS
+        rows = np.stack([np.ones_like(value), i - mean_i, j - mean_j], -1) * np.sqrt(weight)[..., None]
+        system = np.concatenate([rows.reshape(-1, 3), [[0, damping, 0], [0, 0, damping]]])
+        level, across, down = np.linalg.lstsq(system, [*(value * np.sqrt(weight)).ravel(), 0, 0])[0]
+        expected = min(level - across * mean_i - down * mean_j, 0)
+        assert lowered[y, x] - exact[y, x] == pytest.approx(expected, abs=1e-4)
+
+
+def test_edges_move_where_the_misfit_falls() -> None:
+    """Every move, with colours that tell nothing, lowers what a blur of the whole map says of misfit and outline."""
+    _, exact = disc()
+    photo, fitted = np.full((*SIZE, 3), 0.5, np.float32), ragged(exact)
+    soft = blur(exact, SIGMA)
+    missing = np.zeros(SIZE, np.float32)
+    blur_fit._find_missing(soft, fitted, *cells(), 0, 3, missing)
+    for y in range(25, 40):
+        before, left = fitted.copy(), missing.copy()
+        blur_fit._move_edges(photo, fitted, missing, *cells(), LEAST_EDGE, y, y + 1)
+        blurred_again = np.zeros(SIZE, np.float32)
+        blur_fit._find_missing(soft, fitted, *cells(), 0, 3, blurred_again)
+        np.testing.assert_allclose(missing, blurred_again, atol=1e-4)
+        unlike = [np.count_nonzero(np.abs(np.diff(m, axis=axis)) > 0.5) for m in (before, fitted) for axis in (0, 1)]
+        assert np.sum(missing**2) <= np.sum(left**2) or sum(unlike[2:]) < sum(unlike[:2])
+    assert wrong_side(fitted[25:40], exact[25:40]) < wrong_side(ragged(exact)[25:40], exact[25:40])
+
+
+def test_colours_of_clean_pixels_on_both_sides_vote() -> None:
+    photo, exact = disc()
+    photo[exact > 1.2], photo[exact < 1.2] = [0.8, 0.2, 0.1], [0.1, 0.3, 0.7]
+    on_rim = [(45, 37), (45, 36), (45, 82), (45, 84)]
+    for y, x in on_rim:
+        here, there = (2.0, 0.3) if exact[y, x] > 1.2 else (exact[y, x], 2.0)
+        assert blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE) < -0.9
+        photo[y, x] = photo[5, 5] if exact[y, x] > 1.2 else photo[45, 60]
+        assert blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE) > 0.9
+        # Half of both tells nothing.
+        photo[y, x] = 0.5 * (photo[5, 5] + photo[45, 60])
+        assert abs(blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE)) < 0.1
