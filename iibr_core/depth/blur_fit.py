@@ -40,6 +40,8 @@ SLOPE_DAMPING = 0.1
 """Squared sigmas, added to the spread of clean pixels."""
 SURFACE_EDGES = 6.0
 """Times the least edge: heights within it may be one surface's."""
+MOVED_EDGES = 2.0
+"""Times the least edge: lower steps stay where they are."""
 MOST_MISFIT = 0.1
 """Of the fitted map, blurred again, from the given map, relative to what the blur changed (rms of a cell)."""
 
@@ -78,7 +80,7 @@ def fit_to_blur(
         _lower_halos(fitted, missing, clean, near, *cells, surface, first, last, lowered)
 
     def move(first: int, last: int) -> None:
-        _move_edges(photo, fitted, missing, *cells, least_edge, first, last)
+        _move_edges(photo, fitted, missing, *cells, MOVED_EDGES * least_edge, first, last)
 
     in_bands(mark, size, should_stop)
     in_bands(find_missing, cell_rows, should_stop)
