@@ -34,8 +34,11 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.trials import trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.generation.view_maker import ViewMaker
+from iibr_core.inpainting.patch import fill_patches
 from iibr_core.rendering.ray_set import NO_MARGINS
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.training.degradation import degrade
 from iibr_core.types import FloatImage, ViewOffset, ignore_progress
 
@@ -109,6 +112,13 @@ SWITCHES = (
         "no canvas beyond the frame", swaps={"generation.view_maker.margins_beyond_frame": lambda *_: NO_MARGINS}
     ),
     NOTHING_SHARED,
+    Switch(
+        "inpainting: patch",
+        swaps={
+            "generation.view_maker.render_outer_views": partial(render_outer_views, inpainter=fill_patches),
+            "generation.view_maker.ViewSynthesis": partial(ViewSynthesis, inpainter=fill_patches),
+        },
+    ),
 )  # fmt: skip
 
 

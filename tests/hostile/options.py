@@ -74,7 +74,7 @@ _screenshot = [
         ("--backend", ("", "vulkan")),
         ("--gloss", ("", "missing", "photo.png", "map.pfm")),
         ("--quality", ("", "best", "Exact")),
-        ("--inpaint", ("", "magic", "diffusion", "diffusion:", "background:folder")),
+        ("--inpaint", ("", "magic", "diffusion", "diffusion:", "patch:folder")),
         ("--depth-strength", ("", "nan", "1e300")),
         ("--focus-disparity", ("", "inf")),
     )
@@ -195,8 +195,8 @@ _inpainters = [
         says="folder",
     ),
     Case(
-        "screenshot --inpaint background",
-        ("screenshot", "photo.png", "-o", "new.png", "--inpaint", "background"),
+        "screenshot --inpaint patch",
+        ("screenshot", "photo.png", "-o", "new.png", "--inpaint", "patch"),
         0,
         "",
         ("new.png",),

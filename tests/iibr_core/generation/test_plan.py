@@ -133,6 +133,7 @@ def test_literal_takes_disparity_as_it_is():
     ("inpaint", "words", "paints"),
     [
         ("background", "inpainted by background: nearest to true views, though smooth.", False),
+        ("patch", "inpainted by patch: as asked.", False),
         ("diffusion:folder", "inpainted by diffusion: as asked.", True),
     ],
 )

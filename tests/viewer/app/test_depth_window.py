@@ -12,9 +12,7 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
-from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import GridShape, ViewOffset
-from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import FAR, NEAR, Driver
 from viewer.app.main_loop import App
 from viewer.model.actions import (
@@ -313,8 +311,7 @@ def test_no_dialog_means_a_prompt(viewer: Driver) -> None:
     viewer.until_idle()
 
 
-def test_holes_are_filled_another_way_and_depth_edits_stay(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(INPAINTERS, "red", red_inpainter.ENTRY)
+def test_holes_are_filled_another_way_and_depth_edits_stay(viewer: Driver) -> None:
     viewer.app.do(SetTone(DepthEdits(gamma=1.5), is_finished=True), EndGesture())
     viewer.until(lambda app: app.state.generation == 2 and is_made(app))
     preferences = replace(viewer.app.state.preferences, open_sections=("scene",))
@@ -322,13 +319,13 @@ def test_holes_are_filled_another_way_and_depth_edits_stay(viewer: Driver, monke
     viewer.until_idle()
     edited, corner = disparity_of(viewer.app).copy(), viewer.app.scene_view.views_present
     viewer.press("##holes")
-    viewer.press("red", "##Combo_00")
+    viewer.press("patch", "##Combo_00")
     viewer.until(lambda app: app.state.generation == 3 and is_made(app))
     viewer.until_idle()
     scene = viewer.app.state.scene
     assert scene is not None
     assert scene.plan is not None
-    assert scene.source.inpaint == "red"
-    assert any("inpainted by red" in reason for reason in scene.plan.reasons)
+    assert scene.source.inpaint == "patch"
+    assert any("inpainted by patch" in reason for reason in scene.plan.reasons)
     assert viewer.app.scene_view.views_present == corner == 9
     np.testing.assert_array_equal(disparity_of(viewer.app), edited)

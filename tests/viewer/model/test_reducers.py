@@ -376,7 +376,7 @@ def test_reset_brings_the_first_optics_back() -> None:
         (MoveEye(ViewOffset(math.nan, 0.0)), False, False),
         (SetDepthStrength(2.0, is_finished=False), False, False),
         (SetDepthStrength(2.0, is_finished=True), False, True),
-        (SetInpainter("diffusion:folder"), False, False),
+        (SetInpainter("patch"), False, False),
         (OpenPath(Source("other.png")), False, True),
         (ProgressMade(1, Progress(3, 81, 0.1)), False, False),
         (Notify(Notice("hello")), False, False),
@@ -473,13 +473,13 @@ def test_notices_are_kept_once_bounded_and_dismissable() -> None:
 
 def test_another_inpainter_makes_the_open_photos_views_anew() -> None:
     photo = state_with(scene_of(plan=plan_of(GridShape(9, 9))))
-    asked = reduce(photo, SetInpainter("diffusion:folder"))
+    asked = reduce(photo, SetInpainter("patch"))
     assert asked.generation == photo.generation + 1
     assert asked.source is not None
     assert asked.scene is not None
-    assert asked.source.inpaint == "diffusion:folder"
+    assert asked.source.inpaint == "patch"
     assert asked.scene.source is asked.source, "it is the same photo, with its depth as it was edited"
-    assert reduce(asked, SetInpainter("diffusion:folder")) is asked
+    assert reduce(asked, SetInpainter("patch")) is asked
     opening = replace(photo, source=Source("other.png"))
     for unchanged in (state_with(None), state_with(scene_of()), opening):
-        assert reduce(unchanged, SetInpainter("diffusion:folder")) == unchanged
+        assert reduce(unchanged, SetInpainter("patch")) == unchanged

@@ -14,7 +14,8 @@ from viewer.model.state.scene import Scene
 from viewer.ui.widgets import gap, label, last_part, quiet, tooltip
 
 HOLES_TIP = (
-    "What fills the places that the photo never saw: background goes on from what lies behind. The views are made anew."
+    "What fills the places that the photo never saw: background goes on smoothly from what lies behind, patch gives it"
+    " texture from around. The views are made anew."
 )
 
 
@@ -40,15 +41,12 @@ def scene_section(scene: Scene, facts: FactsRead, layout: Layout) -> list[Action
 
 
 def _holes(scene: Scene, layout: Layout) -> list[Action]:
-    """The ways of inpainting that need no model, and the one that the photo was opened with: where that is a choice."""
+    """The ways of inpainting that need no model, and the one that the photo was opened with."""
     actions: list[Action] = []
     chosen = scene.source.inpaint
-    ways = dict.fromkeys((*INPAINTERS, chosen))
-    if len(ways) < 2:
-        return actions
     label("Holes", layout, HOLES_TIP)
     if imgui.begin_combo("##holes", last_part(chosen)):
-        for name in ways:
+        for name in dict.fromkeys((*INPAINTERS, chosen)):
             if imgui.selectable(last_part(name), name == chosen)[0]:
                 actions.append(SetInpainter(name))
         imgui.end_combo()
