@@ -19,27 +19,35 @@ import re
 import shutil
 import sys
 import warnings
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 
+@contextmanager
+def _as_if_missing(*packages: str) -> Iterator[None]:
+    """Whoever imports one of these meanwhile is told that there is none."""
+    before = {name: sys.modules[name] for name in packages if name in sys.modules}
+    sys.modules.update(dict.fromkeys(packages))  # type: ignore[arg-type]  # how Python says so
+    try:
+        yield
+    finally:
+        for name in packages:
+            del sys.modules[name]
+        sys.modules.update(before)
+
+
 def _import_numba() -> Any:
     """Numba, without the settings that it takes from `.numba_config.yaml` in the working folder: they name the folder
-    where compiled code is kept, and what lies there is run.
+    where compiled code is kept, and what lies there is run. And without scipy, where that is installed: matrices are
+    none of our kernels' business, and it would cost each start 0.2 s.
     """
-    yaml = sys.modules.get("yaml")
-    sys.modules["yaml"] = None  # type: ignore[assignment]  # how Python says that there is none
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "A Numba config file is found")
-            import numba
-    finally:
-        del sys.modules["yaml"]
-        if yaml is not None:
-            sys.modules["yaml"] = yaml
+    with _as_if_missing("yaml", "scipy"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "A Numba config file is found")
+        import numba
+        import numba.np.arraymath  # the part that looks for scipy, else at the first kernel
     numba.core.config._config_fname = os.devnull  # it looks again whenever it compiles
     _settle_processor(numba)
     return numba

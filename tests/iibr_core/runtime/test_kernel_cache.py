@@ -174,6 +174,16 @@ def test_the_working_folder_names_no_place_to_take_code_from(package, tmp_path, 
     assert [path.name for path in strange.iterdir()] == [".numba_config.yaml"]
 
 
+@pytest.mark.parametrize("before", ["", "import scipy.linalg; "])
+def test_kernels_do_without_scipy_and_leave_it_to_others(before):
+    code = f"{before}import sys; from iibr_core.color import linear_from_srgb; import numpy as np"
+    code += (
+        "; linear_from_srgb(np.zeros((2, 2, 3), np.float32)); print('scipy' in sys.modules); import scipy.ndimage, yaml"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (run.stdout, run.stderr) == (f"{bool(before)}\n", "")
+
+
 def test_without_a_place_to_keep_them_kernels_run(package):
     (package.parent / "file").write_text("")
     nowhere = str(package.parent / "file" / "folder")
