@@ -19,7 +19,7 @@ REACH_SIGMAS = 3.0
 """Where a Gaussian ends."""
 WIDEST_SIGMA_PX = 4.5
 """Work grows with the blur's area: wider ones stay as they are."""
-ROUNDS = 3
+ROUNDS = 2
 SWEEPS = 2
 """Of moving edges, in each round."""
 COLOR_WEIGHT = 6.0
