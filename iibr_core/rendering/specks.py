@@ -2,7 +2,8 @@
 
 Beside depth edges a map's errors tear rays off their surface: alone among others, they catch the eye. A ray that stands
 out from what surrounds it in the view by far more than it does in the photo was torn off, and takes the median of what
-surrounds it. Thin things stand out in the photo, too, and stay; so does all that lies within one surface.
+surrounds it. Thin things stand out in the photo, too, and stay; so does what shows between them, and all that lies
+within one surface or was inpainted.
 """
 
 from __future__ import annotations
@@ -10,22 +11,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.ray_set import HIGHEST_LEVEL, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
-STANDS_OUT = 0.03
-"""So much, in sRGB-encoded values, no ray may differ from the median of its 3x3 pixels; and STANDS_OUT_TIMES what it
-does in the photo.
+STANDS_OUT = 0.05
+STANDS_OUT_TIMES = 3.0
+"""A ray may differ from the median of its 3x3 pixels so many times more than in the photo, and by this much besides, in
+sRGB-encoded values.
 """
-STANDS_OUT_TIMES = 2.0
-ALONE = 0.1
-"""With what was inpainted the photo has nothing to compare: it may differ by so much, and more where any of its eight
-neighbours is ALIKE, closer than this to it.
-"""
-ALIKE = 0.05
+GAP_PX = 2.0
+"""Rays are torn off only where a step of the photo's disparity opens a gap of so many pixels in the view."""
 
 
 def measure_detail(photo: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
@@ -52,11 +50,11 @@ def without_specks(
     disparity, inpainted (H, W): as in `RenderedView`. threads: None for all. Raises Cancelled once should_stop is true.
     """
     detail, edge_level = rays.photo_detail, rays.arrays[4][0]
-    limit, parallax = rays.edge_limits(offset)[0], np.float32(max(map(abs, offset)))
+    limit = min(round(GAP_PX / OWN_SURFACE_PX) * int(rays.edge_limits(offset)[0]), HIGHEST_LEVEL - 1)
     settled = np.empty_like(colors)
     in_bands(
         lambda first, last: _settle(
-            colors, disparity, inpainted, detail, edge_level, limit, parallax,
+            colors, disparity, inpainted, detail, edge_level, limit,
             rays.margins.top, rays.margins.left, *offset, first, last, settled,
         ),
         image_size(disparity), should_stop, threads,
@@ -78,31 +76,20 @@ def _measure(photo, first, last, detail):
 
 @kernel
 def _settle(
-    colors, disparity, inpainted, detail, edge_level, limit, parallax, top, left, t, s, first, last, settled
+    colors, disparity, inpainted, detail, edge_level, limit, top, left, t, s, first, last, settled
 ):  # fmt: skip
-    """Rows [first, last) of `without_specks`. limit, parallax: a ray is beside a depth edge if the photo's edge_level
-    is above the one, or its view has steps of more than OWN_SURFACE_PX there, at the other, px per disparity.
-    """
-    height, width = disparity.shape
+    """Rows [first, last) of `without_specks`. limit: the edge_level above which rays are beside a depth edge."""
     lowest, rightmost = detail.shape[0] - 1, detail.shape[1] - 1
     settled[first:last] = colors[first:last]
     for y in range(first, last):
-        above, below = max(y - 1, 0), min(y + 1, height - 1)
-        for x in range(width):
-            d = disparity[y, x]
-            v, u = min(max(y + d * t + top, 0.0), lowest), min(max(x + d * s + left, 0.0), rightmost)
-            if not inpainted[y, x] and edge_level[nearest_pixel(v), nearest_pixel(u)] <= limit:
-                before, after = disparity[y, max(x - 1, 0)], disparity[y, min(x + 1, width - 1)]
-                step = max(abs(before - d), abs(after - d), abs(disparity[above, x] - d), abs(disparity[below, x] - d))
-                if step * parallax <= OWN_SURFACE_PX:
-                    continue
+        for x in range(disparity.shape[1]):
+            v, u = y + disparity[y, x] * t + top, x + disparity[y, x] * s + left
+            v, u = min(max(v, 0.0), lowest), min(max(u, 0.0), rightmost)
+            if inpainted[y, x] or edge_level[nearest_pixel(v), nearest_pixel(u)] <= limit:
+                continue
             red, green, blue = _median(colors, y, x, 0), _median(colors, y, x, 1), _median(colors, y, x, 2)
             stands_out = max(abs(colors[y, x, 0] - red), abs(colors[y, x, 1] - green), abs(colors[y, x, 2] - blue))
-            if inpainted[y, x]:
-                is_speck = stands_out > ALONE and _is_alone(colors, y, x)
-            else:
-                is_speck = stands_out > STANDS_OUT + STANDS_OUT_TIMES * _interpolated(detail, v, u)
-            if is_speck:
+            if stands_out > STANDS_OUT + STANDS_OUT_TIMES * _interpolated(detail, v, u):
                 settled[y, x, 0], settled[y, x, 1], settled[y, x, 2] = red, green, blue
 
 
@@ -133,16 +120,3 @@ def _interpolated(image, y, x):
     down, across = y - row, x - column
     upper = (1 - across) * image[row, column] + across * image[row, right]
     return (1 - down) * upper + down * ((1 - across) * image[below, column] + across * image[below, right])
-
-
-@kernel
-def _is_alone(colors, y, x):
-    """Whether none of the eight pixels around is ALIKE."""
-    for row in range(max(y - 1, 0), min(y + 2, colors.shape[0])):
-        for column in range(max(x - 1, 0), min(x + 2, colors.shape[1])):
-            difference = 0.0
-            for channel in range(3):
-                difference = max(difference, abs(colors[row, column, channel] - colors[y, x, channel]))
-            if difference < ALIKE and (row != y or column != x):
-                return False
-    return True
