@@ -132,6 +132,8 @@ class SceneLoader:
             return [OpenFailed(result.generation, str(error))]
 
     def _take_views(self, result: SceneReady | ViewReady) -> list[Action]:
+        if result.generation < self._scene_view.generation:
+            return []  # the small picture of another photo is shown by now
         if isinstance(result, SceneReady):
             self._scene_view.open(result)
             self._inspection_view.open()

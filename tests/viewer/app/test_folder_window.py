@@ -12,15 +12,16 @@ import pytest
 from imgui_bundle import imgui
 from PIL import ImageGrab
 
-from iibr_core.types import GridShape
+from iibr_core.types import GridShape, ViewUpdate
 from tests.viewer.background.test_scene_worker import write_large_jpeg
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.main_loop import App
 from viewer.background import scene_worker
 from viewer.background.read_ahead import WantedPhoto
+from viewer.background.scene_worker import ViewReady
 from viewer.model.actions import OpenPath
 from viewer.model.state.folder import StepPhoto
-from viewer.model.state.scene import Source
+from viewer.model.state.scene import Progress, Source
 
 Opener = Callable[..., Driver]
 
@@ -60,6 +61,15 @@ def test_a_folder_opens_at_its_first_photo_with_all_of_them_in_small(viewer: Dri
     paths = tuple(str(folder / name) for name in names)
     viewer.until(lambda app: len(app._filmstrip.thumbnails(paths)) == 3)
     assert viewer.app.layout().filmstrip is not None
+
+
+def test_a_late_view_of_the_photo_that_was_left_is_dropped(viewer: Driver) -> None:
+    """The next one is there in small by then, of another size."""
+    colors, nothing = np.zeros((7, 9, 3), np.uint8), np.zeros((7, 9), np.float32)
+    view = ViewUpdate(0, 0, colors, nothing, nothing.astype(np.bool_))
+    late = ViewReady(viewer.app.scene_view.generation - 1, view, Progress())
+    assert viewer.app.scene_loader._take(late, viewer.app.state) == []
+    viewer.until_idle()
 
 
 def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Driver, tmp_path: Path) -> None:
