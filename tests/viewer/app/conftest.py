@@ -12,9 +12,15 @@ from tests.viewer.conftest import Driver
 
 
 @pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+def grid() -> GridShape:
+    """Of the photo's views."""
+    return GridShape(3, 3)
+
+
+@pytest.fixture
+def viewer(open_window: Callable[..., Driver], photo_path: Path, grid: GridShape) -> Driver:
     """All views of the photo are there; the pointer rests in the picture, off the near square."""
-    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver = open_window(photo_path, grid=grid)
     driver.until_idle()
     driver.send("mousemove", *driver.position(0.1, 0.1))
     driver.until_idle()

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -30,12 +28,8 @@ from viewer.model.state.optics import (
 
 
 @pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(5, 5))
-    driver.until_idle()
-    driver.send("mousemove", *driver.position(0.1, 0.1))
-    driver.until_idle()
-    return driver
+def grid() -> GridShape:
+    return GridShape(5, 5)
 
 
 def test_the_pad_moves_the_viewpoint_as_far_as_there_are_views(viewer: Driver) -> None:
