@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from types import TracebackType
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
@@ -12,8 +11,7 @@ from iibr_core.generation.light_field import transformer_for
 from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.rendering.specks import without_specks
-from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo, settled_view
 from iibr_core.types import FloatImage, Quality, ViewOffset
 
 
@@ -87,10 +85,7 @@ class ViewMaker:
         )
 
     def _settled(self, offset: ViewOffset, view: RenderedView, threads: int | None = None) -> RenderedView:
-        colors = without_specks(
-            self._rays, offset, view.colors, view.disparity, view.inpainted, self._should_stop, threads
-        )
-        return replace(view, colors=colors)
+        return settled_view(self._rays, offset, view, self._should_stop, threads)
 
 
 def quantise_as_stored(colors: FloatImage) -> FloatImage:

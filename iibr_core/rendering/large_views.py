@@ -15,8 +15,7 @@ import numpy as np
 
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX
-from iibr_core.rendering.specks import without_specks
-from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo, settled_view
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
@@ -142,9 +141,8 @@ def views_of_tile(
     around = tile.grown(AROUND_PX + math.ceil(min(parallax_px, max(photo.size))), photo.bounds)
     rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
     for offset in offsets:
-        view = synthesis.render(rays, offset)
-        colors = without_specks(rays, offset, view.colors, view.disparity, view.inpainted, should_stop)
-        yield RenderedView(colors[shown], view.disparity[shown], view.occluded[shown], view.inpainted[shown])
+        view = settled_view(rays, offset, synthesis.render(rays, offset), should_stop)
+        yield RenderedView(view.colors[shown], view.disparity[shown], view.occluded[shown], view.inpainted[shown])
 
 
 def _fills_in(fills: RaySet, size: ImageSize, part: Part, offsets: Sequence[ViewOffset]) -> list[int]:

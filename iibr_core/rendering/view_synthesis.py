@@ -27,7 +27,7 @@ from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
 from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
-from iibr_core.rendering.specks import measure_detail
+from iibr_core.rendering.specks import measure_detail, without_specks
 from iibr_core.rendering.undecided_rays import find_undecided_rays
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
@@ -375,3 +375,15 @@ def _blank_view(size: ImageSize, with_entropy: bool) -> RenderedView:
         np.empty(size, np.bool_),
         np.empty(size, np.float32) if with_entropy else None,
     )
+
+
+def settled_view(
+    rays: RaySet,
+    offset: ViewOffset,
+    view: RenderedView,
+    should_stop: ShouldStop = never,
+    threads: int | None = None,
+) -> RenderedView:
+    """A view made of the rays of a photo, without its specks. Arguments as of `without_specks`."""
+    colors = without_specks(rays, offset, view.colors, view.disparity, view.inpainted, should_stop, threads)
+    return replace(view, colors=colors)

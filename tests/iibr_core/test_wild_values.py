@@ -60,7 +60,7 @@ from iibr_core.rendering import (
 )
 from iibr_core.rendering.gloss import environment, geometry, shading, surface
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface, of_maps
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo, settled_view
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime.tiling import never
 from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
@@ -449,6 +449,9 @@ FINITE = {
     ),
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
     "rendering.view_synthesis.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
+    "rendering.view_synthesis.settled_view": lambda v, _: settled_view(
+        rays(v), ViewOffset(0.5, 1.0), rendered(ViewOffset(0.5, 1.0), v)
+    ),
     "types.Disparity": lambda v, _: Disparity(depths(v), "wild"),
     "formats.images.picture_writers.write_picture": lambda v, to: [
         read_back(write_picture, to / f"a{ending}", image(v)) for ending in KINDS

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import bytes_from_encoded, convert, stored_from_encoded
+from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored
 from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
@@ -25,8 +25,8 @@ from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.inspection_request import InspectionRequest
 
 if TYPE_CHECKING:
+    from iibr_core.inpainting.protocol import Inpainter
     from iibr_core.rendering.ray_set import RaySet
-    from iibr_core.rendering.view_synthesis import RenderedView
 
 Bytes = NDArray[np.uint8]
 
@@ -111,9 +111,7 @@ class ComparisonJob:
         A pair that is kept comes again: who asked for it first may not have waited.
         """
         if request.kind == "entropy":
-            view = self._make_view(request, inputs, "fast", should_stop)
-            assert view.entropy is not None
-            yield EntropyReady(request, np.rint(np.clip(view.entropy, 0, 1) * 255).astype(np.uint8))
+            yield EntropyReady(request, np.rint(self._entropy(request, inputs, should_stop) * 255).astype(np.uint8))
             return
         unscored = replace(request, is_scored=False)
         if self._pair is None or self._pair.request != unscored:
@@ -134,48 +132,79 @@ class ComparisonJob:
             truth = read_stored_view(open_light_field(Path(os.path.expanduser(request.truth.path))), *request.view)
             made = inputs.stored
             if made is None:
-                view = self._make_view(request, inputs, inputs.quality, should_stop)
-                made = _bytes_of(view.colors, inputs.color_space)
+                made = self._stored_view(request, inputs, inputs.quality, should_stop)
             if truth.shape != made.shape:
                 raise InputError(f"{request.truth.path}: its views have changed; choose the folder again")
-            return _bytes_of(made), _bytes_of(truth)
-        fast, exact = (self._make_view(request, inputs, quality, should_stop) for quality in ("fast", "exact"))
-        return _bytes_of(fast.colors, inputs.color_space), _bytes_of(exact.colors, inputs.color_space)
+            return _bytes_of(made, inputs.color_space), _bytes_of(truth)
+        fast, exact = (self._stored_view(request, inputs, quality, should_stop) for quality in ("fast", "exact"))
+        return _bytes_of(fast, inputs.color_space), _bytes_of(exact, inputs.color_space)
 
-    def _make_view(
+    def _stored_view(
         self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality, should_stop: Callable[[], bool]
-    ) -> RenderedView:
-        """The view by the ray set of the scene's plan, or at the ground truth's places; the middle one is the photo."""
-        from iibr_core.generation.light_field import ray_set, transformer_for
-        from iibr_core.rendering.specks import without_specks
-        from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis
+    ) -> StoredColors:
+        """The view as the light field stores it; the middle one is the photo."""
+        from iibr_core.generation.light_field import transformer_for
+        from iibr_core.generation.stored_views import StoredViews, encode_for_storage
+        from iibr_core.rendering.view_synthesis import ViewSynthesis
 
-        loaded, plan = inputs.loaded, inputs.plan
-        assert loaded is not None
-        assert plan is not None
-        grid = request.truth.grid if request.truth is not None else None
-        if grid is not None:
-            plan = plan_literal(loaded.photo, loaded.disparity, grid)
+        loaded, plan = _given(request, inputs)
+        is_hdr = loaded.photo.is_hdr
         if request.view == plan.grid.centre:
-            nothing = np.zeros(loaded.photo.size, np.float32)
-            nowhere = nothing.astype(np.bool_)
-            return RenderedView(loaded.photo.pixels, nothing, nowhere, nowhere, nothing)
+            return encode_for_storage(loaded.photo.pixels, is_hdr, should_stop)
         inpainter = load_inpainter(inputs.inpaint)
-        if self._rays is None or self._rays_of != (request.generation, grid):
+        rays = self._kept_rays(request, inputs, inpainter, should_stop)
+        transformer = transformer_for(quality)
+        with ViewSynthesis(should_stop, transformer, quality == "exact", inpainter=inpainter) as synthesis:
+            offset = plan.grid.offset(*request.view)
+            stored = StoredViews(synthesis, rays, plan.grid, is_hdr, should_stop)
+            return stored.update(offset, synthesis.render(rays, offset)).colors
+
+    def _entropy(
+        self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
+    ) -> FloatImage:
+        """Of the weights of the view (H, W), in [0, 1]; in the middle every ray is the photo's own."""
+        from iibr_core.rendering.view_synthesis import ViewSynthesis
+
+        loaded, plan = _given(request, inputs)
+        if request.view == plan.grid.centre:
+            return np.zeros(loaded.photo.size, np.float32)
+        inpainter = load_inpainter(inputs.inpaint)
+        rays = self._kept_rays(request, inputs, inpainter, should_stop)
+        with ViewSynthesis(should_stop, keeps_entropy=True, inpainter=inpainter) as synthesis:
+            entropy = synthesis.render(rays, plan.grid.offset(*request.view)).entropy
+        assert entropy is not None
+        return np.clip(entropy, 0, 1)
+
+    def _kept_rays(
+        self,
+        request: InspectionRequest,
+        inputs: ComparisonInputs,
+        inpainter: Inpainter,
+        should_stop: Callable[[], bool],
+    ) -> RaySet:
+        """The ray set of the scene's plan, or of the ground truth's places."""
+        from iibr_core.generation.light_field import ray_set
+
+        loaded, plan = _given(request, inputs)
+        rays_of = request.generation, request.truth.grid if request.truth is not None else None
+        if self._rays is None or self._rays_of != rays_of:
             self._rays = None  # two sets would be large
             disparity = plan.field_disparity(loaded.disparity)
             rays, outer_views = ray_set(loaded.photo, disparity, plan, should_stop, inpainter)
             for _ in outer_views:
                 pass
-            self._rays, self._rays_of = rays, (request.generation, grid)
-        transformer, every, keeps_entropy = transformer_for(quality), quality == "exact", request.kind == "entropy"
-        with ViewSynthesis(
-            should_stop, transformer, every, keeps_entropy=keeps_entropy, inpainter=inpainter
-        ) as synthesis:
-            offset = plan.grid.offset(*request.view)
-            view = synthesis.render(self._rays, offset)
-        colors = without_specks(self._rays, offset, view.colors, view.disparity, view.inpainted, should_stop)
-        return replace(view, colors=colors)
+            self._rays, self._rays_of = rays, rays_of
+        return self._rays
+
+
+def _given(request: InspectionRequest, inputs: ComparisonInputs) -> tuple[LoadedPhoto, ScenePlan]:
+    """The photo, and the plan of its scene or of the ground truth's places."""
+    loaded, plan = inputs.loaded, inputs.plan
+    assert loaded is not None
+    assert plan is not None
+    if request.truth is not None:
+        plan = plan_literal(loaded.photo, loaded.disparity, request.truth.grid)
+    return loaded, plan
 
 
 class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):
@@ -202,11 +231,6 @@ class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):
             yield from self._comparison_job.results_of(request, inputs, job.should_stop)
 
 
-def _bytes_of(colors: StoredColors | FloatImage, color_space: ColorSpace = SRGB) -> Bytes:
-    """Stored or encoded colours of a space as sRGB bytes; what exceeds white is white."""
-    if color_space != SRGB:
-        white = 255 if colors.dtype == np.uint8 else 1
-        return bytes_from_encoded(convert(np.asarray(colors / white, np.float32), SRGB, color_space))
-    if colors.dtype == np.uint8:
-        return np.asarray(colors, np.uint8)
-    return np.asarray(stored_from_encoded(colors.astype(np.float32), False), np.uint8)
+def _bytes_of(stored: StoredColors, color_space: ColorSpace = SRGB) -> Bytes:
+    """Stored colours of a space as sRGB bytes; what exceeds white is white."""
+    return bytes_from_encoded(convert(encoded_from_stored(stored), SRGB, color_space))
