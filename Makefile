@@ -18,7 +18,7 @@ test: install
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 # DATA: a folder of scenes as `iibr evaluate` takes them; without it, a made-up scene and the demo photo. OUT: for the report.
 OUT ?= out/bench
