@@ -11,6 +11,7 @@ import pytest
 
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
+from viewer.background.scene_worker import SceneReady
 from viewer.display import scene_view
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.render_settings import RenderSettings
@@ -70,3 +71,17 @@ def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: Headless
     view.renderer.refine()
     shown = view.renderer.read_image().astype(int)
     assert np.abs(shown - view.picture(RenderSettings(opened.state.optics, SIZE))).max() <= 1
+
+
+def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: HeadlessViewer) -> None:
+    view, scene = opened._scene_view, opened.state.scene
+    assert scene is not None
+    assert view.centre is not None
+    view.open(SceneReady(view.generation, scene, view.loaded, view.centre))
+    view.stand_in(replace(view.centre, colors=np.full_like(view.centre.colors, 255)))
+    view.converge(opened.state, SIZE)
+    assert view.renderer.read_image().min() == 255
+    view.add(replace(view.centre, row=0, column=1))
+    view.upload_all()
+    view.converge(opened.state, SIZE)
+    assert view.renderer.read_image().min() == 255

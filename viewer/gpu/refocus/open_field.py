@@ -54,7 +54,7 @@ class OpenField:
             field = self.loaded
             size = field.grid, field.width, field.height
             self._stand_in = LightFieldTexture(self._ctx, *size, field.hdr, with_disparity=True, stride=max(field.grid))
-            self._stand_in.upload(view.row, view.column, view.colors, view.disparity)
+            self._stand_in.upload(*field.grid.centre, view.colors, view.disparity)
 
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """See `Renderer.set_gloss`."""

@@ -127,9 +127,9 @@ class Renderer:
             self._accumulation = None
 
     def stand_in(self, view: ViewUpdate | None) -> None:
-        """Draw this view alone in place of the field, whose grid and size it has; None: the field again.
+        """Draw this view alone in the field's place, from its middle; None: the field again.
 
-        It has a disparity, and its colours are sRGB's.
+        It has the size of the field's views, a disparity, and sRGB's colours.
         """
         self._stop_picture()
         self._fields.stand_in(view)
