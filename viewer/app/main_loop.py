@@ -60,6 +60,7 @@ from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.inspection import Probed
 from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import Preferences
 from viewer.model.state.tasks import ReadTruthTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
@@ -143,7 +144,7 @@ class App:
         self._side_effects = SideEffects(self.scene_view, wake, self.window.clipboard_text)
         self._sessions = SessionStore(kept_in, wake)
         self._kept_in = kept_in
-        self._kept_recent = self.state.recent
+        self._kept = _worth_keeping(self.state)
         self._stepped_at = 0.0
         self._noticed: Notice | None = None
         self._noticed_at = 0.0
@@ -193,7 +194,7 @@ class App:
         self.do(*self.free_look.advance(self.state))
         self._is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self.scene_loader.advance(self.state)
-        self._keep_recent()
+        self._keep_news()
         self._took_s.append(time.perf_counter() - start)
 
     @property
@@ -329,10 +330,10 @@ class App:
         if request != before:
             self._comparisons.want(request, self.inspection_view.inputs(request, self.state))
 
-    def _keep_recent(self) -> None:
-        """At once: they are what one misses after a crash."""
-        if self.state.recent != self._kept_recent:
-            self._kept_recent = self.state.recent
+    def _keep_news(self) -> None:
+        """At once: it is what one misses after a crash."""
+        if _worth_keeping(self.state) != self._kept:
+            self._kept = _worth_keeping(self.state)
             self._keep()
 
     def _keep(self) -> None:
@@ -352,6 +353,11 @@ class App:
         self.window.show_frame()
         self._shown, self._same_frames = frame, 0
         self.frames_shown += 1
+
+
+def _worth_keeping(state: AppState) -> tuple[tuple[str, ...], Preferences]:
+    """Recent files and preferences, but for where the window is: that changes with every move of it."""
+    return state.recent, replace(state.preferences, window=None)
 
 
 def run(state: AppState, kept_in: Path | None = None) -> None:

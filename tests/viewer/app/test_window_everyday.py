@@ -14,6 +14,7 @@ from iibr_core.formats.images.photo import read_photo, write_image
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, write_scene
 from viewer.app.headless import HeadlessViewer
+from viewer.app.preferences_store import load_preferences
 from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
 from viewer.model.saved_settings import ATTRIBUTE, read_settings
 from viewer.model.state.app_state import AppState
@@ -209,6 +210,7 @@ def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo
     first.until(lambda app: "scene" in app.state.preferences.open_sections)
     first.until_idle()
     preferences = first.app.state.preferences
+    assert load_preferences(AppState(), kept).preferences.open_sections == preferences.open_sections, "after a crash"
     first.close()
     second = open_window(None, kept_in=kept)
     second.until(lambda app: app.frames_shown > 0)
