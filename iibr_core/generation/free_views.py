@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.cameras import infinity_of
 from iibr_core.generation.outer_views import AROUND_PX, farthest_views, outer_views
-from iibr_core.generation.relief import measure_relief
+from iibr_core.generation.relief import measure_relief, rounding_step
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.beyond_frame import extend_beyond_frame
@@ -126,6 +126,7 @@ class FreeViews:
         self._should_stop, self._margins = should_stop, reach.margins
         self.scale_px = camera.focal_px[0] * reach.step
         disparity = inverse_depth * np.float32(self.scale_px)
+        self._step = rounding_step(disparity)
         colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, should_stop)
         x, y = camera.centre_px
         centre_px = x + reach.margins.left, y + reach.margins.top
@@ -142,7 +143,8 @@ class FreeViews:
         should_stop: None for that of the ray set.
         """
         matrix = target_from_photo(self._camera, camera, self.scale_px)
-        return render_free_view(self._rays, matrix, camera.size, self._margins, should_stop or self._should_stop)
+        should_stop = should_stop or self._should_stop
+        return render_free_view(self._rays, matrix, camera.size, self._margins, self._step, should_stop)
 
 
 def depths_of(inverse_depth: FloatImage) -> tuple[float, float]:

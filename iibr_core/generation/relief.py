@@ -20,6 +20,9 @@ LEAST_OVER_NOISE = 4.0
 LEAST_OVER_VALUE = 1e-4
 """A range below this share of the disparities it is found at lies beyond what maps state."""
 
+MOST_STEP = 1 / 30
+"""Of the range: maps with larger steps than five bits have are made of edges."""
+
 
 @dataclass(frozen=True)
 class Relief:
@@ -51,6 +54,17 @@ def measure_relief(disparity: FloatImage) -> Relief:
     if high - low <= max(LEAST_OVER_NOISE * noise, LEAST_OVER_VALUE * max(abs(low), abs(high))):
         return Relief(middle, middle, noise)
     return Relief(low, high, noise)
+
+
+def rounding_step(disparity: FloatImage) -> float:
+    """What the values of a map (H, W) are rounded to, quarter pixels or 8 bits, say: the usual step between neighbours
+    that differ. 0 where such steps are edges; of maps that are not rounded it is their usual slope.
+    """
+    steps = np.concatenate([np.abs(np.diff(disparity, axis=axis)).ravel() for axis in (0, 1)])
+    range_ = measure_relief(disparity).range
+    steps = steps[steps > LEAST_OVER_VALUE * range_]
+    step = float(np.median(steps)) if steps.size else 0.0
+    return step if step <= MOST_STEP * range_ else 0.0
 
 
 def _of_squares(values: FloatImage, extreme: np.ufunc) -> FloatImage:

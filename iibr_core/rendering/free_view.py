@@ -33,6 +33,8 @@ MOST_MAGNIFIED_PX = 16.0
 """A square that lands larger than this is left out: the photo knows nothing so small."""
 FINE_PX = 1.25
 """Where a target pixel spans more pixels of its source, every sample looks up its own colour: none may be skipped."""
+SEALED_STEPS = 1.5
+"""Surfaces of a rounded map are stairs; steps up to so many times its own are no depth edges."""
 # The order in which a ray that fills its pixel in part covers samples: any share is spread over the pixel.
 COVERING_ORDER = np.array([4, 0, 8, 2, 6, 1, 7, 3, 5]).argsort()
 INSIDE = 1e-6
@@ -61,12 +63,17 @@ def target_from_photo(photo: Camera, target: Camera, scale_px: float) -> Matrix:
 
 
 def render_free_view(
-    rays: RaySet, target_from_rays: Matrix, size: ImageSize, frame: Margins, should_stop: ShouldStop = never
+    rays: RaySet,
+    target_from_rays: Matrix,
+    size: ImageSize,
+    frame: Margins,
+    rounding_step: float = 0.0,
+    should_stop: ShouldStop = never,
 ) -> RenderedView:
     """The view of a camera with pictures of a size, its holes filled.
 
     target_from_rays: see `target_from_photo`. frame: so far within the ray set's images the photo's own frame lies: all
-    beyond counts as inpainted. Raises Cancelled once should_stop is true.
+    beyond counts as inpainted. rounding_step: what disparity is rounded to. Raises Cancelled once should_stop is true.
     """
     view = RenderedView(
         np.zeros((*size, 3), np.float32), np.zeros(size, np.float32), np.zeros(size, np.bool_), np.zeros(size, np.bool_)
@@ -75,10 +82,10 @@ def render_free_view(
     drawing = [tuple(map(float, matrix.ravel())) for matrix in matrices]
     looking_up = np.stack([np.linalg.inv(matrix).ravel() for matrix in matrices])
     landing = [_landing(rays, k, matrix, should_stop) for k, matrix in enumerate(drawing)]
-    surface = SAME_SURFACE_PX / rays.farthest_views
+    surface, sealed_step = SAME_SURFACE_PX / rays.farthest_views, SEALED_STEPS * rounding_step
 
     def band(first: int, last: int) -> None:
-        nearest, source = _draw(rays, drawing, landing, surface, (first, last), size.width)
+        nearest, source = _draw(rays, drawing, landing, surface, sealed_step, (first, last), size.width)
         _, images, surfaces, _, edge_level = rays.arrays
         _resolve(
             images, surfaces, edge_level, rays.photo_images, looking_up, frame, rays.farthest_views,
@@ -116,6 +123,7 @@ def _draw(
     matrices: list[tuple[float, ...]],
     landing: list[FloatImage],
     surface: float,
+    sealed_step: float,
     rows: tuple[int, int],
     width: int,
 ) -> tuple[FloatImage, NDArray[np.uint8]]:
@@ -132,7 +140,8 @@ def _draw(
         # What the photo shows goes before what was made up beside it.
         ahead = surface if k >= rays.photo_images else 0.0
         _draw_rays(
-            disparity[k], coverage[k], joined, landing[k], matrix, k, rays.photo_images, ahead, first, nearest, source
+            disparity[k], coverage[k], joined, landing[k], matrix, k, rays.photo_images, ahead, sealed_step, first,
+            nearest, source,
         )  # fmt: skip
     return nearest, source
 
@@ -175,7 +184,7 @@ def _land_cells(low, high, m, first, last, landing):
 
 @kernel
 def _draw_rays(
-    disparity, coverage, joined, landing, m, index, photo_images, ahead, first_row, nearest, source
+    disparity, coverage, joined, landing, m, index, photo_images, ahead, sealed_step, first_row, nearest, source
 ):  # fmt: skip
     """Draw the rays of one image; see `_draw`. ahead: so much nearer than the photo's surface it must
     be to hide it.
@@ -191,12 +200,12 @@ def _draw_rays(
             is_drawn[x] = is_near and coverage[y, x] > 0
             any_drawn = any_drawn or is_drawn[x]
         if any_drawn:
-            _land_squares(disparity, joined, m, y, corners, is_drawn)
+            _land_squares(disparity, joined, m, y, sealed_step, corners, is_drawn)
             _draw_squares(corners, is_drawn, coverage[y], index, photo_images, ahead, first_row, nearest, source)
 
 
 @kernel
-def _land_squares(disparity, joined, m, y, corners, is_drawn):
+def _land_squares(disparity, joined, m, y, sealed_step, corners, is_drawn):
     """Where the corners of a row of pixels land: (X, Y, D) each; what reaches behind the camera is not drawn.
 
     A corner's disparity is the mean of those around it on the pixel's surface: where these agree, there are no cracks.
@@ -206,10 +215,11 @@ def _land_squares(disparity, joined, m, y, corners, is_drawn):
         if not is_drawn[x]:
             continue
         here = disparity[y, x]
-        # Steps of disparity that open a gap as wide as may be sealed.
+        # Steps of disparity that open a gap as wide as may be sealed, or that rounding has left.
         at_x, at_y, _, _ = _project(m, x, y, here)
         wide = max(abs(m[0] - at_x * m[8]), abs(m[5] - at_y * m[9]), abs(m[1] - at_x * m[9]), abs(m[4] - at_y * m[8]))
         one_surface = SEALED_GAP_PX * wide / max(abs(m[3] - at_x * m[11]), abs(m[7] - at_y * m[11]), 1e-9)
+        one_surface = max(one_surface, sealed_step)
         for corner in range(4):
             v, u = y + CORNERS[corner, 0], x + CORNERS[corner, 1]
             has_row, has_column = 0 <= v < height, 0 <= u < width

@@ -424,6 +424,7 @@ FINITE = {
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(focus_disparity=v)).field_disparity(scene()[1]),
     ],
     "generation.relief.measure_relief": lambda v, _: relief.measure_relief(depths(v)),
+    "generation.relief.rounding_step": lambda v, _: relief.rounding_step(depths(v)),
     "generation.plan.plan_literal": lambda v, _: plan.plan_literal(scene()[0], Disparity(depths(v), "wild"), GRID),
     "rendering.coherent_cells.find_coherent_cells": lambda v, _: [
         coherent_cells.find_coherent_cells(rays(v), ViewOffset(0.5, -1.0), (0, SIZE[0])),

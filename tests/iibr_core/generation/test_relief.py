@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from iibr_core.generation.plan import PlanOverrides, plan_for_viewing
-from iibr_core.generation.relief import Relief, measure_relief
+from iibr_core.generation.relief import Relief, measure_relief, rounding_step
 from iibr_core.types import TOTAL_PARALLAX, GridShape
 from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture
 
@@ -100,3 +100,15 @@ def test_planes_have_no_noise_and_keep_their_range():
     relief = measure_relief(0.25 * x - 0.5 * y)
     assert relief.noise == pytest.approx(0, abs=1e-5)
     assert relief.range == pytest.approx(0.25 * WIDTH + 0.5 * HEIGHT, rel=0.05)
+
+
+@pytest.mark.parametrize("steps", [40, 64, 255])
+def test_what_a_map_is_rounded_to_is_found(steps):
+    y, x = np.indices((HEIGHT, WIDTH))
+    smooth = np.hypot(y - 100, x - 150) / 260
+    assert rounding_step(np.round(smooth * steps).astype(np.float32) / steps) == pytest.approx(1 / steps)
+
+
+@pytest.mark.parametrize("values", [wall(), bird(0.0), np.ones((1, 1), np.float32)])
+def test_edges_are_no_rounding(values):
+    assert rounding_step(values) == 0

@@ -57,13 +57,15 @@ def sealed_step(matrix, x, y, d):
     return 0.75 * max(np.abs(landed(x + i, y + j, d) - here).max() for i, j in ((little, 0), (0, little))) / moved
 
 
-def drawn_slowly(disparity, matrix, size):
-    """What `_draw` gives for one image: every sample asks every square of every pixel."""
+def drawn_slowly(disparity, matrix, size, rounding):
+    """What `_draw` gives for one image: every sample asks every square of every pixel. rounding: so large steps are
+    none.
+    """
     height, width = disparity.shape
     nearest = np.full((SAMPLES * size.height, SAMPLES * size.width), -np.inf)
     at = (np.arange(SAMPLES * max(size)) + 0.5) / SAMPLES - 0.5
     for y, x in np.ndindex(height, width):
-        corners, one_surface = [], sealed_step(matrix, x, y, disparity[y, x])
+        corners, one_surface = [], max(sealed_step(matrix, x, y, disparity[y, x]), rounding)
         for j, i in CORNERS:
             # The pixels around the corner that steps below one_surface lead to from this one.
             alike, ways = {(y, x)}, [(y, x)]
@@ -89,8 +91,8 @@ def drawn_slowly(disparity, matrix, size):
     return nearest
 
 
-@pytest.mark.parametrize("turn", [about(2, 30.0), about(1, -8.0) @ about(0, 5.0)])
-def test_samples_see_what_a_slow_twin_sees(turn):
+@pytest.mark.parametrize(("turn", "rounding"), [(about(2, 30.0), 0.0), (about(1, -8.0) @ about(0, 5.0), 0.9)])
+def test_samples_see_what_a_slow_twin_sees(turn, rounding):
     rng = np.random.default_rng(1)
     disparity = np.where(rng.random((6, 7)) < 0.3, 2.0, 1.0) + rng.uniform(0, 0.3, (6, 7))
     photo = camera(6, 7, 8.0)
@@ -99,8 +101,8 @@ def test_samples_see_what_a_slow_twin_sees(turn):
     rays = rays_of_photo(np.zeros((6, 7, 3), np.float32), disparity.astype(np.float32), 1.0, 0)
     flat = tuple(map(float, matrix.ravel()))
     landing = [free_view._landing(rays, 0, flat, lambda: False)]
-    nearest, source = free_view._draw(rays, [flat], landing, 0.5, (0, 4), 5)
-    slow = drawn_slowly(rays.arrays[2][0], matrix, target.size)
+    nearest, source = free_view._draw(rays, [flat], landing, 0.5, rounding, (0, 4), 5)
+    slow = drawn_slowly(rays.arrays[2][0], matrix, target.size, rounding)
     # Samples on the very side of a triangle belong to either.
     differ = ~np.isclose(nearest, slow, atol=1e-4)
     assert differ.mean() < 0.01
@@ -157,6 +159,15 @@ def test_a_rough_surface_stays_closed_before_a_camera_that_hardly_moves():
     taken, near, far = (camera(40, 48, place=(step, 0.0, 0.0)) for step in (0.0, 0.1, 1.0))
     view = FreeViews(smooth_texture(40, 48), rough, taken, [near, far]).view(near)
     assert not view.inpainted[5:35, 10:40].any()
+
+
+def test_a_surface_of_a_rounded_map_stays_closed_before_a_camera_that_moves_far():
+    """A slope of stairs, and a wall far behind it, which stays apart."""
+    rounded = np.tile(np.round(np.linspace(0.5, 1.0, 192, dtype=np.float32) * 50) / 50, (60, 1))
+    rounded[:40] = 0.2
+    view = view_of(smooth_texture(60, 192), rounded, camera(60, 192, place=(0.0, 0.0, 0.6)))
+    assert not view.inpainted[55:].any()
+    assert view.inpainted[:55].any()
 
 
 def test_half_way_to_a_wall_it_is_twice_as_large():
