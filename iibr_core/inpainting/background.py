@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, rims_of_holes
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.inpainting.rim_lines import find_lines, line_weight, mixed_beside
-from iibr_core.inpainting.rim_texture import carry_texture
+from iibr_core.inpainting.rim_texture import TILE_PX, carry_texture, choose_places, tile_rows_and_columns, tiles_of
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage, ViewOffset, image_size
@@ -94,6 +94,9 @@ def _fill_view(
         # Only when all is computed: neighbours are taken as they were before a step, not after it.
         _write_colors(changed[part], pixels[part], colors)
 
+    def run(step: Callable[[slice], None], count: int, most: int = MOST_PIECE_PIXELS) -> None:
+        in_pieces(step, pieces_of(count, most), should_stop, threads)
+
     steps: list[Callable[[slice], None]] = [
         lambda part: _fill(
             colors, disparity, pixels[part], known[part], number, lines,
@@ -102,15 +105,20 @@ def _fill_view(
         lambda part: _agree(disparity, hole, pixels[part], changed[part]),
         lambda part: _write_disparity(changed[part], pixels[part], disparity),
         *chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX),
-        lambda part: carry_texture(colors, disparity, mixed, pixels[part], one_surface, changed[part]),
-        lambda part: _add_texture(changed[part], pixels[part], colors),
     ]  # fmt: skip
-    in_pieces(
-        lambda part: find_lines(colors, disparity, mixed, rims[part], one_surface, lines[part]),
-        pieces_of(len(rims), MOST_PIECE_PIXELS), should_stop, threads,
-    )  # fmt: skip
+    run(lambda part: find_lines(colors, disparity, mixed, rims[part], one_surface, lines[part]), len(rims))
     for step in steps:
-        in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), should_stop, threads)
+        run(step, len(pixels))
+    tiles, place = tiles_of(pixels, image_size(hole)), np.empty(tile_rows_and_columns(image_size(hole)), np.int8)
+    run(
+        lambda part: choose_places(colors, disparity, hole, mixed, tiles[part], one_surface, place),
+        len(tiles), MOST_PIECE_PIXELS // TILE_PX**2,
+    )  # fmt: skip
+    run(
+        lambda part: carry_texture(colors, disparity, mixed, pixels[part], one_surface, place, changed[part]),
+        len(pixels),
+    )
+    run(lambda part: _add_texture(changed[part], pixels[part], colors), len(pixels))
 
 
 def background_inpainter() -> Inpainter:
