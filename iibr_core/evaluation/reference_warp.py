@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from iibr_core.runtime.jit import kernel
-from iibr_core.types import FloatImage, ImageSize, ViewOffset
+from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 SAMPLES = 3
 """Every pixel lands as SAMPLES x SAMPLES points, so that stretched surfaces stay closed."""
@@ -46,25 +46,19 @@ class WarpedView:
 
 def reference_warp(photo: FloatImage, disparity: FloatImage, offset: ViewOffset) -> WarpedView:
     """The view at an offset of a photo (H, W, 3), sRGB-encoded in 0..1, with disparity (H, W), px per view step."""
-    height, width = disparity.shape
-    nearest = _splat(disparity.astype(np.float32), float(offset.t), float(offset.s))
-    hole = nearest == NOWHERE
-    nearest[hole] = 0
-    y, x = np.mgrid[0:height, 0:width]
-    from_x, from_y = x + nearest * offset.s, y + nearest * offset.t
-    hole |= (from_x < -0.5) | (from_y < -0.5) | (from_x > width - 0.5) | (from_y > height - 0.5)
-    colors = np.clip(_lanczos(photo.astype(np.float32), from_x, from_y), 0, 1)
-    return WarpedView(_fill_holes(colors, hole, nearest), nearest, hole)
+    view_from_photo = np.eye(4)
+    view_from_photo[:2, 3] = -offset.s, -offset.t  # x lands at x - d (s, t)
+    return reference_warp_to(photo, disparity, view_from_photo, image_size(disparity))
 
 
 def reference_warp_to(
     photo: FloatImage, disparity: FloatImage, target_from_photo: NDArray[np.float64], size: ImageSize
 ) -> WarpedView:
-    """The same for a camera with pictures of a size that stands anywhere. target_from_photo: (4, 4), from (x, y, 1, d)
+    """The same for a camera that stands anywhere, with pictures of a size. target_from_photo: (4, 4), from (x, y, 1, d)
     of the photo to a multiple of the same of the target.
     """
     height, width = disparity.shape
-    nearest = _splat_by(disparity.astype(np.float32), target_from_photo, *size)
+    nearest = _splat(disparity.astype(np.float32), target_from_photo, *size)
     hole = nearest == NOWHERE
     nearest[hole] = 0
     y, x = np.mgrid[0 : size.height, 0 : size.width]
@@ -79,27 +73,8 @@ def reference_warp_to(
 
 
 @kernel
-def _splat(disparity, t, s):
-    """The nearest (largest) disparity that lands on each pixel, NOWHERE where none does."""
-    height, width = disparity.shape
-    nearest = np.full((height, width), NOWHERE, np.float32)
-    for y in range(height):
-        for x in range(width):
-            for j in range(SAMPLES):
-                for i in range(SAMPLES):
-                    point_x = x + (i + 0.5) / SAMPLES - 0.5
-                    point_y = y + (j + 0.5) / SAMPLES - 0.5
-                    # Forward warp: x lands at x - d (s, t). A z-test keeps the nearest.
-                    d = _surface_at(disparity, x, y, point_x, point_y)
-                    to_x, to_y = math.floor(point_x - d * s + 0.5), math.floor(point_y - d * t + 0.5)
-                    if 0 <= to_x < width and 0 <= to_y < height and d > nearest[int(to_y), int(to_x)]:
-                        nearest[int(to_y), int(to_x)] = d
-    return nearest
-
-
-@kernel
-def _splat_by(disparity, matrix, target_height, target_width):
-    """What `_splat` does, by a 4x4 matrix: the nearest disparity by the target's measure."""
+def _splat(disparity, matrix, target_height, target_width):
+    """The nearest (largest) disparity, by the target's measure, that a 4x4 matrix lands on each pixel; else NOWHERE."""
     height, width = disparity.shape
     nearest = np.full((target_height, target_width), NOWHERE, np.float32)
     for y in range(height):
@@ -109,16 +84,16 @@ def _splat_by(disparity, matrix, target_height, target_width):
                     point_x = x + (i + 0.5) / SAMPLES - 0.5
                     point_y = y + (j + 0.5) / SAMPLES - 0.5
                     d = _surface_at(disparity, x, y, point_x, point_y)
+                    # Forward warp. A z-test keeps the nearest.
                     w = matrix[2, 0] * point_x + matrix[2, 1] * point_y + matrix[2, 2] + matrix[2, 3] * d
                     if not w > 0:  # behind the camera
                         continue
-                    to_x = matrix[0, 0] * point_x + matrix[0, 1] * point_y + matrix[0, 2] + matrix[0, 3] * d
-                    to_y = matrix[1, 0] * point_x + matrix[1, 1] * point_y + matrix[1, 2] + matrix[1, 3] * d
-                    to_d = matrix[3, 0] * point_x + matrix[3, 1] * point_y + matrix[3, 2] + matrix[3, 3] * d
-                    to_x, to_y, to_d = to_x / w + 0.5, to_y / w + 0.5, to_d / w
+                    to_x = (matrix[0, 0] * point_x + matrix[0, 1] * point_y + matrix[0, 2] + matrix[0, 3] * d) / w + 0.5
+                    to_y = (matrix[1, 0] * point_x + matrix[1, 1] * point_y + matrix[1, 2] + matrix[1, 3] * d) / w + 0.5
                     if 0 <= to_x < target_width and 0 <= to_y < target_height:
                         v, u = int(to_y), int(to_x)
-                        nearest[v, u] = max(nearest[v, u], to_d)
+                        to_d = matrix[3, 0] * point_x + matrix[3, 1] * point_y + matrix[3, 2] + matrix[3, 3] * d
+                        nearest[v, u] = max(nearest[v, u], to_d / w)
     return nearest
 
 

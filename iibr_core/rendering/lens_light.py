@@ -202,9 +202,8 @@ def _add_in_bands(
 
     def band(first: int, last: int) -> None:
         _add_sharp(
-            shown, disparity, around.top, around.left, tile.top, tile.left, size.height, size.width,
-            sample.offset.t, sample.offset.s, sample.weight, lens.focus, *lens.tilt, lens.focus_range, lens.diameter,
-            *lens.sharp_up_to_px, first, last, light, weights,
+            shown, disparity, around, tile, size, sample.offset, sample.weight,
+            lens.focus, lens.tilt, lens.focus_range, lens.diameter, lens.sharp_up_to_px, first, last, light, weights,
         )  # fmt: skip
 
     in_bands(band, tile.size, should_stop)
@@ -241,20 +240,21 @@ def _keys(f, a):
 
 @kernel
 def _add_sharp(
-    shown, disparity, view_top, view_left, tile_top, tile_left, height, width,
-    t, s, weight, focus, tilt_x, tilt_y, focus_range, diameter, from_px, to_px, first, last, light, weights,
+    shown, disparity, around, tile, size, offset, weight,
+    focus, tilt, focus_range, diameter, sharp_up_to_px, first, last, light, weights,
 ):  # fmt: skip
-    """Add to rows [first, last) of a tile what a view t, s from the eye shows in focus, times weight."""
+    """Rows [first, last) of `_add_in_bands`; offset, weight: the sample's; all others: see `LargeLens`."""
     rows, columns = disparity.shape
+    (t, s), (from_px, to_px), (height, width) = offset, sharp_up_to_px, size
     for row in range(first, last):
         for column in range(light.shape[1]):
-            y, x = tile_top + row, tile_left + column
-            focus_here = focus + tilt_x * (2.0 * (x + 0.5) / width - 1.0) + tilt_y * (2.0 * (y + 0.5) / height - 1.0)
+            y, x = tile.top + row, tile.left + column
+            focus_here = focus + tilt[0] * (2.0 * (x + 0.5) / width - 1.0) + tilt[1] * (2.0 * (y + 0.5) / height - 1.0)
             # Sheared to the focus; within a range that is in focus, to the disparity of what shows.
             sheared, d = focus_here, focus_here
             for _ in range(ON_SURFACE_ROUNDS if focus_range > 0 else 1):
-                v = min(max(math.floor(y - sheared * t + 0.5) - view_top, 0), rows - 1)
-                u = min(max(math.floor(x - sheared * s + 0.5) - view_left, 0), columns - 1)
+                v = min(max(math.floor(y - sheared * t + 0.5) - around.top, 0), rows - 1)
+                u = min(max(math.floor(x - sheared * s + 0.5) - around.left, 0), columns - 1)
                 d = disparity[v, u]
                 sheared = min(max(d, focus_here - focus_range), focus_here + focus_range)
             at_y, at_x = y - sheared * t, x - sheared * s
@@ -271,9 +271,9 @@ def _add_sharp(
             weights_y = _keys(at_y - top, ENLARGED_BY)
             red = green = blue = 0.0
             for j in range(4):
-                v = min(max(top + j - 1 - view_top, 0), rows - 1)
+                v = min(max(top + j - 1 - around.top, 0), rows - 1)
                 for i in range(4):
-                    u = min(max(left + i - 1 - view_left, 0), columns - 1)
+                    u = min(max(left + i - 1 - around.left, 0), columns - 1)
                     w = weights_y[j] * weights_x[i]
                     red += w * shown[v, u, 0]
                     green += w * shown[v, u, 1]

@@ -174,6 +174,10 @@ class Driver:
         return self.app.scene_view.renderer.read_image()
 
 
+Opener = Callable[..., Driver]
+"""What `open_window` gives: a photo's path, or None, where preferences are kept, and what a `Source` takes."""
+
+
 @pytest.fixture
 def no_egl_context() -> Iterator[None]:
     """Puts an EGL context of other tests aside: a window's GLX context cannot be current beside it."""
@@ -195,7 +199,7 @@ def no_egl_context() -> Iterator[None]:
 
 
 @pytest.fixture
-def open_window(display: str, no_egl_context: None) -> Iterator[Callable[..., Driver]]:
+def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
     """Opens the viewer on a photo; closes it after the test."""
     from viewer.app.main_loop import App, initial_state
     from viewer.model.actions import OpenPath

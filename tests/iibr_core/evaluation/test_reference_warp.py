@@ -65,17 +65,6 @@ def test_the_warp_is_its_slow_twin(offset: ViewOffset) -> None:
         np.testing.assert_allclose(warped.colors[row, column], wanted, atol=1e-5)
 
 
-def test_to_a_camera_on_the_plane_it_is_the_same() -> None:
-    photo, disparity = smooth_texture(14, 17), np.full((14, 17), 0.5, np.float32)
-    disparity[4:9, 5:11] = 2.0
-    beside = np.eye(4)
-    beside[:2, 3] = -1.5, 0.75  # x - d s, y - d t
-    known = reference_warp(photo, disparity, ViewOffset(-0.75, 1.5))
-    warped = reference_warp_to(photo, disparity, beside, ImageSize(14, 17))
-    np.testing.assert_array_equal(warped.hole, known.hole)
-    np.testing.assert_allclose(warped.colors, known.colors, atol=1e-6)
-
-
 def test_to_a_camera_with_half_as_large_pictures_it_is_the_photo_made_smaller() -> None:
     photo = smooth_texture(16, 20)
     smaller = np.diag([0.5, 0.5, 1.0, 1.0])  # pixel 2 x becomes pixel x

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from iibr_core.types import GridShape
-from tests.viewer.conftest import Driver
+from tests.viewer.conftest import Driver, Opener
 
 
 @pytest.fixture
@@ -18,7 +17,7 @@ def grid() -> GridShape:
 
 
 @pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path, grid: GridShape) -> Driver:
+def viewer(open_window: Opener, photo_path: Path, grid: GridShape) -> Driver:
     """All views of the photo are there; the pointer rests in the picture, off the near square."""
     driver = open_window(photo_path, grid=grid)
     driver.until_idle()

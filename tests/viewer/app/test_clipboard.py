@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
@@ -12,13 +11,12 @@ import pytest
 from PIL import Image
 
 from iibr_core.types import GridShape, InputError
-from tests.viewer.conftest import Driver, write_scene
+from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.clipboard import MOST_KEPT, paste_picture
 from viewer.model.actions import DismissNotices, DoTask
 from viewer.model.state.optics import SetAperture
 from viewer.model.state.saving import CopyTask, PasteTask
 
-Opener = Callable[..., Driver]
 CLIPBOARD = ["xclip", "-selection", "clipboard"]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import FAR, NEAR, Driver
+from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
 from viewer.model.actions import (
     AskForPath,
@@ -32,7 +32,6 @@ from viewer.model.state.optics import MoveEye
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
-Opener = Callable[..., Driver]
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 GRID = GridShape(3, 3)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from imgui_bundle import imgui
 from PIL import Image, ImageSequence
 
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, write_scene
+from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.main_loop import App
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, ShowPrompt
@@ -26,7 +25,7 @@ LARGE = ExportOptions(size=ScreenSize(600, 400), frames=200)
 
 
 @pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+def viewer(open_window: Opener, photo_path: Path) -> Driver:
     driver = open_window(photo_path, grid=GridShape(3, 3))
     driver.until_idle()
     for notice in driver.app.state.notices:

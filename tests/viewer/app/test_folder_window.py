@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from PIL import ImageGrab
 
 from iibr_core.types import GridShape, ViewUpdate
 from tests.viewer.background.test_scene_worker import write_large_jpeg
-from tests.viewer.conftest import Driver, write_scene
+from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.main_loop import App
 from viewer.background import scene_worker
 from viewer.background.read_ahead import WantedPhoto
@@ -22,8 +22,6 @@ from viewer.background.scene_worker import ViewReady
 from viewer.model.actions import OpenPath
 from viewer.model.state.folder import StepPhoto
 from viewer.model.state.scene import Progress, Source
-
-Opener = Callable[..., Driver]
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape
-from tests.viewer.conftest import Driver
+from tests.viewer.conftest import Driver, Opener
 from viewer.app.save_places import inputs_of_scene
 from viewer.model.actions import ShowPrompt
 from viewer.model.commands import action_for_path
@@ -20,7 +19,7 @@ from viewer.model.state.prompts import PathPrompt
 
 
 @pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+def viewer(open_window: Opener, photo_path: Path) -> Driver:
     driver = open_window(photo_path, grid=GridShape(3, 3))
     driver.until_idle()
     preferences = replace(driver.app.state.preferences, open_sections=("gloss",))

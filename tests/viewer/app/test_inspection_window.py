@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, write_scene
+from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.main_loop import App, initial_state
 from viewer.background.loaded_photo import load_photo
@@ -31,7 +30,7 @@ GRID = GridShape(5, 5)
 
 
 @pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+def viewer(open_window: Opener, photo_path: Path) -> Driver:
     driver = open_window(photo_path, grid=GRID)
     driver.until_idle()
     driver.send("mousemove", *driver.position(0.1, 0.1))
@@ -217,7 +216,7 @@ def test_ground_truth_that_is_no_use_is_a_notice(viewer: Driver, photo_path: Pat
 
 
 def test_ground_truth_of_the_command_line_waits_for_the_scene(
-    open_window: Callable[..., Driver], photo_path: Path, tmp_path: Path
+    open_window: Opener, photo_path: Path, tmp_path: Path
 ) -> None:
     truth = write_truth(photo_path, tmp_path / "truth")
     driver = open_window(None)
@@ -232,9 +231,7 @@ def test_ground_truth_of_the_command_line_waits_for_the_scene(
     assert (pair.psnr_db, pair.flip) == (math.inf, 0)
 
 
-def test_a_light_field_from_disk_beside_its_truth(
-    open_window: Callable[..., Driver], photo_path: Path, tmp_path: Path
-) -> None:
+def test_a_light_field_from_disk_beside_its_truth(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
     made, truth = write_truth(photo_path, tmp_path / "made", shift=4), write_truth(photo_path, tmp_path / "truth")
     driver = open_window(made)
     driver.until_idle()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,10 @@ import pytest
 from iibr_core.depth.models.catalog import LOCK, cached_folder, known_model
 from iibr_core.types import GridShape
 from tests.iibr_core.depth.test_transformers_models import depth_anything
-from tests.viewer.conftest import Driver
+from tests.viewer.conftest import Driver, Opener
 from viewer.model.commands import BY_NAME
 from viewer.model.state.model_download import ModelsPrompt
 
-Opener = Callable[..., Driver]
 COMMIT = "0123456789abcdef" * 2 + "01234567"
 MODEL = known_model("depth-anything-v2-small")
 

@@ -16,7 +16,7 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.rendering.lens_light import mean_of_areas
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
-from tests.viewer.conftest import HEIGHT, WIDTH, Driver, write_scene
+from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.full_picture import FullPicture
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, AskToSave, DismissNotice, DoTask, OpenPath, SetDepthStrength
@@ -32,7 +32,7 @@ LARGE = 1500, 1000
 
 
 @pytest.fixture
-def viewer(open_window: Callable[..., Driver], photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Driver:
+def viewer(open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Driver:
     """One small step of a picture a turn, so that there are many turns however fast the machine is."""
     monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
@@ -209,7 +209,7 @@ def test_a_file_that_cannot_be_written_is_a_notice_and_the_next_is_saved(
 
 
 @pytest.fixture
-def large(open_window: Callable[..., Driver], photo_path: Path) -> Driver:
+def large(open_window: Opener, photo_path: Path) -> Driver:
     """The photo is four times as large as its views."""
     driver = open_window(photo_path, grid=GridShape(3, 3), max_pixels=WIDTH * HEIGHT // 4)
     driver.until_idle()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 
 from iibr_core.depth.editing.edits import UNEDITED, Stroke
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver
+from tests.viewer.conftest import Driver, Opener
 from viewer.app.session_store import sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
 from viewer.model.reducers.root import EDITS_KEPT
@@ -19,7 +18,6 @@ from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 from viewer.model.state.saving import WriteSidecarTask
 
-Opener = Callable[..., Driver]
 ONE = GridShape(1, 1)
 AS_LEFT = "As you left it"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import glfw
@@ -13,7 +12,7 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import FAR, NEAR, Driver, write_scene
+from tests.viewer.conftest import FAR, NEAR, Driver, Opener, write_scene
 from viewer.app.main_loop import App
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
@@ -21,8 +20,6 @@ from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model.actions import SetDepthStrength
 from viewer.model.state.optics import MoveEye, Optics
 from viewer.model.state.scene import Source
-
-Opener = Callable[..., Driver]
 
 
 @pytest.fixture
@@ -224,7 +221,7 @@ def test_a_missing_file_leaves_an_empty_window_with_a_notice(open_window: Opener
 
 @pytest.mark.parametrize("kept", [[0, 0, 40_000, 40_000], [-90_000, 90_000, 100_000, 200], [0, 0, 1e308, float("nan")]])
 def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(
-    open_window: Callable[..., Driver], tmp_path: Path, kept: list[float]
+    open_window: Opener, tmp_path: Path, kept: list[float]
 ) -> None:
     (tmp_path / PREFERENCES_FILE).write_text(json.dumps({"window": kept}))
     window = open_window(None, kept_in=tmp_path).app.window

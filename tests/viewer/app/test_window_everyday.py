@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 from iibr_core.formats.images.photo import read_photo, write_image
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, write_scene
+from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.preferences_store import load_preferences
 from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
@@ -24,7 +24,6 @@ from viewer.model.state.prompts import PalettePrompt, SavePrompt
 from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
-Opener = Callable[..., Driver]
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
 

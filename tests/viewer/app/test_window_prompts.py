@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from imgui_bundle import imgui
 
 from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape
-from tests.viewer.conftest import SMALL_WINDOW, Driver
+from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.app.window_slot import STEP
 from viewer.model.actions import AskToSave, HidePanel, Notify, OpenPath, SetFontScale, ShowPrompt, StopWork
 from viewer.model.commands import COMMANDS
@@ -22,7 +21,6 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 from viewer.model.state.scene import Source
 
-Opener = Callable[..., Driver]
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
 

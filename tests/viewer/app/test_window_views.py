@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import SMALL_WINDOW, Driver
+from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.display.inspection_view import ROUNDING
 from viewer.model.actions import DismissNotices, ShowPrompt
 from viewer.model.inspection_request import DIFFERENCE_GAIN
 from viewer.model.state.inspection import Compare, KeepState
 from viewer.model.state.optics import MoveEye, SetAperture, SetExposure
-
-Opener = Callable[..., Driver]
 
 
 def test_f11_fills_the_screen_and_escape_comes_back_to_where_it_was(viewer: Driver) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +9,10 @@ import pytest
 
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import NEAR, Driver
+from tests.viewer.conftest import NEAR, Driver, Opener
 from viewer.model.layout import Rect
 from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.zoom import SetZoom, Zoom
-
-Opener = Callable[..., Driver]
 
 
 def until_sharp(viewer: Driver) -> np.ndarray:
