@@ -30,16 +30,14 @@ DISPARITY_ADJUSTMENT = 293
 EYES_APART_UM = 63_000
 
 
-def write_spatial_photo(
-    path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8], focal_px: float, apart_um: int = EYES_APART_UM
-) -> None:
-    """Write two pictures (H, W, 3), sRGB-encoded, whole or not at all. focal_px: of both. apart_um: from eye to eye.
+def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8], focal_px: float) -> None:
+    """Write two pictures (H, W, 3), sRGB-encoded, whole or not at all. focal_px: of both.
 
     Raises InputError where it cannot be written, ValueError where they differ in size.
     """
     if left.shape != right.shape:
         raise ValueError(f"the left picture is {left.shape}, the right one {right.shape}")
-    stored = _with_pair(_encode(path, left, right), focal_px / left.shape[1], apart_um)
+    stored = _with_pair(_encode(path, left, right), focal_px / left.shape[1])
     with atomic_write(path) as temporary:
         temporary.write_bytes(stored)
 
@@ -58,7 +56,7 @@ def _encode(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> by
     return stored.getvalue()
 
 
-def _with_pair(file: bytes, focal: float, apart_um: int) -> bytes:
+def _with_pair(file: bytes, focal: float) -> bytes:
     """With the pair's boxes. focal: focal length as a share of the width."""
     top = dict(_boxes(file))
     meta = dict(_boxes(top[b"meta"][4:]))
@@ -66,7 +64,12 @@ def _with_pair(file: bytes, focal: float, apart_um: int) -> bytes:
     left, right = (item for item, _ in _associations(iprp[b"ipma"]))
     known = sum(1 for _ in _boxes(iprp[b"ipco"]))
     # Properties are counted from 1, in their order.
-    new = [_intrinsics(focal), _extrinsics(None), _extrinsics(apart_um), _uuid(ADJUSTMENT, 0, DISPARITY_ADJUSTMENT)]
+    new = [
+        _intrinsics(focal),
+        _extrinsics(None),
+        _extrinsics(EYES_APART_UM),
+        _uuid(ADJUSTMENT, 0, DISPARITY_ADJUSTMENT),
+    ]
     own = {left: (1, 2, 4), right: (1, 3, 4)}
     entries = [(item, [*held, *(known + i for i in own[item])]) for item, held in _associations(iprp[b"ipma"])]
     iprp[b"ipco"] += b"".join(new)

@@ -33,7 +33,7 @@ def test_both_pictures_are_what_the_renderer_shows(source: ExportSource, tmp_pat
 def test_the_boxes_of_the_pair(tmp_path: Path, size: tuple[int, int]) -> None:
     rng = np.random.default_rng(0)
     left, right = (np.full((*size, 3), shade, np.uint8) for shade in rng.integers(0, 256, 2))
-    write_spatial_photo(tmp_path / "a.heic", left, right, focal_px=0.75 * size[1], apart_um=63_000)
+    write_spatial_photo(tmp_path / "a.heic", left, right, focal_px=0.75 * size[1])
     stored = (tmp_path / "a.heic").read_bytes()
     group = stored.index(b"ster")
     assert struct.unpack_from(">IIIII", stored, group + 4)[2:] == (2, 1, 2)
