@@ -1,9 +1,10 @@
 """Pixels at depth edges show two surfaces at once. Left whole, they trail a rim of foreground colour into the
 background.
 
-A pixel on the far side of a depth edge whose colour lies between both surfaces is split: the background keeps its own
-colour, and the foreground gets a fringe ray there that covers the pixel's share alpha. Both together are the pixel
-again.
+A pixel on the far side of a depth edge is split: the background keeps its own colour, and the foreground gets a fringe
+ray there that covers the pixel's share alpha. Both together are the pixel again. Share and colours are the most likely
+ones by how both surfaces' colours are spread around it (Bayesian matting: Chuang et al., CVPR 2001); where colours tell
+nothing, the outline tells the share.
 """
 
 from __future__ import annotations
@@ -14,14 +15,23 @@ from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
-LEAST_SHARE = 0.05
+LEAST_SHARE = 0.02
 """Smaller shares of foreground are noise."""
-LEAST_CONTRAST = 0.05
-"""Distance of the two surfaces' colours in linear light below which a share cannot be told."""
-MOST_RESIDUAL = 0.1
-"""How far, relative to their contrast squared, a pixel's colour may lie off the line between the two surfaces."""
-DIAGONAL = 0.99
-"""Prefers a straight neighbour to a diagonal one with the same disparity."""
+REACH_PX = 4
+"""Colours of both surfaces are taken from so far around."""
+NEARNESS = np.exp(-0.5 * (np.add.outer(*2 * [np.arange(-REACH_PX, REACH_PX + 1) ** 2])) / 2.0**2)
+"""What a pixel there counts, (2 REACH_PX + 1)^2."""
+RIM_TRUST = 0.001
+"""What pixels beside a depth edge count, which may be mixed themselves; they tell where there are no others."""
+NOISE = 2e-5
+"""Variance of a colour in linear light about what its surroundings say; and what is added for rounding, relative."""
+ROUNDING = 1e-6
+STRAIGHT_SHARE = 0.12
+DIAGONAL_SHARE = 0.05
+"""Of a pixel that its outline alone gives to the foreground, for each straight and diagonal neighbour that is."""
+SHARE_DEVIATION = 0.2
+"""Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
+ROUNDS = 3
 
 
 def split_mixed_pixels(
@@ -35,77 +45,140 @@ def split_mixed_pixels(
     """
     own, fringe = np.empty_like(colors, order="C"), np.empty_like(colors, order="C")
     fringe_disparity, coverage = np.empty_like(disparity, order="C"), np.empty_like(disparity, order="C")
+    is_rim, size = np.empty(disparity.shape, np.bool_), image_size(disparity)
 
     def band(first: int, last: int) -> None:
         own[first:last] = fringe[first:last] = colors[first:last]
         fringe_disparity[first:last], coverage[first:last] = np.nan, 0.0
-        _split_rows(colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage)
+        _split_rows(colors, disparity, is_rim, edge_step, first, last, own, fringe, fringe_disparity, coverage)
 
-    in_bands(band, image_size(disparity), should_stop)
+    in_bands(lambda first, last: _mark_rims(disparity, edge_step, first, last, is_rim), size, should_stop)
+    in_bands(band, size, should_stop)
     return own, fringe, fringe_disparity, coverage
 
 
 @kernel
-def _towards_front(disparity, x, y, edge_step):
-    """Direction to the neighbour most in front by more than edge_step; (0, 0) if none, or if one is as far behind."""
-    here = disparity[y, x]
-    best, step_x, step_y = edge_step, 0, 0
-    for j in range(-1, 2):
-        for i in range(-1, 2):
-            step = disparity[y + j, x + i] - here
-            if i != 0 and j != 0:
-                step *= DIAGONAL
-            # In front of something itself: no background that the foreground mixes into.
-            if step < -edge_step:
-                return 0, 0
-            if step > best:
-                best, step_x, step_y = step, i, j
-    return step_x, step_y
+def _mark_rims(disparity, edge_step, first, last, is_rim):
+    """Rows [first, last): which pixels have a neighbour on the other side of a depth edge."""
+    height, width = disparity.shape
+    for y in range(first, last):
+        for x in range(width):
+            here, is_rim[y, x] = disparity[y, x], False
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    is_rim[y, x] |= abs(disparity[v, u] - here) > edge_step
+
+
+@kernel
+def _front_beside(disparity, y, x, edge_step):
+    """The disparity most in front beside a pixel, and the share of the pixel that the outline gives to it."""
+    height, width = disparity.shape
+    front, share = disparity[y, x], 0.0
+    for v in range(max(y - 1, 0), min(y + 2, height)):
+        for u in range(max(x - 1, 0), min(x + 2, width)):
+            front = max(front, disparity[v, u])
+    for v in range(max(y - 1, 0), min(y + 2, height)):
+        for u in range(max(x - 1, 0), min(x + 2, width)):
+            if abs(disparity[v, u] - front) <= edge_step:
+                share += STRAIGHT_SHARE if v == y or u == x else DIAGONAL_SHARE
+    return front, share
+
+
+@kernel
+def _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, spread):
+    """Mean colour (2, 3) and its covariance (2, 3, 3) of the pixel's own surface and of that in front, around it, in
+    linear light; returns whether there are pixels of both.
+    """
+    height, width = disparity.shape
+    weights, color = np.zeros(2), np.empty(3)
+    mean[:], spread[:] = 0.0, 0.0
+    for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)):
+        for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
+            to_own, to_front = abs(disparity[v, u] - disparity[y, x]), abs(disparity[v, u] - front)
+            # A third surface, or none; or the pixel itself.
+            if not min(to_own, to_front) <= edge_step or (v == y and u == x):
+                continue
+            surface = 1 if to_front < to_own else 0
+            weight = NEARNESS[v - y + REACH_PX, u - x + REACH_PX] * (RIM_TRUST if is_rim[v, u] else 1.0)
+            weights[surface] += weight
+            for c in range(3):
+                color[c] = linear_scalar(colors[v, u, c])
+                mean[surface, c] += weight * color[c]
+                for e in range(c + 1):
+                    spread[surface, c, e] += weight * color[c] * color[e]
+    for surface in range(2):
+        mean[surface] /= max(weights[surface], 1e-9)
+        spread[surface] /= max(weights[surface], 1e-9)
+        for c in range(3):
+            for e in range(c + 1):
+                spread[surface, c, e] -= mean[surface, c] * mean[surface, e]
+                spread[surface, e, c] = spread[surface, c, e]
+        noise = NOISE + ROUNDING * (spread[surface, 0, 0] + spread[surface, 1, 1] + spread[surface, 2, 2])
+        for c in range(3):
+            spread[surface, c, c] += noise
+    return weights.min() > 0
+
+
+@kernel
+def _mixture_precision(spread, share, precision):
+    """Inverse (3, 3) of the covariance of a mixture's colours, by cofactors. spread (2, 3, 3): of what is behind and
+    what is in front.
+    """
+    mixed = (1.0 - share) ** 2 * spread[0] + share**2 * spread[1]
+    for c in range(3):
+        for e in range(3):
+            i, j, k, m = (c + 1) % 3, (c + 2) % 3, (e + 1) % 3, (e + 2) % 3
+            precision[c, e] = mixed[i, k] * mixed[j, m] - mixed[i, m] * mixed[j, k]
+    precision /= mixed[0, 0] * precision[0, 0] + mixed[0, 1] * precision[0, 1] + mixed[0, 2] * precision[0, 2]
 
 
 @kernel
 def _split_rows(
-    colors, disparity, edge_step, first, last, own, fringe, fringe_disparity, coverage,
+    colors, disparity, is_rim, edge_step, first, last, own, fringe, fringe_disparity, coverage,
 ):  # fmt: skip
     """Rows [first, last) of what `split_mixed_pixels` returns, which hold the photo where nothing is split."""
-    height, width = disparity.shape
-    front, back, here = np.empty(3), np.empty(3), np.empty(3)
-    # Colours are looked up two pixels away at most.
-    for y in range(max(first, 2), min(last, height - 2)):
-        for x in range(2, width - 2):
-            # A pixel just behind an edge: the foreground on one side, its own surface on the other.
-            i, j = _towards_front(disparity, x, y, edge_step)
-            if (i == 0 and j == 0) or abs(disparity[y - j, x - i] - disparity[y, x]) > edge_step:
+    mean, spread, precision, here = np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((3, 3)), np.empty(3)
+    for y in range(first, last):
+        for x in range(disparity.shape[1]):
+            if not is_rim[y, x]:
                 continue
-            # The foreground's colour, from one pixel beyond where it is that wide: the neighbour may be mixed itself.
-            front_disparity = disparity[y + j, x + i]
-            reach = 2 if abs(disparity[y + 2 * j, x + 2 * i] - front_disparity) <= edge_step else 1
-            contrast = along = 0.0
-            # Matting on the line between both colours: share = (here - back) (front - back) / |front - back|^2.
+            front, outline = _front_beside(disparity, y, x, edge_step)
+            # A pixel just behind an edge, and colours of both sides.
+            if not (
+                front - disparity[y, x] > edge_step
+                and _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, spread)
+            ):
+                continue
             for c in range(3):
-                front[c] = linear_scalar(colors[y + reach * j, x + reach * i, c])
-                back[c] = linear_scalar(colors[y - j, x - i, c])
                 here[c] = linear_scalar(colors[y, x, c])
-                along += (here[c] - back[c]) * (front[c] - back[c])
-                contrast += (front[c] - back[c]) ** 2
-            # Surfaces of one colour: the pixel tells nothing about shares.
-            if not contrast >= LEAST_CONTRAST**2:
+            # Colours of a mixture spread with both surfaces'. The share that fits best, by colours and outline, follows
+            # from that spread, and the spread from the share.
+            share, contrast = outline, mean[1] - mean[0]
+            _mixture_precision(spread, share, precision)
+            for _ in range(ROUNDS):
+                fits = 1.0 / SHARE_DEVIATION**2
+                expected = fits * outline
+                for c in range(3):
+                    for e in range(3):
+                        fits += contrast[c] * precision[c, e] * contrast[e]
+                        expected += contrast[c] * precision[c, e] * (here[e] - mean[0, e])
+                share = min(max(expected / fits, 0.0), 1.0 - LEAST_SHARE)
+                _mixture_precision(spread, share, precision)
+            # Colours that are not finite tell nothing.
+            if not share >= LEAST_SHARE:
                 continue
-            share = min(max(along / contrast, 0.0), 1.0)
-            # Off the line it is some third colour, and no mix.
-            residual = 0.0
+            # What is left goes to both by how far they spread: so both together are the pixel again.
+            off = here - mean[0] - share * contrast
             for c in range(3):
-                residual += (here[c] - share * front[c] - (1.0 - share) * back[c]) ** 2
-            if share < LEAST_SHARE or residual > MOST_RESIDUAL * contrast:
-                continue
-            for c in range(3):
-                # The better-determined of the two takes the residual, so that both together are the pixel again.
-                if share < 0.5:
-                    back[c] = max((here[c] - share * front[c]) / (1.0 - share), 0.0)
-                else:
-                    front[c] = max((here[c] - (1.0 - share) * back[c]) / share, 0.0)
-                own[y, x, c] = srgb_scalar(back[c])
-                fringe[y, x, c] = srgb_scalar(front[c])
+                back, fore = mean[0, c], mean[1, c]
+                for e in range(3):
+                    part = precision[e, 0] * off[0] + precision[e, 1] * off[1] + precision[e, 2] * off[2]
+                    back, fore = back + (1.0 - share) * spread[0, c, e] * part, fore + share * spread[1, c, e] * part
+                # Nothing is darker than black.
+                if back < 0.0:
+                    back, fore = 0.0, here[c] / share
+                elif fore < 0.0:
+                    back, fore = here[c] / (1.0 - share), 0.0
+                own[y, x, c], fringe[y, x, c] = srgb_scalar(back), srgb_scalar(fore)
             # The fringe ray moves with the foreground and covers its share; the own ray stays and fills the pixel.
-            fringe_disparity[y, x] = front_disparity
-            coverage[y, x] = share
+            fringe_disparity[y, x], coverage[y, x] = front, share
