@@ -27,7 +27,7 @@ GAP_PX = 1.0
 """A depth edge disoccludes something if it opens a gap wider than this in the outermost view."""
 SMOOTH_PX = 0.4
 """A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
-OPEN_SHARE = 0.42
+OPEN_SHARE = 0.28
 """Of the rays where surfaces meet, so many are left open by the closed form."""
 REMADE = 0.6
 """What an outer view takes once more, of the closed form's time, where the transformer is asked."""

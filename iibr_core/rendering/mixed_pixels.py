@@ -31,6 +31,8 @@ DIAGONAL_SHARE = 0.05
 """Of a pixel that its outline alone gives to the foreground, for each straight and diagonal neighbour that is."""
 SHARE_DEVIATION = 0.2
 """Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
+SLOPE = 0.5
+"""A pixel so many depth edges in front of a neighbour lies on a slope."""
 ROUNDS = 3
 
 
@@ -71,12 +73,17 @@ def _mark_rims(disparity, edge_step, first, last, is_rim):
 
 @kernel
 def _front_beside(disparity, y, x, edge_step):
-    """The disparity most in front beside a pixel, and the share of the pixel that the outline gives to it."""
+    """The disparity most in front beside a pixel, and the share of the pixel that the outline gives to it; its own and
+    0 on a slope, which falls away on the other side.
+    """
     height, width = disparity.shape
-    front, share = disparity[y, x], 0.0
+    here, share = disparity[y, x], 0.0
+    front = back = here
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
-            front = max(front, disparity[v, u])
+            front, back = max(front, disparity[v, u]), min(back, disparity[v, u])
+    if here - back > SLOPE * edge_step:
+        return here, share
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
             if abs(disparity[v, u] - front) <= edge_step:

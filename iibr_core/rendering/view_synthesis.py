@@ -35,8 +35,8 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
-EDGE_PX = 2.0
-"""A step of disparity is a depth edge if it opens a gap of at least this many pixels in the outermost view."""
+EDGE_PX = 1.0
+"""A step of disparity mixes two surfaces if it opens a gap of at least this many pixels in the outermost view."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -77,9 +77,12 @@ def test_completing_is_taking_all_views():
 def test_the_inpainter_decides_what_joins():
     seen = rays()
     for _, view in render_outer_views(seen, [LEFT], inpainter=paint_red):
-        assert (view.colors[view.occluded] == (1, 0, 0)).all()
-        assert (view.disparity[view.occluded] == -9).all()
-    np.testing.assert_array_equal(seen.arrays[2][-1] == -9, view.occluded)
+        colors, disparity, filled = view.filled_rays()
+        assert view.occluded.any()
+        assert (filled[view.occluded] == 1).all()
+        assert (colors[filled == 1] == (1, 0, 0)).all()
+        assert (disparity[filled == 1] == -9).all()
+    np.testing.assert_array_equal(seen.arrays[2][-1] == -9, filled)
 
 
 def test_a_stop_is_heard_and_adds_nothing():

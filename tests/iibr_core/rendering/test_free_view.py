@@ -147,9 +147,10 @@ def test_depth_edges_are_looked_up_as_anything_where_the_camera_only_turns():
     turned = camera(48, 48, turned=about(2, 10.0) @ about(1, 2.0))
     scenes = np.full((48, 48), 0.5, np.float32), square_scene(48, 48)[1]
     flat, square = (FreeViews(rough, inverse, taken, [turned, beside]).view(turned) for inverse in scenes)
-    differ = np.abs(flat.colors - square.colors).max(axis=2)[~(flat.inpainted | square.inpainted)] > 1e-3
-    # Pixels at the edges are split in nine at most.
-    assert differ.mean() < 0.05
+    apart = np.abs(flat.colors - square.colors).max(axis=2)[~(flat.inpainted | square.inpainted)]
+    # Pixels around the square are split, and looked up in two parts.
+    assert apart.max() < 0.05
+    assert (apart > 1e-3).mean() < 0.15
 
 
 def test_a_rough_surface_stays_closed_before_a_camera_that_hardly_moves():
