@@ -22,6 +22,8 @@ WIDEST_SIGMA_PX = 4.5
 ROUNDS = 2
 SWEEPS = 2
 """Of moving edges, in each round."""
+STIRRED_PX = 2
+"""Beside a pixel that moved, so far around, the next sweep looks again."""
 COLOR_WEIGHT = 6.0
 """What a colour that is clearly one side's counts, in what a whole pixel on the wrong side adds to the misfit."""
 OUTLINE_WEIGHT = 1.0
@@ -32,9 +34,9 @@ COLOR_NOISE = 0.003
 """Squared distance of colours (sRGB-encoded) that tells nothing."""
 SAME_SIDE = 0.3
 """Of the step, up to which a height is that side's."""
-CLEAN = 0.85
+CLEAN = np.float32(0.85)
 """A pixel of whose blur a smaller share comes from its own surface tells nothing of that surface's height."""
-MOSTLY_CLEAN = 0.95
+MOSTLY_CLEAN = np.float32(0.95)
 """From this share on, a pixel's own height counts, too."""
 SLOPE_DAMPING = 0.1
 """Squared sigmas, added to the spread of clean pixels."""
@@ -42,6 +44,10 @@ SURFACE_EDGES = 6.0
 """Times the least edge: heights within it may be one surface's."""
 MOVED_EDGES = 2.0
 """Times the least edge: lower steps stay where they are."""
+LATTICES = ((1, 0), (2, 1), (5, 2), (8, 3), (10, 3))
+"""Of pixels that stand for all of them: every n-th of a row, shifted by so many from row to row."""
+LATTICE_SIGMAS = 0.8
+"""Their spacing, the root of n, is at most that: then a Gaussian has the same means over them."""
 MOST_MISFIT = 0.1
 """Of the fitted map, blurred again, from the given map, relative to what the blur changed (rms of a cell)."""
 
@@ -62,9 +68,10 @@ def fit_to_blur(
     taps, reach = _taps(blur)
     if not reach.any():
         return sharp
-    cells, surface = (taps, reach, blur.cell_px), SURFACE_EDGES * least_edge
+    cells, lattices = (taps, reach, blur.cell_px), (*_lattices(blur, reach), blur.cell_px)
+    surface, margin = np.float32(SURFACE_EDGES * least_edge), int(reach.max())
     size, cell_rows = image_size(values), ImageSize(len(reach), blur.cell_px * values.shape[1])
-    fitted, lowered = sharp.copy(), sharp.copy()
+    fitted = sharp.copy()
     near, clean, missing = np.zeros(sharp.shape, np.bool_), np.ones_like(sharp), np.zeros_like(sharp)
 
     def mark(first: int, last: int) -> None:
@@ -74,39 +81,67 @@ def fit_to_blur(
         _find_missing(values, fitted, *cells, first, last, missing)
 
     def find_clean(first: int, last: int) -> None:
-        _find_clean(fitted, near, *cells, surface, first, last, clean)
+        _find_clean(wide, near, *lattices, surface, first, last, clean)
 
     def lower(first: int, last: int) -> None:
-        _lower_halos(fitted, missing, clean, near, *cells, surface, first, last, lowered)
+        _lower_halos(wide, wide_missing, wide_clean, near, *lattices, blur.sigma_px, surface, first, last, fitted)
 
     def move(first: int, last: int) -> None:
-        _move_edges(photo, fitted, missing, *cells, MOVED_EDGES * least_edge, first, last)
+        _move_edges(photo, fitted, missing, *cells, MOVED_EDGES * least_edge, first, last, settled)
 
     in_bands(mark, size, should_stop)
+    near &= _at_pixels(reach > 0, blur, size)
     in_bands(find_missing, cell_rows, should_stop)
     for _ in range(ROUNDS):
+        wide = np.pad(fitted, margin, mode="edge")
         in_bands(find_clean, size, should_stop)
-        np.copyto(lowered, fitted)
+        # What lies outside tells nothing.
+        wide_missing, wide_clean = np.pad(missing, margin), np.pad(clean, margin)
         in_bands(lower, size, should_stop)
-        np.copyto(fitted, lowered)
         in_bands(find_missing, cell_rows, should_stop)
+        settled = np.zeros_like(near)
         for _ in range(SWEEPS):
             # One band after the other: each move sees what those before it left missing.
             in_bands(move, size, should_stop, threads=1)
     changed, misfit = _cell_squares(values - fitted, blur), _cell_squares(missing, blur)
     found = np.isfinite(misfit) & (misfit <= MOST_MISFIT**2 * changed)
-    found = found.repeat(blur.cell_px, 0).repeat(blur.cell_px, 1)
-    return np.where(found[: size.height, : size.width], fitted, sharp)
+    return np.where(_at_pixels(found, blur, size), fitted, sharp)
 
 
 def _taps(blur: EdgeBlur) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Of each cell (M, N): one half of a Gaussian (M, N, R), whole ones sum to 1, and how far it reaches, 0 = none."""
+    """Of each cell (M, N): a Gaussian (M, N, R) that sums to 1, and how far it reaches to both sides, 0 = none."""
     fits = blur.sigma_px <= WIDEST_SIGMA_PX
     reach = np.where(fits, np.ceil(REACH_SIGMAS * blur.sigma_px), 0).astype(np.int64)
-    apart = np.arange(int(reach.max()) + 1)
+    apart = np.abs(np.arange(2 * int(reach.max()) + 1) - reach[..., None])
     sigma = np.maximum(blur.sigma_px, 1e-3)[..., None]
     taps = np.where(apart <= reach[..., None], np.exp(-0.5 * (apart / sigma) ** 2), 0.0)
-    return (taps / (2 * taps.sum(axis=2) - taps[..., 0])[..., None]).astype(np.float32), reach
+    return (taps / taps.sum(axis=2, keepdims=True)).astype(np.float32), reach
+
+
+def _lattices(blur: EdgeBlur, reach: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Of each cell (M, N): pixels (M, N, K, 2) that stand for those its blur reaches; weights (M, N, K), sums are 1.
+
+    Pixels, down and across, are counted from the corner of what the widest blur reaches.
+    """
+    down, across = np.mgrid[-reach.max() : reach.max() + 1, -reach.max() : reach.max() + 1]
+    apart = down**2 + across**2
+    points, weights = [], []
+    for sigma in np.where(reach > 0, blur.sigma_px, 0).flat:
+        nth, shift = [lattice for lattice in LATTICES if lattice[0] <= max((LATTICE_SIGMAS * sigma) ** 2, 1)][-1]
+        is_on = (apart <= (REACH_SIGMAS * sigma) ** 2) & ((across - shift * down) % nth == 0)
+        weight = np.exp(-0.5 * apart[is_on] / max(sigma, 1e-3) ** 2)
+        points.append(np.argwhere(is_on))
+        weights.append(weight / weight.sum())
+    most = max(map(len, points))
+    # Those of narrow blurs are followed by pixels of no weight.
+    pixels = np.array([np.pad(at, ((0, most - len(at)), (0, 0))) for at in points])
+    shares = np.array([np.pad(weight, (0, most - len(weight))) for weight in weights], np.float32)
+    return pixels.reshape(*reach.shape, most, 2), shares.reshape(*reach.shape, most)
+
+
+def _at_pixels(cells: NDArray[np.bool_], blur: EdgeBlur, size: ImageSize) -> NDArray[np.bool_]:
+    """(H, W), what is true of a pixel's cell, from (M, N)."""
+    return cells.repeat(blur.cell_px, 0).repeat(blur.cell_px, 1)[: size.height, : size.width]
 
 
 def _cell_squares(values: FloatImage, blur: EdgeBlur) -> NDArray[np.float64]:
@@ -122,26 +157,31 @@ def _find_missing(values, fitted, taps, reach, cell, first, last, missing):
     height, width = values.shape
     for row in range(first, last):
         for column in range(reach.shape[1]):
-            far = reach[row, column]
+            far, own = reach[row, column], taps[row, column]
             if far == 0:
                 continue
             top, left = row * cell, column * cell
             bottom, right = min(top + cell, height), min(left + cell, width)
             # Separable: rows of the cell and of what its blur reaches, then columns. The border's pixels go on.
-            blurred = np.empty((bottom - top + 2 * far, right - left))
+            line = np.empty(right - left + 2 * far, np.float32)
+            blurred = np.zeros((bottom - top + 2 * far, right - left), np.float32)
             for y in range(len(blurred)):
                 v = min(max(top + y - far, 0), height - 1)
-                for x in range(left, right):
-                    total = 0.0
-                    for i in range(-far, far + 1):
-                        total += taps[row, column, abs(i)] * fitted[v, min(max(x + i, 0), width - 1)]
-                    blurred[y, x - left] = total
+                for x in range(len(line)):
+                    line[x] = fitted[v, min(max(left + x - far, 0), width - 1)]
+                for i in range(-far, far + 1):
+                    _add(own[far + i], line[far + i :], blurred[y])
             for y in range(top, bottom):
-                for x in range(left, right):
-                    total = 0.0
-                    for j in range(-far, far + 1):
-                        total += taps[row, column, abs(j)] * blurred[y - top + far + j, x - left]
-                    missing[y, x] = values[y, x] - total
+                total = -values[y, left:right]
+                for j in range(-far, far + 1):
+                    _add(own[far + j], blurred[y - top + far + j], total)
+                missing[y, left:right] = -total
+
+
+@kernel
+def _add(factor, values, total):
+    for x in range(len(total)):
+        total[x] += factor * values[x]
 
 
 @kernel
@@ -157,52 +197,55 @@ def _mark_near_edges(sharp, reach, cell, step, first, last, near):
 
 
 @kernel
-def _find_clean(fitted, near, taps, reach, cell, surface, first, last, clean):
-    """Rows [first, last): how much of a pixel's blur comes from heights within `surface` of its own, 0..1."""
-    height, width = fitted.shape
+def _find_clean(wide, near, pixels, weights, cell, surface, first, last, clean):
+    """Rows [first, last): how much of a pixel's blur comes from heights within `surface` of its own, 0..1.
+
+    wide: the fitted map with a margin as wide as any blur reaches, of its border's pixels.
+    """
+    margin = (wide.shape[0] - near.shape[0]) // 2
     for y in range(first, last):
-        for x in range(width):
-            here, far, total = fitted[y, x], reach[y // cell, x // cell], 0.0
-            if not (near[y, x] and far > 0):
+        for x in range(near.shape[1]):
+            if not near[y, x]:
                 continue
-            for j in range(-far, far + 1):
-                v = min(max(y + j, 0), height - 1)
-                for i in range(-far, far + 1):
-                    if abs(fitted[v, min(max(x + i, 0), width - 1)] - here) < surface:
-                        total += taps[y // cell, x // cell, abs(j)] * taps[y // cell, x // cell, abs(i)]
+            row, column, here, total = y // cell, x // cell, wide[y + margin, x + margin], np.float32(0.0)
+            for k in range(weights.shape[2]):
+                value = wide[y + pixels[row, column, k, 0], x + pixels[row, column, k, 1]]
+                total += weights[row, column, k] if abs(value - here) < surface else np.float32(0.0)
             clean[y, x] = total
 
 
 @kernel
-def _lower_halos(fitted, missing, clean, near, taps, reach, cell, surface, first, last, lowered):
+def _lower_halos(wide, missing, clean, near, pixels, weights, cell, sigmas, surface, first, last, lowered):
     """Rows [first, last): what the blur left of the other side's height beside an edge is taken off.
 
     Clean pixels of the same surface tell it; under the edge itself, their plane goes on. Nothing is added: round
-    things bend away from the view at their outlines, as if something were missing there.
+    things bend away from the view at their outlines, as if something were missing there. wide, missing, clean: with
+    a margin, which is not clean.
     """
-    height, width = fitted.shape
+    margin = (wide.shape[0] - near.shape[0]) // 2
     for y in range(first, last):
-        for x in range(width):
-            here, far, own = fitted[y, x], reach[y // cell, x // cell], taps[y // cell, x // cell]
-            if not (near[y, x] and far > 0):
+        for x in range(near.shape[1]):
+            if not near[y, x]:
                 continue
+            row, column, here = y // cell, x // cell, wide[y + margin, x + margin]
             # Where the pixel itself is clean, only what is missing there is levelled out, and its own detail stays.
-            is_clean = clean[y, x] > MOSTLY_CLEAN
+            is_clean = clean[y + margin, x + margin] > MOSTLY_CLEAN
             # Least squares for level + across * i + down * j.
-            n = i1 = j1 = ii = jj = ij = p0 = pi = pj = 0.0
-            for v in range(max(y - far, 0), min(y + far, height - 1) + 1):
-                for u in range(max(x - far, 0), min(x + far, width - 1) + 1):
-                    if clean[v, u] > CLEAN and abs(fitted[v, u] - here) < surface:
-                        weight = own[abs(v - y)] * own[abs(u - x)] * (clean[v, u] - CLEAN)
-                        i, j, value = u - x, v - y, missing[v, u] + (0.0 if is_clean else fitted[v, u] - here)
-                        n, i1, j1, p0 = n + weight, i1 + weight * i, j1 + weight * j, p0 + weight * value
-                        ii, jj, ij = ii + weight * i * i, jj + weight * j * j, ij + weight * i * j
-                        pi, pj = pi + weight * i * value, pj + weight * j * value
+            n = i1 = j1 = ii = jj = ij = p0 = pi = pj = np.float32(0.0)
+            for k in range(weights.shape[2]):
+                v, u = y + pixels[row, column, k, 0], x + pixels[row, column, k, 1]
+                if clean[v, u] > CLEAN and abs(wide[v, u] - here) < surface:
+                    i, j = np.float32(u - x - margin), np.float32(v - y - margin)
+                    weight = weights[row, column, k] * (clean[v, u] - CLEAN)
+                    value = missing[v, u] + (np.float32(0.0) if is_clean else wide[v, u] - here)
+                    n, i1, j1, p0 = n + weight, i1 + weight * i, j1 + weight * j, p0 + weight * value
+                    ii, jj, ij = ii + weight * i * i, jj + weight * j * j, ij + weight * i * j
+                    pi, pj = pi + weight * i * value, pj + weight * j * value
             if not n > 0:
                 continue
             i1, j1, p0 = i1 / n, j1 / n, p0 / n
             # Few pixels on a line tell no slope across it.
-            damping = SLOPE_DAMPING * (far / REACH_SIGMAS) ** 2
+            damping = SLOPE_DAMPING * sigmas[row, column] ** 2
             ii, jj, ij = ii / n - i1 * i1 + damping, jj / n - j1 * j1 + damping, ij / n - i1 * j1
             pi, pj = pi / n - i1 * p0, pj / n - j1 * p0
             area = ii * jj - ij * ij
@@ -211,13 +254,13 @@ def _lower_halos(fitted, missing, clean, near, taps, reach, cell, surface, first
 
 
 @kernel
-def _color_vote(photo, fitted, y, x, here, there, least_edge):
+def _color_vote(photo, fitted, y, x, here, there, least_edge, sums):
     """Matting: the pixel's colour between those of both heights' surfaces around it; -1 here .. 1 there, nearer 0 the
     less sure.
     """
     height, width = fitted.shape
     near = max(SAME_SIDE * abs(there - here), least_edge)
-    sums, weights = np.zeros((2, 3)), np.zeros(2)
+    sums[:] = 0.0
     for v in range(max(y - COLOR_PX, 1), min(y + COLOR_PX, height - 2) + 1):
         for u in range(max(x - COLOR_PX, 1), min(x + COLOR_PX, width - 2) + 1):
             value, apart = fitted[v, u], (v - y) ** 2 + (u - x) ** 2
@@ -231,15 +274,16 @@ def _color_vote(photo, fitted, y, x, here, there, least_edge):
                 and abs(fitted[v, u - 1] - value) < near
                 and abs(fitted[v, u + 1] - value) < near
             ):
-                weights[side] += 1.0 / apart
+                weight = 1.0 / apart
+                sums[side, 3] += weight
                 for c in range(3):
-                    sums[side, c] += photo[v, u, c] / apart
-    if weights.min() == 0:
+                    sums[side, c] += weight * photo[v, u, c]
+    if min(sums[0, 3], sums[1, 3]) == 0:
         return 0.0
     along = contrast = away = 0.0
     for c in range(3):
-        origin = sums[0, c] / weights[0]
-        difference, own = sums[1, c] / weights[1] - origin, photo[y, x, c] - origin
+        origin = sums[0, c] / sums[0, 3]
+        difference, own = sums[1, c] / sums[1, 3] - origin, photo[y, x, c] - origin
         along, contrast, away = along + own * difference, contrast + difference**2, away + own**2
     share = along / max(contrast, 1e-9)
     residual = max(away - share * along, 0.0)
@@ -264,43 +308,55 @@ def _correlate(missing, y, x, taps, far):
     height, width = missing.shape
     total = 0.0
     for v in range(max(y - far, 0), min(y + far, height - 1) + 1):
-        along = 0.0
-        for u in range(max(x - far, 0), min(x + far, width - 1) + 1):
-            along += taps[abs(u - x)] * missing[v, u]
-        total += taps[abs(v - y)] * along
+        along, left, right = np.float32(0.0), max(x - far, 0), min(x + far, width - 1) + 1
+        own, line = taps[left - x + far :], missing[v, left:right]
+        for k in range(len(line)):
+            along += own[k] * line[k]
+        total += taps[v - y + far] * along
     return total
 
 
 @kernel
-def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, last):
+def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, last, settled):
     """Rows [first, last): pixels take over the height of a neighbour across an edge where that fits better.
 
-    Coordinate descent; `missing` is kept up to date.
+    Coordinate descent; `missing` is kept up to date. settled (H, W): what was looked at, until something moves near it.
     """
     height, width = fitted.shape
+    sums = np.empty((2, 4))
     for y in range(first, last):
         for x in range(width):
-            row, column, here = y // cell, x // cell, fitted[y, x]
-            far = reach[row, column]
-            best, value, wanted, energy = 0.0, here, np.nan, 0.0
+            here = fitted[y, x]
+            # Most pixels end here.
+            if settled[y, x] or not (
+                abs(fitted[max(y - 1, 0), x] - here) >= least_edge
+                or abs(fitted[min(y + 1, height - 1), x] - here) >= least_edge
+                or abs(fitted[y, max(x - 1, 0)] - here) >= least_edge
+                or abs(fitted[y, min(x + 1, width - 1)] - here) >= least_edge
+            ):
+                continue
+            row, column, settled[y, x] = y // cell, x // cell, True
+            far, own = reach[row, column], taps[row, column]
+            if far == 0:
+                continue
+            wanted, energy = _correlate(missing, y, x, own, far), (own * own).sum() ** 2
+            best, value = 0.0, here
             for side in range(4):
                 v, u = y + (side == 0) - (side == 1), x + (side == 2) - (side == 3)
-                if far == 0 or not (0 <= v < height and 0 <= u < width) or abs(fitted[v, u] - here) < least_edge:
+                if not (0 <= v < height and 0 <= u < width) or abs(fitted[v, u] - here) < least_edge:
                     continue
                 there = fitted[v, u]
-                if wanted != wanted:
-                    own = taps[row, column]
-                    wanted = _correlate(missing, y, x, own, far)
-                    energy = (2.0 * (own * own).sum() - own[0] ** 2) ** 2
                 # Change of the misfit |missing|^2, relative to that of a whole pixel; then of the outline and colours.
                 change = 1.0 - 2.0 * wanted / ((there - here) * energy)
                 change += OUTLINE_WEIGHT * _fellows(fitted, y, x, here, there)
                 if change - COLOR_WEIGHT < best:
-                    change -= COLOR_WEIGHT * _color_vote(photo, fitted, y, x, here, there, least_edge)
+                    change -= COLOR_WEIGHT * _color_vote(photo, fitted, y, x, here, there, least_edge, sums)
                     if change < best:
                         best, value = change, there
             if value != here:
                 fitted[y, x] = value
+                top, left = max(y - STIRRED_PX, 0), max(x - STIRRED_PX, 0)
+                settled[top : y + STIRRED_PX + 1, left : x + STIRRED_PX + 1] = False
+                left, right = max(x - far, 0), min(x + far, width - 1) + 1
                 for v in range(max(y - far, 0), min(y + far, height - 1) + 1):
-                    for u in range(max(x - far, 0), min(x + far, width - 1) + 1):
-                        missing[v, u] -= (value - here) * taps[row, column, abs(v - y)] * taps[row, column, abs(u - x)]
+                    _add((here - value) * own[v - y + far], own[left - x + far :], missing[v, left:right])

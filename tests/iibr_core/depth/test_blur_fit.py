@@ -111,6 +111,10 @@ def cells() -> tuple[np.ndarray, np.ndarray, int]:
     return *blur_fit._taps(CELLS), CELLS.cell_px
 
 
+def lattices() -> tuple[np.ndarray, np.ndarray, int]:
+    return *blur_fit._lattices(CELLS, cells()[1]), CELLS.cell_px
+
+
 def full_taps() -> np.ndarray:
     """(R, R): the blur's whole kernel."""
     apart = np.abs(np.arange(-6, 7))
@@ -131,38 +135,70 @@ def test_what_is_missing_against_a_blur_pixel_by_pixel() -> None:
         assert -missing[y, x] == pytest.approx((window(exact, y, x) * full_taps()).sum(), abs=1e-5)
 
 
-def test_clean_shares_against_windows() -> None:
-    _, exact = disc()
+def lattice() -> np.ndarray:
+    """(13, 13): the kernel on every second pixel, as on a chessboard; it ends at three sigmas."""
+    j, i = np.mgrid[-6:7, -6:7]
+    shares = full_taps() * ((i + j) % 2 == 0) * (i**2 + j**2 <= 36)
+    return shares / shares.sum()
+
+
+def clean_shares(exact: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels near edges, and what `_find_clean` says of them."""
     near, clean = np.zeros(SIZE, np.bool_), np.ones(SIZE, np.float32)
     blur_fit._mark_near_edges(exact, *cells()[1:], 0.3, 0, SIZE[0], near)
-    blur_fit._find_clean(exact, near, *cells(), 0.3, 0, SIZE[0], clean)
+    blur_fit._find_clean(np.pad(exact, 6, mode="edge"), near, *lattices(), np.float32(0.3), 0, SIZE[0], clean)
+    return near, clean
+
+
+def test_clean_shares_against_windows() -> None:
+    _, exact = disc()
+    near, clean = clean_shares(exact)
     for y, x in np.argwhere(near)[::37]:
         own = np.abs(window(exact, y, x) - exact[y, x]) < 0.3
-        assert clean[y, x] == pytest.approx((own * full_taps()).sum(), abs=1e-5)
+        assert clean[y, x] == pytest.approx((own * lattice()).sum(), abs=1e-5)
+        # The lattice stands for all pixels.
+        assert clean[y, x] == pytest.approx((own * full_taps()).sum(), abs=0.1)
     # Whatever an edge could make unclean is marked.
     for y, x in np.argwhere(~near)[::97]:
         assert np.ptp(window(exact, y, x)) < 0.3
+
+
+@pytest.mark.parametrize("sigma", [0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 4.5])
+def test_lattices_have_the_means_of_all_pixels(sigma: float) -> None:
+    blurs = EdgeBlur(np.array([[sigma, 0, 9.0]], np.float32), 32)
+    reach = blur_fit._taps(blurs)[1]
+    pixels, weights = (part[0, 0] for part in blur_fit._lattices(blurs, reach))
+    j, i = (pixels - reach.max())[weights > 0].T
+    assert len(j) < 90
+    rows, columns = np.mgrid[-15:16, -15:16]
+    whole = np.exp(-0.5 * (rows**2 + columns**2) / sigma**2)
+    whole /= whole.sum()
+    for across, down in [(1, 0), (0, 1), (1, 1), (1, -2), (3, 2)]:
+        # Beyond an edge a sigma away.
+        far = sigma * np.hypot(across, down)
+        share = weights[weights > 0][across * i + down * j > far].sum()
+        assert share == pytest.approx(whole[across * columns + down * rows > far].sum(), abs=0.1)
 
 
 def test_halos_against_least_squares() -> None:
     _, exact = disc()
     rng = np.random.default_rng(1)
     missing = blur(rng.normal(size=SIZE).astype(np.float32), 3.0)
-    near, clean, lowered = np.zeros(SIZE, np.bool_), np.ones(SIZE, np.float32), exact.copy()
-    blur_fit._mark_near_edges(exact, *cells()[1:], 0.3, 0, SIZE[0], near)
-    blur_fit._find_clean(exact, near, *cells(), 0.3, 0, SIZE[0], clean)
-    blur_fit._lower_halos(exact, missing, clean, near, *cells(), 0.3, 0, SIZE[0], lowered)
+    near, clean = clean_shares(exact)
+    wide = [np.pad(exact, 6, mode="edge"), np.pad(missing, 6), np.pad(clean, 6)]
+    lowered, step = exact.copy(), np.float32(0.3)
+    blur_fit._lower_halos(*wide, near, *lattices(), CELLS.sigma_px, step, 0, SIZE[0], lowered)
     j, i = np.mgrid[-6:7, -6:7]
     for y, x in np.argwhere(near)[::23]:
-        share, heights = window(clean, y, x), window(exact, y, x)
-        weight = np.where(np.abs(heights - exact[y, x]) < 0.3, np.maximum(share - blur_fit.CLEAN, 0), 0) * full_taps()
+        share, heights = np.pad(clean, 6)[y : y + 13, x : x + 13], window(exact, y, x)
+        weight = np.where(np.abs(heights - exact[y, x]) < 0.3, np.maximum(share - blur_fit.CLEAN, 0), 0) * lattice()
         if not weight.any():
             assert lowered[y, x] == exact[y, x]
             continue
         value = window(missing, y, x) + (0 if clean[y, x] > blur_fit.MOSTLY_CLEAN else heights - exact[y, x])
         mean_i, mean_j = (np.average(part, weights=weight) for part in (i, j))
         # A plane about the clean pixels' middle, its slopes damped as if by two further measurements of none.
-        damping = np.sqrt(blur_fit.SLOPE_DAMPING * weight.sum()) * 6 / blur_fit.REACH_SIGMAS
+        damping = np.sqrt(blur_fit.SLOPE_DAMPING * weight.sum()) * SIGMA
         rows = np.stack([np.ones_like(value), i - mean_i, j - mean_j], -1) * np.sqrt(weight)[..., None]
         system = np.concatenate([rows.reshape(-1, 3), [[0, damping, 0], [0, 0, damping]]])
         level, across, down = np.linalg.lstsq(system, [*(value * np.sqrt(weight)).ravel(), 0, 0])[0]
@@ -179,7 +215,7 @@ def test_edges_move_where_the_misfit_falls() -> None:
     blur_fit._find_missing(soft, fitted, *cells(), 0, 3, missing)
     for y in range(25, 40):
         before, left = fitted.copy(), missing.copy()
-        blur_fit._move_edges(photo, fitted, missing, *cells(), LEAST_EDGE, y, y + 1)
+        blur_fit._move_edges(photo, fitted, missing, *cells(), LEAST_EDGE, y, y + 1, np.zeros(SIZE, np.bool_))
         blurred_again = np.zeros(SIZE, np.float32)
         blur_fit._find_missing(soft, fitted, *cells(), 0, 3, blurred_again)
         np.testing.assert_allclose(missing, blurred_again, atol=1e-4)
@@ -194,9 +230,9 @@ def test_colours_of_clean_pixels_on_both_sides_vote() -> None:
     on_rim = [(45, 37), (45, 36), (45, 82), (45, 84)]
     for y, x in on_rim:
         here, there = (2.0, 0.3) if exact[y, x] > 1.2 else (exact[y, x], 2.0)
-        assert blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE) < -0.9
+        assert blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE, np.empty((2, 4))) < -0.9
         photo[y, x] = photo[5, 5] if exact[y, x] > 1.2 else photo[45, 60]
-        assert blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE) > 0.9
+        assert blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE, np.empty((2, 4))) > 0.9
         # Half of both tells nothing.
         photo[y, x] = 0.5 * (photo[5, 5] + photo[45, 60])
-        assert abs(blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE)) < 0.1
+        assert abs(blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE, np.empty((2, 4)))) < 0.1
