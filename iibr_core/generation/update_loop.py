@@ -28,7 +28,7 @@ def render_outer_views(
     Weights are the closed form's in every quality: its disparity is smoother, and so is what is inpainted.
     inpainter, slots: see `ViewSynthesis`. Taking a view raises Cancelled once should_stop is true.
     """
-    with ViewSynthesis(should_stop, slots=slots, inpainter=inpainter) as synthesis:
+    with ViewSynthesis(should_stop, slots=slots, inpainter=inpainter, reopens_holes=True) as synthesis:
         for offset in outer:
             view = synthesis.render(rays, offset)
             if view.has_filled_rays:

@@ -68,6 +68,29 @@ def continue_farthest(
     _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, threads=1)
 
 
+def goes_on_in_front(
+    disparity: FloatImage,
+    hole: NDArray[np.bool_],
+    photo_disparity: FloatImage,
+    offset: ViewOffset,
+    should_stop: ShouldStop = never,
+    threads: int = 1,
+) -> NDArray[np.bool_]:
+    """(H, W): where in a hole (H, W) of a view most of what may continue there from around it is in front of the view's
+    disparity (H, W) there. Raises Cancelled once should_stop is true.
+    """
+    pixels = flat_indices(hole, should_stop, threads)
+    known = nearest_known(hole, pixels, should_stop, threads)
+    in_front, one_surface = np.zeros_like(hole), SURFACE_PX / max(*map(abs, offset), 1e-9)
+    in_pieces(
+        lambda part: _weigh_in_front(
+            disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
+        ),
+        pieces_of(len(pixels), MOST_PIECE_PIXELS), should_stop, threads,
+    )  # fmt: skip
+    return in_front
+
+
 def _fill_view(
     colors: FloatImage,
     disparity: FloatImage,
@@ -192,6 +215,28 @@ def _fill(
                 sum_d += w * surface[k]
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
         disparity[y, x] = sum_d / most
+
+
+@kernel
+def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
+    """Write `goes_on_in_front` for these pixels."""
+    height, width = disparity.shape
+    hidden = one_surface * HIDDEN_PX / SURFACE_PX
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        balance = 0.0
+        for k in range(known.shape[1]):
+            if known[i, k] < 0:
+                continue
+            # What may continue to here, and how likely: as in `_fill`, but for lines.
+            known_y, known_x = known[i, k] // width, known[i, k] % width
+            d = disparity[known_y, known_x]
+            column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
+            inside = 0 <= column < width and 0 <= row < height
+            if not inside or photo_disparity[row, column] - d > hidden:
+                likely = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
+                balance += likely if d > disparity[y, x] + one_surface else -likely
+        in_front[y, x] = balance > 0.0
 
 
 @kernel

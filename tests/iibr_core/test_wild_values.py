@@ -499,6 +499,7 @@ FINITE_BY_CONTRACT = {
     "geometry.pixel_of_line": "lines along the plane give infinity or NaN, as it says",
     "inpainting.background.fill_background": "of rendered views only",
     "inpainting.background.continue_farthest": "of rendered views only",
+    "inpainting.background.goes_on_in_front": "of rendered views only",
     "formats.poses.central_camera": "of Cameras, which refuse what is not finite",
     "generation.free_views.fitted_cameras": "of Cameras, which refuse what is not finite",
     "generation.free_views.steered": "of a Camera; the window keeps the rest within limits",

@@ -8,6 +8,7 @@ from iibr_core.inpainting.background import (
     SMOOTH_STEPS_PX,
     SURFACE_PX,
     fill_background,
+    goes_on_in_front,
 )
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.inpainting.rim_lines import ANGLE_POWER, MIXED_PX, NOISE, REACH_PX, STRENGTH_POWER
@@ -102,28 +103,34 @@ def smooth_slowly(colors, hole, reach, step):
     return smoothed
 
 
-def fill_slowly(colors, disparity, hole, photo_disparity, offset):
+def around_slowly(hole, y, x):
+    """The nearest known (x, y) in each direction."""
     height, width = hole.shape
-    t, s = offset
-    parallax = max(abs(s), abs(t))
+    seen = []
+    for i, j in DIRECTIONS:
+        path = [(x + n * i, y + n * j) for n in range(1, max(height, width) + 1)]
+        seen += [(u, v) for u, v in path if 0 <= u < width and 0 <= v < height and not hole[v, u]][:1]
+    return seen
+
+
+def is_possible(d, photo_disparity, offset, y, x):
+    """Whether a surface of disparity d could lie there unseen by the photo."""
+    height, width = photo_disparity.shape
+    column, row = int(np.floor(x + d * offset.s + 0.5)), int(np.floor(y + d * offset.t + 0.5))
+    inside = 0 <= column < width and 0 <= row < height
+    return not inside or (photo_disparity[row, column] - d) * max(map(abs, offset)) > HIDDEN_PX
+
+
+def fill_slowly(colors, disparity, hole, photo_disparity, offset):
+    parallax = max(map(abs, offset))
     one_surface = SURFACE_PX / parallax
     filled_colors, filled_disparity, reach = colors.copy(), disparity.copy(), np.full(hole.shape, np.inf)
     mixed = mixed_slowly(hole)
     for y, x in np.argwhere(hole):
-        seen = []
-        for i, j in DIRECTIONS:
-            path = [(x + n * i, y + n * j) for n in range(1, max(height, width) + 1)]
-            path = [(u, v) for u, v in path if 0 <= u < width and 0 <= v < height and not hole[v, u]]
-            seen += path[:1]
-
-        def possible(u, v, x=x, y=y):
-            d = float(disparity[v, u])
-            column, row = int(np.floor(x + d * s + 0.5)), int(np.floor(y + d * t + 0.5))
-            inside = 0 <= column < width and 0 <= row < height
-            return not inside or (photo_disparity[row, column] - d) * parallax > HIDDEN_PX
-
+        seen = around_slowly(hole, y, x)
+        possible = [(u, v) for u, v in seen if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x)]
         farthest = min((disparity[v, u] for u, v in seen), default=0)
-        chosen = [p for p in seen if possible(*p)] or [(u, v) for u, v in seen if disparity[v, u] <= farthest]
+        chosen = possible or [(u, v) for u, v in seen if disparity[v, u] <= farthest]
         if chosen:
             reach[y, x] = min(np.hypot(u - x, v - y) for u, v in seen)
             clean = [own_surface(disparity, hole, (v, u), one_surface) & ~mixed for u, v in chosen]
@@ -155,6 +162,26 @@ def test_agrees_with_a_slow_twin(contrast):
     fill_background(colors, disparity, hole, photo_disparity, offset)
     assert colors == pytest.approx(expected_colors, abs=1e-5)
     assert disparity == pytest.approx(expected_disparity, abs=1e-5)
+
+
+def test_what_goes_on_in_front_is_weighed_like_a_slow_twin():
+    random = np.random.default_rng(4)
+    size = (27, 31)
+    disparity = random.choice([0.0, 2.0, 3.0], size).astype(np.float32)
+    photo_disparity = random.choice([0.0, 2.5, 4.0], size).astype(np.float32)
+    hole = random.random(size) < 0.1
+    hole[5:12, 12:] = True
+    offset = ViewOffset(1.0, -2.0)
+    expected = np.zeros(size, bool)
+    for y, x in np.argwhere(hole):
+        balance = 0.0
+        for u, v in around_slowly(hole, y, x):
+            if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x):
+                in_front = disparity[v, u] > disparity[y, x] + SURFACE_PX / 2
+                balance += (1 if in_front else -1) / np.hypot(u - x, v - y)
+        expected[y, x] = balance > 0
+    assert expected.any()
+    np.testing.assert_array_equal(goes_on_in_front(disparity, hole, photo_disparity, offset), expected)
 
 
 def test_a_disocclusion_takes_the_background_not_what_hid_it():
