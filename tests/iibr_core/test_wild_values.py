@@ -609,7 +609,7 @@ READS_OR_TELLS = {
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
     "complaint_of full_scale",
     "formats.images.header": "PhotoHeader read_photo_header",
-    "formats.images.thumbnail": "read_thumbnail read_jpeg_thumbnail",
+    "formats.images.thumbnail": "read_thumbnail",
     "formats.light_fields.stanford": "read_stanford StanfordWriter",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
     "generation.light_field": "transformer_for nearest_first",

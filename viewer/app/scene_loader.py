@@ -33,7 +33,9 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.scene import Source, source_beside
 
 SKETCHES_FIRST = 3
-"""A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work."""
+"""A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work.
+The photo that is opened first does not wait for the next ones.
+"""
 
 TAKE_BUDGET_S = 0.006
 """A turn: making room for a scene, and then for all its views, is too much for one frame."""
@@ -195,7 +197,8 @@ class SceneLoader:
         self.sketches.want(_photos_to_sketch(state) if state.stopped != state.generation else ())
 
     def _has_sketches(self, state: AppState) -> bool:
-        return all(map(self.sketches.is_settled, _photos_to_sketch(state)[:SKETCHES_FIRST]))
+        count = SKETCHES_FIRST if self._submitted else 1
+        return all(map(self.sketches.is_settled, _photos_to_sketch(state)[:count]))
 
     def _read_ahead(self, state: AppState) -> None:
         """What is likely to be opened next, once all of this photo is there; on the way to it nothing is begun."""

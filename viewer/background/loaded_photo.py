@@ -123,24 +123,21 @@ def load_photo(
 
 
 def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto | None:
-    """A large JPEG in small, with depth that is found quickly: something to look at while the photo is read. None for
-    all others.
+    """A large photo in small, with depth that is found quickly: something to look at while it is read. None where that
+    is no use.
 
     Raises InputError, and Cancelled once should_stop is true.
     """
     from iibr_core.depth.search import sketch_depth
-    from iibr_core.formats.images.header import read_photo_header
-    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov
-    from iibr_core.formats.images.thumbnail import read_jpeg_thumbnail
+    from iibr_core.formats.images.photo import focal_px_from_fov
+    from iibr_core.formats.images.thumbnail import read_thumbnail
 
     path = Path(source.path)
-    stored, stamp = read_photo_header(path).size, stamp_of(path)
-    to_read = min(stored.height * stored.width, source.max_pixels or DEFAULT_MAX_PIXELS)
-    if source.is_literal or to_read < SKETCH_WORTH_PIXELS:
+    max_pixels, stored, _ = _pixels_to_read(source, keeps_views=True)
+    stamp = stamp_of(path)
+    if source.is_literal or min(math.prod(stored), max_pixels) < SKETCH_WORTH_PIXELS:
         return None
-    pixels = read_jpeg_thumbnail(path, SKETCH)
-    if pixels is None:
-        return None
+    pixels = read_thumbnail(path, SKETCH, should_stop)
     encoded = pixels.astype(np.float32) / np.float32(255)
     photo = Photo(encoded, focal_px_from_fov(encoded.shape[1]), path.stem, is_hdr=False)
     found = sketch_depth(path, photo, source.depth, should_stop)

@@ -11,22 +11,25 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
 from iibr_core.formats.images.header import read_photo_header
+from iibr_core.formats.images.side_by_side import own_picture
+from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import ImageSize, InputError
 
 JPEG_START = b"\xff\xd8"
 
 
-def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
-    """The photo, upright, as large as fits within (height, width): (h, w, 3), sRGB bytes; colours are not exact.
+def read_thumbnail(path: Path, within: ImageSize, should_stop: ShouldStop = never) -> NDArray[np.uint8]:
+    """The photo, upright, as large as fits within (height, width): (h, w, 3), sRGB bytes; a JPEG's colours are not
+    exact.
 
-    Raises InputError where it is no photo, or claims more pixels than any file may.
+    Raises InputError where it is no photo, or claims more pixels than any file may; Cancelled once should_stop is true.
     """
-    pixels = read_jpeg_thumbnail(path, within)
-    return _any_thumbnail(path, within) if pixels is None else pixels
+    pixels = _jpeg_thumbnail(path, within) if own_picture(path).part is None else None
+    return _any_thumbnail(path, within, should_stop) if pixels is None else pixels
 
 
-def read_jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
-    """The same by the decoder's own reduction to an eighth or so; None where this is no JPEG that Pillow takes.
+def _jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
+    """By the decoder's own reduction to an eighth or so; None where this is no JPEG that Pillow takes.
 
     Raises InputError where there is no file.
     """
@@ -50,13 +53,14 @@ def read_jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | No
         return None
 
 
-def _any_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
+def _any_thumbnail(path: Path, within: ImageSize, should_stop: ShouldStop) -> NDArray[np.uint8]:
     from iibr_core.formats.images.photo import read_photo
 
     size = read_photo_header(path).size
     if math.prod(size) > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {size} is more than any photo has")
-    pixels = read_photo(path, max(math.prod(within) * 4, 1)).pixels
+    smaller = min(within.height / size.height, within.width / size.width, 1.0)
+    pixels = read_photo(path, max(math.floor(math.prod(size) * smaller**2), 1), should_stop=should_stop).pixels
+    # One that was turned may still be too large, as may a very narrow one.
     step = max(math.ceil(pixels.shape[0] / within.height), math.ceil(pixels.shape[1] / within.width), 1)
-    small = pixels[::step, ::step]
-    return np.round(np.nan_to_num(small).clip(0.0, 1.0) * 255).astype(np.uint8)
+    return np.round(np.nan_to_num(pixels[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)

@@ -33,6 +33,14 @@ def test_it_fits_and_shows_the_photo(tmp_path: Path, name: str, size: tuple[int,
         assert small[small.shape[0] // 2, 1, 0] > 150 > 60 > small[small.shape[0] // 2, -2, 0]
 
 
+@pytest.mark.parametrize("ending", ["jpg", "png"])
+def test_of_two_pictures_side_by_side_the_left_one_is_shown(tmp_path: Path, ending: str) -> None:
+    Image.fromarray(halves(40, 80)).save(tmp_path / f"a_SBS.{ending}")
+    small = read_thumbnail(tmp_path / f"a_SBS.{ending}", WITHIN)
+    assert small.shape[0] == small.shape[1]
+    assert (small[..., 0] > 150).all()
+
+
 def test_a_photo_held_sideways_comes_upright(tmp_path: Path) -> None:
     exif = Image.Exif()
     exif[0x0112] = 6  # to be turned clockwise: left goes up

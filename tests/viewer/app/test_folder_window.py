@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from PIL import ImageGrab
 
 from iibr_core.types import GridShape, ViewUpdate
-from tests.viewer.background.test_scene_worker import write_large_jpeg
+from tests.viewer.background.test_scene_worker import write_large_photo
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.main_loop import App
 from viewer.background import scene_worker
@@ -84,7 +84,7 @@ def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Drive
 
 
 def test_a_large_photo_is_there_in_small_before_it_is_read(open_window: Opener, tmp_path: Path) -> None:
-    driver = open_window(write_large_jpeg(tmp_path), grid=GridShape(3, 3))
+    driver = open_window(write_large_photo(tmp_path), grid=GridShape(3, 3))
     driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
     driver.until(lambda app: app.scene_view.picture_drawn is not None)
     driver.until(lambda app: not app.state.scene.is_sketch)
@@ -106,14 +106,14 @@ def test_the_next_photo_is_there_in_small_before_the_one_before_stops(
     monkeypatch.setattr(scene_worker, "results_of", stopping_late)
     driver = open_window(write_scene(tmp_path, "before"), grid=GridShape(3, 3))
     driver.until(lambda app: app.state.progress.is_complete)
-    driver.app.do(OpenPath(Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3))))
+    driver.app.do(OpenPath(Source(str(write_large_photo(tmp_path)), grid=GridShape(3, 3))))
     driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
     may_stop.set()
     driver.until(lambda app: not app.state.scene.is_sketch)
 
 
 def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_window: Opener, tmp_path: Path) -> None:
-    paths = [write_large_jpeg(tmp_path, f"photo{i}") for i in range(3)]
+    paths = [write_large_photo(tmp_path, f"photo{i}") for i in range(3)]
     driver = open_window(tmp_path, grid=GridShape(3, 3))
     last = WantedPhoto(Source(str(paths[2]), grid=GridShape(3, 3)), 1.0)
     driver.until(lambda app: app.scene_loader.sketches.get(last) is not None)
@@ -130,7 +130,7 @@ def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_windo
 
 def test_a_held_key_shows_every_photo_that_it_asks_for(open_window: Opener, tmp_path: Path) -> None:
     for i in range(8):
-        write_large_jpeg(tmp_path, f"photo{i}")
+        write_large_photo(tmp_path, f"photo{i}")
     driver = open_window(tmp_path, grid=GridShape(3, 3))
     driver.until(lambda app: app.state.folder is not None)
     asked, shown = set[int](), set[int]()

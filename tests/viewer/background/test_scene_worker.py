@@ -91,17 +91,18 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
     assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
 
 
-def write_large_jpeg(folder: Path, name: str = "large") -> Path:
+def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") -> Path:
     """A photo that takes a while to read."""
     rows, columns = np.mgrid[:1200, :1600]
     pixels = np.stack([rows % 256, columns % 256, (rows // 100 + columns // 100) % 2 * 200], axis=2)
-    path = folder / f"{name}.jpg"
+    path = folder / f"{name}.{ending}"
     Image.fromarray(pixels.astype(np.uint8)).save(path)
     return path
 
 
-def test_a_large_jpeg_has_a_sketch(tmp_path: Path) -> None:
-    source = Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3))
+@pytest.mark.parametrize("ending", ["jpg", "png", "webp"])
+def test_a_large_photo_has_a_sketch(tmp_path: Path, ending: str) -> None:
+    source = Source(str(write_large_photo(tmp_path, ending=ending)), grid=GridShape(3, 3))
     sketch = sketch_of(WantedPhoto(source, 1.0))
     whole = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
     assert isinstance(whole, SceneReady)
@@ -117,12 +118,12 @@ def test_a_large_jpeg_has_a_sketch(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("changes", [{"max_pixels": 10_000}, {"is_literal": True}], ids=str)
 def test_what_is_read_in_no_time_or_taken_literally_has_no_sketch(tmp_path: Path, changes: dict[str, object]) -> None:
-    source = replace(Source(str(write_large_jpeg(tmp_path)), grid=GridShape(3, 3)), **changes)  # type: ignore[arg-type]
+    source = replace(Source(str(write_large_photo(tmp_path)), grid=GridShape(3, 3)), **changes)  # type: ignore[arg-type]
     assert sketch_photo(source) is None
 
 
 def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) -> None:
-    path = write_large_jpeg(tmp_path)
+    path = write_large_photo(tmp_path)
     path.write_bytes(path.read_bytes()[:20_000])
     assert sketch_of(WantedPhoto(Source(str(path)), 1.0)) is None
     with pytest.raises(InputError, match=r"large\.jpg"):
