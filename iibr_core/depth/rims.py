@@ -48,20 +48,33 @@ def settle_rims(
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
-    unknown and filled anew; then pixels of rims change sides where the colours say so, and crumbs that are left are
-    filled. An exact map, which has neither such disparities nor unknown ones in its rims, comes back as it is. Raises
-    Cancelled once should_stop is true.
+    unknown, and all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then
+    pixels of rims change sides where the colours say so, and crumbs that are left are filled. An exact map, which has
+    neither such disparities nor unknown ones in its rims, comes back as it is. Raises Cancelled once should_stop is
+    true.
     """
-    colors, size = np.ascontiguousarray(photo, np.float32), image_size(values)
-    between, rim = np.zeros(values.shape, np.bool_), step_distance(values, least_edge) < RIM_PX
-    clear = in_bands(lambda first, last: _find_between(values, least_edge, first, last, between), size, should_stop)
+    colors = np.ascontiguousarray(photo, np.float32)
+    rim = step_distance(values, least_edge) < RIM_PX
+    between, clear = _find_between(values, least_edge, should_stop)
     least = LEAST_MEASURED * np.count_nonzero(rim)
-    if sum(clear) > least:
-        values = fill_disparity_by_color(colors, np.where(between, np.float32(np.nan), values), should_stop)
+    if clear > least:
+        between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
+        values = fill_disparity_by_color(colors, np.where(between | unknown, np.float32(np.nan), values), should_stop)
     elif np.count_nonzero(unknown & rim) <= least:
         return values
     values = choose_sides(colors, values, between | unknown, least_edge, should_stop)
     return fill_crumbs(colors, values, CRUMB_EDGES * least_edge, should_stop)
+
+
+def _find_between(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> tuple[NDArray[np.bool_], int]:
+    """(H, W): lone pixels of no surface, between two, NaN being none; how many are so clearly."""
+    between = np.zeros(values.shape, np.bool_)
+    clear = in_bands(
+        lambda first, last: _find_between_rows(values, least_edge, first, last, between),
+        image_size(values),
+        should_stop,
+    )
+    return between, sum(clear)
 
 
 @kernel
@@ -90,8 +103,8 @@ def _is_between(values, y, x, right, down, least_edge):
 
 
 @kernel
-def _find_between(values, least_edge, first, last, between):
-    """Rows [first, last): pixels of no surface, between two; how many are so clearly."""
+def _find_between_rows(values, least_edge, first, last, between):
+    """Rows [first, last) of `_find_between`."""
     height, width = values.shape
     margin, clear = 2 + PLATEAU_PX, 0
     for y in range(first, last):

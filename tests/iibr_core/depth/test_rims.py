@@ -38,6 +38,17 @@ def test_what_lies_between_two_surfaces_goes_to_the_one_it_looks_like():
     assert (np.abs(settled - truth) > 1).sum() == 0
 
 
+def test_what_lies_between_is_not_passed_on_by_mixed_pixels_which_look_like_it():
+    """A wire between mixed columns, in which the map knows every third pixel only."""
+    photo, truth = np.full((60, 40, 3), BLUE), np.full((60, 40), FAR, np.float32)
+    photo[:, 20:22], truth[:, 20:22], photo[:, [19, 22]] = RED, NEAR, 0.5 * RED + 0.5 * BLUE
+    photo[:, :8], truth[:, :8] = RED, NEAR
+    given, unknown = resampled(truth), np.zeros(truth.shape, np.bool_)
+    given[:, 19:24] = 4.0, NEAR, NEAR, 6.0, FAR
+    unknown[:, [19, 22]] = (np.arange(60) % 3 > 0)[:, None]
+    assert set(np.unique(settle(photo, given, unknown)[:, 10:])) == {FAR, NEAR}
+
+
 def test_rims_that_look_like_the_other_side_change_it():
     photo, truth = disc()
     given = resampled(np.roll(truth, 1, axis=0))
