@@ -63,7 +63,7 @@ def coarsen(disparity: FloatImage, factor: int) -> FloatImage:
         counts = np.diff(np.r_[starts, out.shape[axis]])
         means = np.moveaxis(np.add.reduceat(out, starts, axis=axis), axis, -1) / counts
         out = np.moveaxis(_interpolate(means, starts + (counts - 1) * 0.5, out.shape[axis]), -1, axis)
-    return out.astype(np.float32)
+    return np.ascontiguousarray(out, np.float32)
 
 
 def misalign(disparity: FloatImage, down_px: float, right_px: float) -> FloatImage:

@@ -252,7 +252,7 @@ def test_softmax_of_huge_logits(factor):
     number = np.arange(70) % 6 + 1
     mask = np.arange(6) < number[:, None]
     unused = np.zeros((70, 6), np.float32), np.zeros((70, 6), np.uint8)
-    weights = Scaled(factor)(AmbiguousRays(ViewOffset(0, 1), np.zeros((70, 2), np.int64), mask, *unused, features))
+    weights = Scaled(factor)(AmbiguousRays(ViewOffset(0.0, 1.0), np.zeros((70, 2), np.int64), mask, *unused, features))
     assert (weights >= 0).all()
     assert weights.sum(axis=1) == pytest.approx(1, abs=1e-5)
     assert (weights[~mask] == 0).all()

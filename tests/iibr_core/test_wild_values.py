@@ -70,7 +70,7 @@ from tests.iibr_core.scenes import smooth_texture, square_before_wall
 WILD = (math.nan, math.inf, -math.inf, 3e38, -3e38, 1e30, 1e-42, -1e-300, 0.0)
 SIZE = ImageSize(12, 14)
 GRID = GridShape(3, 3)
-OFFSETS = [ViewOffset(0, 0), ViewOffset(0, 1)]
+OFFSETS = [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)]
 
 
 def camera(**changes):
@@ -206,7 +206,10 @@ def tile_views(value):
     with ViewSynthesis() as synthesis:
         return list(
             large_views.views_of_tile(
-                large_views.LargePhoto(image(0.5), np.nan_to_num(depths(value))), tile, [ViewOffset(0.5, 1)], synthesis
+                large_views.LargePhoto(image(0.5), np.nan_to_num(depths(value))),
+                tile,
+                [ViewOffset(0.5, 1.0)],
+                synthesis,
             )
         )
 
@@ -404,7 +407,7 @@ FINITE = {
         np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2)
     )[0],
     "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
-    "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0, 1)),
+    "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0.0, 1.0)),
     "rendering.resampling.heaviest_candidate": lambda v, _: resampling.heaviest_candidate(
         rays(v), found(v), shown(v)[0]
     ),

@@ -113,7 +113,7 @@ def test_stanford_viewpoints_are_the_cameras_positions(tmp_path: Path, inside: s
 def test_stanford_positions_that_make_no_grid_are_told(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     names = {
-        f"out_{v:02d}_{u:02d}_{rng.uniform():.5f}_{rng.uniform():.5f}.png": ViewOffset(0, 0)
+        f"out_{v:02d}_{u:02d}_{rng.uniform():.5f}_{rng.uniform():.5f}.png": ViewOffset(0.0, 0.0)
         for v in range(3)
         for u in range(3)
     }
@@ -248,7 +248,7 @@ def test_llff_views_are_made_for_their_cameras_as_they_are(tmp_path: Path) -> No
 
 
 def test_turning_back_by_nothing_changes_nothing() -> None:
-    pixels = view_of_wall(ViewOffset(0, 0))
+    pixels = view_of_wall(ViewOffset(0.0, 0.0))
     same, known = undo_rotation(pixels, np.eye(3))
     assert known.all()
     np.testing.assert_allclose(same, pixels, atol=1e-5)
@@ -353,6 +353,6 @@ def test_what_is_no_data_set_is_told(tmp_path: Path) -> None:
 
 
 def test_a_single_view_cannot_be_compared(tmp_path: Path) -> None:
-    write_numbered(tmp_path / "one", {"out_00_00_1.0_2.0.png": ViewOffset(0, 0)})
+    write_numbered(tmp_path / "one", {"out_00_00_1.0_2.0.png": ViewOffset(0.0, 0.0)})
     with pytest.raises(InputError, match="only view"):
         read_scene(tmp_path / "one")

@@ -55,7 +55,7 @@ def results(folder: Path) -> list[EvaluationResult]:
 
 @pytest.mark.parametrize("quality", ["fast", "balanced"])
 def test_views_are_those_that_generate_makes(quality: Quality) -> None:
-    photo, disparity = photo_of(view_of_square(ViewOffset(0, 0))), disparity_of(disparity_of_square())
+    photo, disparity = photo_of(view_of_square(ViewOffset(0.0, 0.0))), disparity_of(disparity_of_square())
     grid = GridShape(5, 5)
     made = {
         (u.row, u.column): u for u in generate(photo, disparity, literal_plan(photo, disparity, 5), quality=quality)

@@ -187,7 +187,7 @@ def test_what_goes_on_in_front_is_weighed_like_a_slow_twin():
 def test_a_disocclusion_takes_the_background_not_what_hid_it():
     photo_disparity = np.zeros((20, 40), np.float32)
     photo_disparity[:, 20:30] = 4.0
-    offset = ViewOffset(0, 1)
+    offset = ViewOffset(0.0, 1.0)
     disparity = np.zeros((20, 40), np.float32)
     disparity[:, 16:26] = 4.0  # the foreground has moved 4 px to the left
     hole = np.zeros((20, 40), bool)
@@ -206,7 +206,7 @@ def test_what_lies_between_two_surfaces_has_the_disparity_of_one():
     hole[:, 34:] = True
     colors = np.zeros((20, 40, 3), np.float32)
     disparity[hole] = 9.0
-    fill_background(colors, disparity, hole, np.full((20, 40), 8.0, np.float32), ViewOffset(0, 1))
+    fill_background(colors, disparity, hole, np.full((20, 40), 8.0, np.float32), ViewOffset(0.0, 1.0))
     assert set(disparity[hole]) == {0.0, 3.0}
 
 
@@ -218,13 +218,13 @@ def test_the_frame_border_continues_the_surface_that_leaves_it():
     hole = np.zeros((12, 30), bool)
     hole[:, 27:] = True
     colors = np.where(disparity[..., None] > 0, np.float32([1, 0, 0]), np.float32([0, 0, 1])).astype(np.float32)
-    fill_background(colors, disparity, hole, photo_disparity, ViewOffset(0, 1))
+    fill_background(colors, disparity, hole, photo_disparity, ViewOffset(0.0, 1.0))
     assert colors[:, 27:] == pytest.approx(np.tile(np.float32([1, 0, 0]), (12, 3, 1)))
 
 
 def test_a_view_that_is_all_hole_stays_and_stays_finite():
     colors, disparity = np.zeros((5, 6, 3), np.float32), np.zeros((5, 6), np.float32)
-    fill_background(colors, disparity, np.ones((5, 6), bool), disparity, ViewOffset(50, 50))
+    fill_background(colors, disparity, np.ones((5, 6), bool), disparity, ViewOffset(50.0, 50.0))
     assert colors.max() == 0
     assert np.isfinite(disparity).all()
 
@@ -235,7 +235,7 @@ def test_a_line_goes_on_straight():
     truth = np.exp(-(((y - 5 - x / 2) / 4) ** 2))[..., None].repeat(3, axis=2).astype(np.float32)
     hole = x >= 78
     colors = np.where(hole[..., None], np.float32(0.5), truth)
-    fill_background(colors, disparity, hole, disparity, ViewOffset(0, 1))
+    fill_background(colors, disparity, hole, disparity, ViewOffset(0.0, 1.0))
     found, expected = colors[:, 83, 0], truth[:, 83, 0]
     assert abs(found.argmax() - expected.argmax()) <= 1
     assert found.max() > 0.5
@@ -253,6 +253,6 @@ def test_holes_get_the_texture_of_what_lies_behind_and_none_where_that_is_smooth
     rough[:, 20:30] = np.random.default_rng(2).uniform(0, 1, (40, 10, 3))
     truth = np.abs(np.diff(rough[:, 42:], axis=1)).mean()
     for colors in (smooth, rough):
-        fill_background(colors, disparity, hole, photo_disparity, ViewOffset(0, 1))
+        fill_background(colors, disparity, hole, photo_disparity, ViewOffset(0.0, 1.0))
     assert smooth[hole] == pytest.approx(0.4, abs=1e-5)
     assert 0.7 * truth < np.abs(np.diff(rough[:, 31:39], axis=1)).mean() < 1.2 * truth

@@ -25,7 +25,7 @@ def disocclusion():
     hole[HOLE] = True
     colors = np.where(disparity[..., None] > 0, np.float32([1, 0, 0]), weave()).astype(np.float32)
     colors[hole] = np.nan
-    return colors, disparity, hole, photo_disparity, ViewOffset(0, 1)
+    return colors, disparity, hole, photo_disparity, ViewOffset(0.0, 1.0)
 
 
 def fineness(colors):
@@ -50,7 +50,7 @@ def test_a_line_that_ends_at_the_frame_s_hole_goes_on_into_it():
     hole[:, 78:] = True
     disparity = np.full(SIZE, 12.0, np.float32)
     plain = colors.copy()
-    scene = disparity, hole, disparity, ViewOffset(0, 1)
+    scene = disparity, hole, disparity, ViewOffset(0.0, 1.0)
     fill_patches(colors, *scene)
     fill_background(plain, *scene)
     steps = [np.abs(np.diff(filled[20:40, 84, 0])).max() for filled in (plain, colors)]
@@ -59,7 +59,7 @@ def test_a_line_that_ends_at_the_frame_s_hole_goes_on_into_it():
 
 def test_matches_are_whole_never_in_front_and_as_good_as_they_say():
     colors, disparity, hole, _, _ = disocclusion()
-    fill_background(colors, disparity, hole, disocclusion()[3], ViewOffset(0, 1))
+    fill_background(colors, disparity, hole, disocclusion()[3], ViewOffset(0.0, 1.0))
     in_front, r = np.float32(2.0), RADIUS_PX
     targets, number = patch._targets(disparity, hole, in_front, lambda: False)
     nearest = np.empty(SIZE, np.float32)
@@ -95,6 +95,6 @@ def test_pictures_smaller_than_a_patch_stay_as_the_continued_surface(size):
     hole[:, size[1] // 2 :] = size[1] > 1
     colors, disparity = np.full((*size, 3), 0.5, np.float32), np.zeros(size, np.float32)
     plain = colors.copy()
-    fill_patches(colors, disparity, hole, disparity, ViewOffset(1, 1))
-    fill_background(plain, disparity, hole, disparity, ViewOffset(1, 1))
+    fill_patches(colors, disparity, hole, disparity, ViewOffset(1.0, 1.0))
+    fill_background(plain, disparity, hole, disparity, ViewOffset(1.0, 1.0))
     np.testing.assert_array_equal(colors, plain)

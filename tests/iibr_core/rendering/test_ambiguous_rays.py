@@ -95,7 +95,7 @@ def test_no_ray_of_a_steep_surface_is_ambiguous(slope):
     x = np.arange(90, dtype=np.float32)
     photo = photo_of(smooth_texture(60, 90, seed=1))
     for surface in (slope * (x - 45), slope * 64 / (2 * np.pi) * np.cos(x * 2 * np.pi / 64)):
-        ambiguous, _, _ = ambiguous_of(photo, np.tile(surface, (60, 1)).astype(np.float32), offset=ViewOffset(0, 1))
+        ambiguous, _, _ = ambiguous_of(photo, np.tile(surface, (60, 1)).astype(np.float32), offset=ViewOffset(0.0, 1.0))
         # Nothing covers what lies beyond the frame, which a compressed plane leaves earlier.
         inside = 0.6 * 45 * min(1 - slope, 1)
         assert not (np.abs(ambiguous.pixel[:, 1] - 45) < inside).any()

@@ -11,7 +11,7 @@ def ray_set(*disparities, coverage=None):
     rays = RaySet(len(disparities), image_size(disparities[0]), 0.1)
     for d in disparities:
         colors = np.zeros((*d.shape, 3), np.float32)
-        rays.add(ViewOffset(0, 0), colors, d, np.ones_like(d) if coverage is None else coverage)
+        rays.add(ViewOffset(0.0, 0.0), colors, d, np.ones_like(d) if coverage is None else coverage)
     return rays
 
 
@@ -53,7 +53,9 @@ def used(candidates, values):
     return np.where(slots < candidates.count, values, 0)
 
 
-@pytest.mark.parametrize("offset", [ViewOffset(0, 0), ViewOffset(0, 1.3), ViewOffset(-2.4, 0.7), ViewOffset(3, 3)])
+@pytest.mark.parametrize(
+    "offset", [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.3), ViewOffset(-2.4, 0.7), ViewOffset(3.0, 3.0)]
+)
 def test_coverage_agrees_with_a_slow_twin(offset):
     disparity = np.random.default_rng(3).uniform(-0.6, 0.6, (9, 11)).astype(np.float32)
     found = find_candidates(ray_set(disparity), offset, (0, 9), most=30)
@@ -70,7 +72,7 @@ def test_a_constant_surface_covers_every_pixel_once():
 
 def test_a_stretched_slope_stays_sealed():
     slope = np.tile(np.arange(30, dtype=np.float32) * -0.2, (5, 1))
-    found = find_candidates(ray_set(slope), ViewOffset(0, 3), (0, 5))
+    found = find_candidates(ray_set(slope), ViewOffset(0.0, 3.0), (0, 5))
     landed_right = 29 + 0.2 * 29 * 3
     assert used(found, found.coverage).sum(axis=0)[:, 1:29] == pytest.approx(1, abs=1e-4)
     assert landed_right > 29
@@ -78,14 +80,14 @@ def test_a_stretched_slope_stays_sealed():
 
 def test_two_surfaces_make_two_candidates_however_many_rays_land():
     front, back = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
-    found = find_candidates(ray_set(back, front), ViewOffset(0, 1), (0, 6))
+    found = find_candidates(ray_set(back, front), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.count[:, :7] == 2).all()
     assert {*found.source[:2, 3, 3]} == {0, 1}
 
 
 def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
     front, back = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
-    found = find_candidates(ray_set(front, back), ViewOffset(0, 1), (0, 6))
+    found = find_candidates(ray_set(front, back), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.source[0, :, :7] == 0).all()
     assert (found.count[:, :7] == 1).all()
     assert (found.source[0, :, 8] == 1).all(), "the front has moved away"
@@ -94,17 +96,17 @@ def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
 def test_surfaces_closer_than_the_tolerance_are_one():
     near = np.full((4, 8), 1.0)
     near[:, ::2] += 0.9 * SAME_SURFACE_PX / 2
-    found = find_candidates(ray_set(near), ViewOffset(0, 2), (0, 4))
+    found = find_candidates(ray_set(near), ViewOffset(0.0, 2.0), (0, 4))
     assert (found.count[:, :5] == 1).all()
     two_surfaces_1e_minus_4_apart = np.full((4, 8), 1.0)
     two_surfaces_1e_minus_4_apart[:, 4:] += 1e-4
-    found = find_candidates(ray_set(two_surfaces_1e_minus_4_apart), ViewOffset(0, 2), (0, 4))
+    found = find_candidates(ray_set(two_surfaces_1e_minus_4_apart), ViewOffset(0.0, 2.0), (0, 4))
     assert (found.count[:, :5] == 1).all()
 
 
 def test_the_rearmost_gives_way_where_slots_run_out():
     layers = [np.full((3, 12), d) for d in (0.0, 1.0, 2.0, 3.0)]
-    found = find_candidates(ray_set(*layers), ViewOffset(0, 1), (0, 3), most=2)
+    found = find_candidates(ray_set(*layers), ViewOffset(0.0, 1.0), (0, 3), most=2)
     assert sorted(found.disparity[:, 1, 4]) == [2.0, 3.0]
 
 
@@ -135,6 +137,6 @@ def test_wild_disparity_lands_nowhere_and_harms_nothing(wild):
 def test_rays_without_coverage_do_not_land():
     coverage = np.zeros((5, 5), np.float32)
     coverage[2, 2] = 0.25
-    found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage), ViewOffset(0, 1), (0, 5))
+    found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage), ViewOffset(0.0, 1.0), (0, 5))
     assert found.count.sum() == 1
     assert found.coverage[0, 2, 2] == pytest.approx(0.25)

@@ -15,12 +15,14 @@ Y, X = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
 SLOPE = 0.5 + 0.02 * X - 0.01 * Y
 BUMPS = 0.6 * np.sin(X / 9) * np.cos(Y / 7)
 STEP = np.where(X < 30, 0.0, 2.0).astype(np.float32) + 0.01 * Y
-OFFSETS = [ViewOffset(0, 1), ViewOffset(-1.3, 0.4), ViewOffset(2, -2)]
+OFFSETS = [ViewOffset(0.0, 1.0), ViewOffset(-1.3, 0.4), ViewOffset(2.0, -2.0)]
 
 
 def ray_set(disparity, farthest=2.0):
     rays = RaySet(2, image_size(disparity), 0.5 / farthest, farthest)
-    rays.add(ViewOffset(0, 0), smooth_texture(*disparity.shape), disparity.astype(np.float32), np.ones_like(disparity))
+    rays.add(
+        ViewOffset(0.0, 0.0), smooth_texture(*disparity.shape), disparity.astype(np.float32), np.ones_like(disparity)
+    )
     return rays
 
 
@@ -86,7 +88,7 @@ def test_no_cell_is_smooth_where_two_surfaces_or_none_show(offset):
 
 @pytest.mark.parametrize(("disparity", "is_smooth"), [(12.0, False), (-12.0, True)], ids=["in front", "behind"])
 def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
-    photo, at = np.zeros(SIZE, np.float32), ViewOffset(0, 1)
+    photo, at = np.zeros(SIZE, np.float32), ViewOffset(0.0, 1.0)
     photo[:, 32:36] = 20  # hides from the photo what is in front of its wall there
     rays = ray_set(photo)
     filled = np.zeros(SIZE, np.float32)
@@ -109,7 +111,7 @@ def test_bands_do_not_change_what_is_followed(rows):
 @pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1), (5, 7), (9, 9)])
 def test_pictures_of_any_size(size):
     rays = ray_set(np.full(size, 0.3, np.float32))
-    candidates = find_candidates(rays, ViewOffset(1, 1), (0, size[0]))
+    candidates = find_candidates(rays, ViewOffset(1.0, 1.0), (0, size[0]))
     assert candidates.smooth.shape == (-(-size[0] // CELL_PX), -(-size[1] // CELL_PX))
     assert candidates.disparity[0][candidates.count > 0] == pytest.approx(0.3)
 
@@ -120,7 +122,7 @@ def test_unknown_disparity_is_never_smooth():
     rays = ray_set(disparity)
     assert rays.cells.step[2, 3] == np.inf
     assert rays.cells.step[4, 8] < np.inf
-    smooth, _ = find_coherent_cells(rays, ViewOffset(0, 0.01), (0, SIZE[0]))
+    smooth, _ = find_coherent_cells(rays, ViewOffset(0.0, 0.01), (0, SIZE[0]))
     assert not smooth[2, 3]
     assert smooth[4, 8]
 

@@ -62,7 +62,7 @@ def test_depth_edges_sharp_or_soft_join_nothing():
 
 def ray_set(disparity, farthest=1.0):
     rays = RaySet(1, image_size(disparity), 0.5 / farthest, farthest)
-    rays.add(ViewOffset(0, 0), np.zeros((*disparity.shape, 3), np.float32), disparity, np.ones_like(disparity))
+    rays.add(ViewOffset(0.0, 0.0), np.zeros((*disparity.shape, 3), np.float32), disparity, np.ones_like(disparity))
     return rays
 
 
@@ -70,7 +70,7 @@ def ray_set(disparity, farthest=1.0):
 @pytest.mark.parametrize("along", ["rows", "columns"])
 def test_a_steep_plane_is_one_closed_surface_of_exact_disparity(slope, along):
     disparity = np.tile(slope * (np.arange(60, dtype=np.float32) - 30), (60, 1))
-    offset, turn = (ViewOffset(0, 1), np.array) if along == "rows" else (ViewOffset(1, 0), np.transpose)
+    offset, turn = (ViewOffset(0.0, 1.0), np.array) if along == "rows" else (ViewOffset(1.0, 0.0), np.transpose)
     found = find_candidates(ray_set(np.ascontiguousarray(turn(disparity))), offset, (0, 60))
     # d = slope (x + d - 30), seen at x
     x = np.arange(60)
@@ -89,7 +89,7 @@ def test_a_steep_surface_is_torn_where_it_ends():
     """Behind a steep slope's last ray lies the wall: between both nothing is known."""
     x = np.arange(80, dtype=np.float32)
     disparity = np.tile(np.where(x < 40, 0.8 * (40 - x), -9.0), (12, 1)).astype(np.float32)
-    found = find_candidates(ray_set(disparity), ViewOffset(0, 1), (0, 12))
+    found = find_candidates(ray_set(disparity), ViewOffset(0.0, 1.0), (0, 12))
     shown = visibility_weights(found).sum(axis=0)[6]
     # The slope's last ray, 39, lands on 38.2; the wall's first on 49.
     assert shown[41:48] == pytest.approx(0)

@@ -12,7 +12,7 @@ from tests.iibr_core.scenes import smooth_texture
 
 def rays_of(colors, disparity, surface_step=0.1):
     rays = RaySet(1, image_size(disparity), surface_step)
-    rays.add(ViewOffset(0, 0), colors, disparity.astype(np.float32), np.ones(disparity.shape, np.float32))
+    rays.add(ViewOffset(0.0, 0.0), colors, disparity.astype(np.float32), np.ones(disparity.shape, np.float32))
     return rays
 
 
@@ -33,7 +33,7 @@ def cubic_slowly(image, x, y):
     return total
 
 
-@pytest.mark.parametrize("offset", [ViewOffset(0, 0.4), ViewOffset(-1.3, 2.2)])
+@pytest.mark.parametrize("offset", [ViewOffset(0.0, 0.4), ViewOffset(-1.3, 2.2)])
 def test_one_surface_is_looked_up_by_keys_cubic(offset):
     image = np.random.default_rng(5).uniform(0.3, 0.7, (12, 14, 3)).astype(np.float32)
     rays = rays_of(image, np.full((12, 14), 0.9))
@@ -50,7 +50,7 @@ def test_surfaces_that_share_a_pixel_blend_in_linear_light():
     rays = RaySet(2, ImageSize(3, 3), 0.1)
     for color, disparity in ((red, 1.0), (blue, 0.0)):
         rays.add(
-            ViewOffset(0, 0),
+            ViewOffset(0.0, 0.0),
             np.tile(color, (3, 3, 1)),
             np.full((3, 3), disparity, np.float32),
             np.ones((3, 3), np.float32),
@@ -58,7 +58,7 @@ def test_surfaces_that_share_a_pixel_blend_in_linear_light():
     half = np.full((2, 1, 3), 0.5, np.float32)
     slots = np.broadcast_to(np.uint8([[[0]], [[1]]]), (2, 1, 3)).copy()
     candidates = Candidates(
-        ViewOffset(0, 0),
+        ViewOffset(0.0, 0.0),
         1,
         np.full((1, 3), 2, np.uint8),
         half,
@@ -77,7 +77,7 @@ def test_no_colour_crosses_a_depth_edge():
     image[:, 6:] = 1.0
     disparity = np.where(np.arange(12) < 6, 0.0, 3.0) * np.ones((8, 1))
     rays = rays_of(image, disparity)
-    candidates = find_candidates(rays, ViewOffset(0, 0.5), (0, 8))
+    candidates = find_candidates(rays, ViewOffset(0.0, 0.5), (0, 8))
     colors, found, _ = resample_colors(rays, candidates, visibility_weights(candidates))
     sole = visibility_weights(candidates).max(axis=0) > 0.999
     assert colors[sole & (found == 0)].max() == 0
@@ -86,7 +86,7 @@ def test_no_colour_crosses_a_depth_edge():
 
 def test_no_candidates_are_black():
     rays = rays_of(smooth_texture(5, 5), np.full((5, 5), 100.0))
-    candidates = find_candidates(rays, ViewOffset(0, 1), (0, 5))
+    candidates = find_candidates(rays, ViewOffset(0.0, 1.0), (0, 5))
     colors, disparity, _ = resample_colors(rays, candidates, visibility_weights(candidates))
     assert colors.max() == 0
     assert disparity.max() == 0

@@ -16,7 +16,7 @@ def one_ray(pairs, slots=5):
     for k, (c, d) in enumerate(pairs):
         coverage[k], disparity[k] = c, d
     return Candidates(
-        ViewOffset(0, 1),
+        ViewOffset(0.0, 1.0),
         0,
         np.full((1, 1), len(pairs), np.uint8),
         coverage,

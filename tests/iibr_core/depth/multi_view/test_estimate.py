@@ -49,7 +49,7 @@ def test_a_slanted_plane_comes_back_to_a_fiftieth_of_a_pixel(slope):
 
 
 def test_two_views_beside_each_other_are_enough():
-    pair = [ViewOffset(0, 0), ViewOffset(0, 1)]
+    pair = [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)]
     views, truth = slanted_views(0.05, pair)
     error = np.abs(whole(views, pair, 0) - truth)[8:-8, 8:-8]
     assert np.quantile(error, 0.9) < 0.15
@@ -90,9 +90,9 @@ def test_wild_colours_of_hdr_views_give_something_finite(value):
 
 def test_what_cannot_be_matched_is_refused_in_words():
     with pytest.raises(InputError, match="too small"):
-        estimate_coarse([np.zeros((1, 40, 3), np.uint8)] * 2, [ViewOffset(0, 0), ViewOffset(0, 1)], 0)
+        estimate_coarse([np.zeros((1, 40, 3), np.uint8)] * 2, [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)], 0)
     with pytest.raises(InputError, match="one viewpoint"):
-        estimate_coarse([np.zeros((20, 40, 3), np.uint8)] * 2, [ViewOffset(0, 0)] * 2, 0)
+        estimate_coarse([np.zeros((20, 40, 3), np.uint8)] * 2, [ViewOffset(0.0, 0.0)] * 2, 0)
     with pytest.raises(ValueError, match="cannot be matched"):
         matching_views([np.zeros((4, 4), np.float32), np.zeros((4, 5), np.float32)], OFFSETS[:2])
 
@@ -123,7 +123,7 @@ def test_views_on_eight_rays_are_matched_and_few_are_all_taken():
     chosen = choose_views([GridShape(9, 9).offset(*at) for at in np.ndindex(9, 9)], 40)
     assert chosen[0] == 40
     assert len(chosen) == len(set(chosen)) == 33
-    assert choose_views([ViewOffset(0, 0), ViewOffset(2, 1), ViewOffset(1, 2)], 1) == [1, 2, 0]
+    assert choose_views([ViewOffset(0.0, 0.0), ViewOffset(2.0, 1.0), ViewOffset(1.0, 2.0)], 1) == [1, 2, 0]
 
 
 def test_more_is_foretold_for_more_pixels_and_more_disparities():
