@@ -7,8 +7,8 @@ import os
 import pytest
 from hypothesis import settings
 
-# Before torch and BLAS load: their threads spin while they wait for each other, and where others use the cores, tests on
-# tiny arrays took up to 28 times as long.
+# Before torch and BLAS load: their threads spin while they wait for each other, so that tiny arrays take up to 28 times
+# as long where others use the cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 # The first example of a test may compile a kernel, which takes seconds; nothing is timed in a test anyway.

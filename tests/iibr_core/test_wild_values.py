@@ -202,16 +202,9 @@ def large_picture(value):
 
 
 def tile_views(value):
-    tile = large_views.Part(2, 9, 3, 12)
+    photo, tile = large_views.LargePhoto(image(0.5), np.nan_to_num(depths(value))), large_views.Part(2, 9, 3, 12)
     with ViewSynthesis() as synthesis:
-        return list(
-            large_views.views_of_tile(
-                large_views.LargePhoto(image(0.5), np.nan_to_num(depths(value))),
-                tile,
-                [ViewOffset(0.5, 1.0)],
-                synthesis,
-            )
-        )
+        return list(large_views.views_of_tile(photo, tile, [ViewOffset(0.5, 1.0)], synthesis))
 
 
 def shares(value):
