@@ -17,12 +17,12 @@ from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE
 class RayTransformer(nn.Module):
     """Weights (N, K) from features (N, K, FEATURES) and a mask (N, K) of hypotheses in use; every row sums to 1."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: int = WIDTH) -> None:
         super().__init__()
-        self.embed = nn.Sequential(nn.Linear(FEATURES, WIDTH), nn.ReLU(), nn.Linear(WIDTH, WIDTH), nn.ReLU())
-        self.key = nn.Linear(WIDTH, WIDTH)
-        self.query = nn.Linear(2 * WIDTH, WIDTH, bias=False)
-        self.score = nn.Linear(WIDTH, 1, bias=False)
+        self.embed = nn.Sequential(nn.Linear(FEATURES, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU())
+        self.key = nn.Linear(width, width)
+        self.query = nn.Linear(2 * width, width, bias=False)
+        self.score = nn.Linear(width, 1, bias=False)
         nn.init.zeros_(self.score.weight)  # start as the closed form
 
     def forward(self, features: Tensor, mask: Tensor) -> Tensor:
