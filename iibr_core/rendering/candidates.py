@@ -26,6 +26,10 @@ SEALED_GAP_PX = 0.75
 """A gap between landing neighbours up to this wide is no disocclusion: their footprints stretch to meet. So they do
 where a steep surface joins them.
 """
+CLOSED_GAP_PX = 1.25
+"""Behind the nearer of two rays the farther one's surface goes on: a gap up to this wide it closes alone. Seen through
+so narrow a gap, what lies far behind both would be a crack.
+"""
 MOST_STRETCHED_PX = 8.0
 """Even a surface is torn by a gap this wide: little can be told from so few of its rays."""
 LEAST_SHRUNK = 0.05
@@ -89,12 +93,15 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
 
 
 @kernel
-def _half_extent(gap, is_joined):
-    """How far a footprint reaches towards a neighbour that lands 1 + gap pixels away."""
+def _half_extent(nearer, shift, is_joined):
+    """How far a footprint reaches towards a neighbour that is nearer by so much, which moves it away by shift times
+    that.
+    """
+    gap = nearer * shift
     # Wider gaps are disocclusions and stay open; neighbours that land on each other are two surfaces.
     if abs(gap) <= SEALED_GAP_PX or (is_joined and LEAST_SHRUNK - 1.0 <= gap <= MOST_STRETCHED_PX):
         return 0.5 + 0.5 * gap
-    return 0.5
+    return 0.5 + gap if nearer > 0 and 0 < gap <= CLOSED_GAP_PX else 0.5
 
 
 @kernel
@@ -161,13 +168,11 @@ def _land_rays(
                     slope_x, slope_y = rise_x / stretched, rise_y / stretched
                     tolerance = max(same_surface, abs(slope_x) + abs(slope_y))
                 left = landed_x - _half_extent(
-                    (ray_disparity[y, to_left] - d) * s, is_joined and joined[y, to_left] & RIGHT
+                    ray_disparity[y, to_left] - d, s, is_joined and joined[y, to_left] & RIGHT
                 )
-                right = landed_x + _half_extent(
-                    (d - ray_disparity[y, to_right]) * s, is_joined and joined[y, x] & RIGHT
-                )
-                top = landed_y - _half_extent((ray_disparity[above, x] - d) * t, is_joined and joined[above, x] & BELOW)
-                bottom = landed_y + _half_extent((d - ray_disparity[below, x]) * t, is_joined and joined[y, x] & BELOW)
+                right = landed_x + _half_extent(ray_disparity[y, to_right] - d, -s, is_joined and joined[y, x] & RIGHT)
+                top = landed_y - _half_extent(ray_disparity[above, x] - d, t, is_joined and joined[above, x] & BELOW)
+                bottom = landed_y + _half_extent(ray_disparity[below, x] - d, -t, is_joined and joined[y, x] & BELOW)
                 # Beside the target rows, or not finite.
                 if not (right > -0.5 and left < width and bottom > first_row - 0.5 and top < first_row + rows):
                     continue

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.rendering.candidates import SAME_SURFACE_PX, SEALED_GAP_PX, find_candidates
+from iibr_core.rendering.candidates import CLOSED_GAP_PX, SAME_SURFACE_PX, SEALED_GAP_PX, find_candidates
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.types import ViewOffset, image_size
 
@@ -16,20 +16,25 @@ def ray_set(*disparities, coverage=None):
 
 
 def footprints_slowly(disparity, offset):
-    """Every ray's landed rectangle, its neighbours' midpoints where they are close, else one pixel wide."""
+    """Every ray's landed rectangle: to its neighbours' midpoints where they are close, right to a nearer one that is
+    farther off, else one pixel wide.
+    """
 
-    def reach(gap):
-        return (1 + gap) / 2 if abs(gap) <= SEALED_GAP_PX else 0.5
+    def reach(neighbour, d, shift):
+        gap = (neighbour - d) * shift
+        if abs(gap) <= SEALED_GAP_PX:
+            return (1 + gap) / 2
+        return 0.5 + gap if neighbour > d and 0 < gap <= CLOSED_GAP_PX else 0.5
 
     height, width = disparity.shape
     t, s = offset
     for y in range(height):
         for x in range(width):
             d = float(disparity[y, x])
-            left = reach((disparity[y, x - 1] - d) * s) if x > 0 else 0.5
-            right = reach((d - disparity[y, x + 1]) * s) if x + 1 < width else 0.5
-            top = reach((disparity[y - 1, x] - d) * t) if y > 0 else 0.5
-            bottom = reach((d - disparity[y + 1, x]) * t) if y + 1 < height else 0.5
+            left = reach(disparity[y, x - 1], d, s) if x > 0 else 0.5
+            right = reach(disparity[y, x + 1], d, -s) if x + 1 < width else 0.5
+            top = reach(disparity[y - 1, x], d, t) if y > 0 else 0.5
+            bottom = reach(disparity[y + 1, x], d, -t) if y + 1 < height else 0.5
             yield d, x - d * s - left, x - d * s + right, y - d * t - top, y - d * t + bottom
 
 
@@ -76,6 +81,15 @@ def test_a_stretched_slope_stays_sealed():
     landed_right = 29 + 0.2 * 29 * 3
     assert used(found, found.coverage).sum(axis=0)[:, 1:29] == pytest.approx(1, abs=1e-4)
     assert landed_right > 29
+
+
+def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them():
+    surfaces = np.tile(np.where(np.arange(12) < 5, 2.0, 1.0), (6, 1))
+    closed, opened = (find_candidates(ray_set(surfaces), ViewOffset(0, s), (0, 6)) for s in (1.0, 2.0))
+    # The nearer one's last ray lands at 4 - 2 s, the other's first at 5 - s.
+    assert used(closed, closed.coverage).sum(axis=0)[:, :7] == pytest.approx(1, abs=1e-5)
+    assert (closed.disparity[0, :, 3] == 1.0).all()
+    assert (opened.count[:, 1:3] == 0).all()
 
 
 def test_two_surfaces_make_two_candidates_however_many_rays_land():
