@@ -29,6 +29,9 @@ TRUST = np.array([0.15, 0.35, 0.7, 1.0], np.float32)
 """Their weights by how many pixels lie between them and a step: rims are mixed, or on the wrong side themselves."""
 FILLED_TRUST = 0.2
 """Of pixels that were unknown, besides."""
+LIKENESS_STEPS = 64
+LIKENESS = np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKENESS_STEPS)
+"""Likeness by squared distance of colours, in such steps of a variance: computing powers took a quarter of the time."""
 LEAST_WEIGHT = 0.05
 """Weight of all pixels of a surface together, below which its colours are not known."""
 ALIKE, LIKE_NEIGHBOUR = 0.5, 0.6
@@ -165,6 +168,7 @@ def _weigh_colors(colors, values, unknown, distance, least_edge, alike, pixels):
     """
     height, width = values.shape
     others, evidence = np.empty(len(pixels), np.float32), np.zeros(len(pixels), np.float32)
+    steps = LIKENESS_STEPS / (alike * alike)
     for n in range(len(pixels)):
         y, x = pixels[n] // width, pixels[n] % width
         own, other = values[y, x], _nearest_other(values, y, x, least_edge)
@@ -185,7 +189,8 @@ def _weigh_colors(colors, values, unknown, distance, least_edge, alike, pixels):
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
                 # Colours that are not finite are like no other.
-                like = w * exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
+                at = apart * steps
+                like = w * LIKENESS[int(at)] if at < len(LIKENESS) else 0.0
                 if to_own <= to_other:
                     own_weight, own_like = own_weight + w, own_like + like
                 else:
