@@ -101,8 +101,11 @@ def obvious_split(colors, disparity, y, x):
     off = precision @ (light[y, x] - means[0] - share * contrast)
     back = means[0] + (1 - share) * spreads[0] @ off
     front = means[1] + share * spreads[1] @ off
-    back, front = np.where(front < 0, light[y, x] / (1 - share), back), np.where(back < 0, light[y, x] / share, front)
-    return share, srgb_from_linear(np.maximum(back, 0)), srgb_from_linear(np.maximum(front, 0))
+    brightest = light[(behind | in_front) & window | (v == y) & (u == x)].max(axis=0)
+    back, front = np.where(front < 0, light[y, x] / (1 - share), back), np.maximum(front, 0)
+    bounded = np.clip(back, 0, brightest)
+    front = np.where(bounded == back, front, (light[y, x] - (1 - share) * bounded) / share)
+    return share, srgb_from_linear(bounded), srgb_from_linear(front)
 
 
 def test_both_parts_together_are_the_pixel_again():
@@ -113,6 +116,13 @@ def test_both_parts_together_are_the_pixel_again():
     together = srgb_from_linear(share * linear_from_srgb(fringe) + (1 - share) * linear_from_srgb(own))
     assert coverage[2:-2, 5].min() > 0.3
     assert together == pytest.approx(noisy, abs=1e-4)
+
+
+def test_what_is_behind_is_not_brighter_than_all_around():
+    colors, disparity = edge_photo(1.0)
+    colors[:, :5] = np.random.default_rng(1).uniform(0.2, 0.8, (9, 5, 3))
+    colors[4, 5] = 0.95
+    assert split_mixed_pixels(colors, disparity, edge_step=0.5)[0][:, 5].max() <= 0.95 + 1e-6
 
 
 def test_what_is_not_mixed_stays():
