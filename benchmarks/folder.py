@@ -20,6 +20,7 @@ import numpy as np
 import psutil
 from PIL import Image
 
+from iibr_core.runtime.allocator import limit_arenas
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import OpenPath
@@ -78,6 +79,7 @@ def main() -> None:
     parser.add_argument("--megapixels", type=float, default=12.0)
     parser.add_argument("--dwell", type=float, default=1.0)
     options = parser.parse_args()
+    limit_arenas()  # as the program does
     with tempfile.TemporaryDirectory() as name, private_display():
         if options.folder is None:
             make_photos(Path(name), options.photos, options.megapixels)
