@@ -17,9 +17,9 @@ from iibr_core.types import FloatImage, image_size
 
 LEAST_SHARE = 0.02
 """Smaller shares of foreground are noise."""
-REACH_PX = 4
+REACH_PX = 5
 """Colours of both surfaces are taken from so far around."""
-NEARNESS = np.exp(-0.5 * (np.add.outer(*2 * [np.arange(-REACH_PX, REACH_PX + 1) ** 2])) / 2.0**2)
+NEARNESS = np.exp(-0.5 * (np.add.outer(*2 * [np.arange(-REACH_PX, REACH_PX + 1) ** 2])) / 2.5**2)
 """What a pixel there counts, (2 REACH_PX + 1)^2."""
 RIM_TRUST = 0.001
 """What pixels beside a depth edge count, which may be mixed themselves; they tell where there are no others."""

@@ -80,7 +80,7 @@ def obvious_split(colors, disparity, y, x):
             for j, i in np.ndindex(disparity.shape)
         ]
     ).reshape(disparity.shape)
-    weight = np.exp(-((v - y) ** 2 + (u - x) ** 2) / 8) * np.where(is_rim, mixed_pixels.RIM_TRUST, 1.0)
+    weight = np.exp(-((v - y) ** 2 + (u - x) ** 2) / 12.5) * np.where(is_rim, mixed_pixels.RIM_TRUST, 1.0)
     light = linear_from_srgb(colors).astype(np.float64)
     means, spreads = [], []
     for surface in (behind, in_front):
