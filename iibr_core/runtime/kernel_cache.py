@@ -157,7 +157,17 @@ class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-
 
 
 class _CheckedFiles(numba.core.caching.IndexDataCacheFile):  # type: ignore[misc, name-defined]
-    """Each with a digest at its end: what a crash has left of machine code would be run, or end the process."""
+    """Each with a digest at its end: what a crash has left of machine code would be run, or end the process. And named
+    by its signature: two processes that count at the same time would give one number to code of two signatures.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        name = self._data_name(hashlib.sha256(repr(key).encode()).hexdigest()[:16])
+        self._save_data(name, data)
+        self._save_index({**self._load_index(), key: name})
+
+    def _data_name(self, digest: str) -> str:
+        return f"{self._index_name.removesuffix('.nbi')}.{digest}.nbc"
 
     def _dump(self, value: Any) -> bytes:
         data: bytes = super()._dump(value)

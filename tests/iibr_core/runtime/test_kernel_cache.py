@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import iibr_core
@@ -141,6 +142,19 @@ def test_a_damaged_entry_is_a_miss_and_goes(tmp_path, monkeypatch, damage, endin
     assert not run_anew()
     assert run_anew(), "it was written anew"
     assert sorted(tmp_path.rglob("*.nb?")) == files
+
+
+def test_processes_that_save_at_the_same_time_keep_each_kind_apart(tmp_path, monkeypatch):
+    """The second has read the index before the first has written it."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    row, square = np.zeros(2), np.zeros((2, 2))
+    kernel(plus_one)(row)
+    (index,) = tmp_path.rglob("*.nbi")
+    of_first = index.read_bytes()
+    index.unlink()
+    kernel(plus_one)(square)
+    index.write_bytes(of_first)
+    np.testing.assert_array_equal(kernel(plus_one)(row), row + 1)
 
 
 def test_a_full_disk_leaves_nothing_and_stops_nothing(package):
