@@ -87,13 +87,22 @@ class StoredViews:
         inpainted: NDArray[np.bool_],
         is_final: bool,
     ) -> ViewUpdate:
-        """Specks are told from colours as they are stored: so a draft that was finished is what was made at once."""
-        settled = without_specks(
-            self._rays, offset, encoded_from_stored(stored), disparity, inpainted, self._should_stop, 1
-        )
-        colors = encode_for_storage(settled, self._is_hdr, self._should_stop, 1)
+        colors = stored_without_specks(self._rays, offset, stored, disparity, inpainted, self._should_stop)
         (v, u), (t, s) = self._grid.centre, offset
         return ViewUpdate(v + round(t), u + round(s), colors, disparity, inpainted, is_final)
+
+
+def stored_without_specks(
+    rays: RaySet,
+    offset: ViewOffset,
+    stored: StoredColors,
+    disparity: FloatImage,
+    inpainted: NDArray[np.bool_],
+    should_stop: ShouldStop,
+) -> StoredColors:
+    """`without_specks`, told from colours as they are stored: so a draft that was finished is what was made at once."""
+    settled = without_specks(rays, offset, encoded_from_stored(stored), disparity, inpainted, should_stop, 1)
+    return encode_for_storage(settled, stored.dtype == np.float16, should_stop, 1)
 
 
 def encode_for_storage(

@@ -287,8 +287,10 @@ class ViewSynthesis:
         """Where another view's filling shows, (H, W), but the photo's surfaces go on in front of it: there, that view
         saw what lies farther back. They count as occluded from now on.
         """
-        y, x = np.ogrid[: rays.view_size.height, : rays.view_size.width]
-        filled = np.asarray(view.inpainted & ~hole & ~_beyond_frame(y, x, view.disparity, *offset, *rays.view_size))
+        y, x = np.nonzero(view.inpainted & ~hole)
+        inside = ~_beyond_frame(y, x, view.disparity[y, x], *offset, *rays.view_size)
+        filled = np.zeros_like(hole)
+        filled[y[inside], x[inside]] = True
         if filled.any():
             filled &= goes_on_in_front(
                 view.disparity, hole | filled, rays.photo_disparity, offset, self._should_stop, threads

@@ -19,7 +19,7 @@ from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.runtime.extras import is_installed
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, Quality, StoredColors
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, Quality, StoredColors, ViewOffset
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.inspection_request import InspectionRequest
@@ -27,6 +27,7 @@ from viewer.model.inspection_request import InspectionRequest
 if TYPE_CHECKING:
     from iibr_core.inpainting.protocol import Inpainter
     from iibr_core.rendering.ray_set import RaySet
+    from iibr_core.rendering.view_synthesis import RenderedView
 
 Bytes = NDArray[np.uint8]
 
@@ -97,11 +98,13 @@ class ComparisonJob:
     def __init__(self) -> None:
         self._rays: RaySet | None = None
         self._rays_of: tuple[int, GridShape | None] | None = None
+        self._outer: dict[ViewOffset, StoredColors] = {}  # of fast quality, by which the set was completed
         self._pair: PairReady | None = None
 
     def forget(self) -> None:
         """Free what is kept."""
         self._rays = self._rays_of = self._pair = None
+        self._outer = {}
 
     def results_of(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
@@ -144,20 +147,19 @@ class ComparisonJob:
     ) -> StoredColors:
         """The view as the light field stores it; the middle one is the photo."""
         from iibr_core.generation.light_field import transformer_for
-        from iibr_core.generation.stored_views import StoredViews, encode_for_storage
+        from iibr_core.generation.stored_views import encode_for_storage
         from iibr_core.rendering.view_synthesis import ViewSynthesis
 
         loaded, plan = _given(request, inputs)
-        is_hdr = loaded.photo.is_hdr
         if request.view == plan.grid.centre:
-            return encode_for_storage(loaded.photo.pixels, is_hdr, should_stop)
-        inpainter = load_inpainter(inputs.inpaint)
+            return encode_for_storage(loaded.photo.pixels, loaded.photo.is_hdr, should_stop)
+        inpainter, offset = load_inpainter(inputs.inpaint), plan.grid.offset(*request.view)
         rays = self._kept_rays(request, inputs, inpainter, should_stop)
+        if quality == "fast" and offset in self._outer:
+            return self._outer[offset]
         transformer = transformer_for(quality)
         with ViewSynthesis(should_stop, transformer, quality == "exact", inpainter=inpainter) as synthesis:
-            offset = plan.grid.offset(*request.view)
-            stored = StoredViews(synthesis, rays, plan.grid, is_hdr, should_stop)
-            return stored.update(offset, synthesis.render(rays, offset)).colors
+            return _as_stored(rays, offset, synthesis.render(rays, offset), loaded.photo.is_hdr, should_stop)
 
     def _entropy(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
@@ -188,11 +190,11 @@ class ComparisonJob:
         loaded, plan = _given(request, inputs)
         rays_of = request.generation, request.truth.grid if request.truth is not None else None
         if self._rays is None or self._rays_of != rays_of:
-            self._rays = None  # two sets would be large
+            self.forget()  # two sets would be large
             disparity = plan.field_disparity(loaded.disparity)
             rays, outer_views = ray_set(loaded.photo, disparity, plan, should_stop, inpainter)
-            for _ in outer_views:
-                pass
+            is_hdr = loaded.photo.is_hdr
+            self._outer = {at: _as_stored(rays, at, view, is_hdr, should_stop) for at, view in outer_views}
             self._rays, self._rays_of = rays, rays_of
         return self._rays
 
@@ -229,6 +231,16 @@ class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):
             self._comparison_job.forget()
         else:
             yield from self._comparison_job.results_of(request, inputs, job.should_stop)
+
+
+def _as_stored(
+    rays: RaySet, offset: ViewOffset, view: RenderedView, is_hdr: bool, should_stop: Callable[[], bool]
+) -> StoredColors:
+    """The colours of a rendered view as the light field stores them."""
+    from iibr_core.generation.stored_views import encode_for_storage, stored_without_specks
+
+    stored = encode_for_storage(view.colors, is_hdr, should_stop)
+    return stored_without_specks(rays, offset, stored, view.disparity, view.inpainted, should_stop)
 
 
 def _bytes_of(stored: StoredColors, color_space: ColorSpace = SRGB) -> Bytes:
