@@ -219,9 +219,10 @@ class ViewSynthesis:
         raise_if_stopped(self._should_stop)
         colors, disparity, source = blend_hypotheses(rays, ambiguous, chosen)
         y, x = np.divmod(undecided.pixel, rays.size.width)
-        y, x = y - rays.margins.top, x - rays.margins.left
-        inpainted = (source >= rays.photo_images) | _beyond_frame(y, x, disparity, *undecided.offset, *rays.view_size)
-        return DecidedRays(y * rays.view_size.width + x, colors, disparity, inpainted)
+        pixel = (y - rays.margins.top) * rays.view_size.width + x - rays.margins.left
+        inpainted = source >= rays.photo_images
+        inpainted |= _beyond_frame(pixel.astype(np.int64), disparity, *undecided.offset, *rays.view_size)
+        return DecidedRays(pixel, colors, disparity, inpainted)
 
     def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """The results of work on all items, in their order. An item is only taken when a thread is free for it."""
@@ -287,10 +288,9 @@ class ViewSynthesis:
         """Where another view's filling shows, (H, W), but the photo's surfaces go on in front of it: there, that view
         saw what lies farther back. They count as occluded from now on.
         """
-        y, x = np.nonzero(view.inpainted & ~hole)
-        inside = ~_beyond_frame(y, x, view.disparity[y, x], *offset, *rays.view_size)
-        filled = np.zeros_like(hole)
-        filled[y[inside], x[inside]] = True
+        pixel, filled = np.flatnonzero(view.inpainted & ~hole), np.zeros_like(hole)
+        disparity = view.disparity.reshape(-1)[pixel]
+        filled.reshape(-1)[pixel] = ~_beyond_frame(pixel, disparity, *offset, *rays.view_size)
         if filled.any():
             filled &= goes_on_in_front(
                 view.disparity, hole | filled, rays.photo_disparity, offset, self._should_stop, threads
@@ -347,8 +347,9 @@ class ViewSynthesis:
         view.occluded[shown], covered[shown] = occluded[inner], share[inner]
         view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
         if any(rays.margins):
-            y, x = np.ogrid[rows[0] : rows[1], : rays.view_size.width]
-            view.inpainted[shown] |= _beyond_frame(y, x, view.disparity[shown], *offset, *rays.view_size)
+            pixel = np.arange(rows[0] * rays.view_size.width, rows[1] * rays.view_size.width)
+            beyond = _beyond_frame(pixel, view.disparity[shown].reshape(-1), *offset, *rays.view_size)
+            view.inpainted[shown] |= beyond.reshape(view.inpainted[shown].shape)
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
         return undecided
@@ -375,10 +376,13 @@ def _is_within_margins(
 
 
 @kernel
-def _beyond_frame(y, x, disparity, t, s, height, width):
-    """Which of the rays at (y, x) of a view look beyond the photo's frame; arrays of shapes that go together."""
-    v, u = y + disparity * t, x + disparity * s
-    return (v < -0.5) | (v > height - 0.5) | (u < -0.5) | (u > width - 0.5)
+def _beyond_frame(pixel, disparity, t, s, height, width):
+    """Which rays (N) of a view look beyond the photo's frame. pixel: indices into a view's pixels, row by row."""
+    beyond = np.empty(len(pixel), np.bool_)
+    for i in range(len(pixel)):
+        v, u = pixel[i] // width + disparity[i] * t, pixel[i] % width + disparity[i] * s
+        beyond[i] = v < -0.5 or v > height - 0.5 or u < -0.5 or u > width - 0.5
+    return beyond
 
 
 def _composite(front: FloatImage, back: FloatImage, share: FloatImage) -> FloatImage:
