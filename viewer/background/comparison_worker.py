@@ -190,7 +190,7 @@ class ComparisonJob:
         loaded, plan = _given(request, inputs)
         rays_of = request.generation, request.truth.grid if request.truth is not None else None
         if self._rays is None or self._rays_of != rays_of:
-            self.forget()  # two sets would be large
+            self._rays, self._outer = None, {}  # two sets would be large
             disparity = plan.field_disparity(loaded.disparity)
             rays, outer_views = ray_set(loaded.photo, disparity, plan, should_stop, inpainter)
             is_hdr = loaded.photo.is_hdr
