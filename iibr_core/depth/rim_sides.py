@@ -32,7 +32,6 @@ FILLED_TRUST = np.float32(0.2)
 """Of pixels that were unknown, besides."""
 LIKENESS_STEPS = 64
 LIKENESS = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKENESS_STEPS), 0).astype(np.float32)
-MOST_UNLIKE = np.float32(16 * LIKENESS_STEPS)
 """Likeness by squared distance of colours, in such steps of a variance, 0 from the last one on: computing powers took
 a quarter of the time.
 """
@@ -174,7 +173,7 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
     """
     height, width = values.shape
     others, evidence = np.empty(len(pixels), np.float32), np.zeros(len(pixels), np.float32)
-    steps, nothing = np.float32(LIKENESS_STEPS / (alike * alike)), np.float32(0.0)
+    steps, most = np.float32(LIKENESS_STEPS / (alike * alike)), np.float32(len(LIKENESS) - 1)
     for n in range(len(pixels)):
         y, x = pixels[n] // width, pixels[n] % width
         own, other = values[y, x], _nearest_other(values, y, x, least_edge)
@@ -186,21 +185,21 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
         for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)):
             for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
                 w = NEARNESS[v - y + REACH_PX, u - x + REACH_PX] * trust[v, u]
-                apart = nothing
+                apart = np.float32(0.0)
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
                 # Colours that are not finite are like no other.
                 at = apart * steps
-                like = w * LIKENESS[np.int32(at if at < MOST_UNLIKE else MOST_UNLIKE)]
+                like = w * LIKENESS[int(at if at < most else most)]
                 # Sums without branches: which surface comes next nobody can foretell.
                 to_own, to_other = abs(values[v, u] - own), abs(values[v, u] - other)
                 is_own = to_own <= half and to_own <= to_other
                 is_other = to_other <= half and not is_own
-                own_weight += w if is_own else nothing
-                own_like += like if is_own else nothing
-                other_weight += w if is_other else nothing
-                other_like += like if is_other else nothing
-                other_sum += w * (values[v, u] - other) if is_other else nothing
+                own_weight += w if is_own else 0.0
+                own_like += like if is_own else 0.0
+                other_weight += w if is_other else 0.0
+                other_like += like if is_other else 0.0
+                other_sum += w * (values[v, u] - other) if is_other else 0.0
         if other_weight > LEAST_WEIGHT:
             others[n] = other + other_sum / other_weight
             on_own = (own_like + UNSEEN_WEIGHT * UNLIKE) / (own_weight + UNSEEN_WEIGHT)
@@ -236,7 +235,7 @@ def _believe(colors, values, pixels, number, other, drive, alike, believed, beli
                     votes += 1.0 - stays
                 elif abs(elsewhere - other[n]) <= half:
                     votes -= 1.0 - stays
-                apart = 0.0
+                apart = np.float32(0.0)
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
                 like = exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0

@@ -19,6 +19,9 @@ REACH_PX = 4
 """Pixels that vote lie within so many, each way."""
 SPREAD_PX = 2.0
 """Standard deviation of their weights by distance."""
+_STEPS = np.arange(-REACH_PX, REACH_PX + 1)
+NEARNESS = np.exp(-0.5 * (_STEPS[:, None] ** 2 + _STEPS**2) / SPREAD_PX**2)
+"""Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1), the pixel itself in the middle."""
 ALIKE = 0.04
 """Standard deviation of their weights by colour (sRGB-encoded, all channels together)."""
 UNLIKE_WEIGHT = 1e-3
@@ -92,21 +95,10 @@ def _unknown_around(values, pixels, queued):
 
 
 @kernel
-def vote_weight(colors, y, x, v, u, alike, spread, unlike_weight):
-    """Of the pixel (v, u) in deciding for (y, x): by their distance, and by how alike their colours are."""
-    apart = 0.0
-    for c in range(3):
-        apart += (colors[v, u, c] - colors[y, x, c]) ** 2
-    # Colours that are not finite are like no other.
-    likeness = exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
-    return (likeness + unlike_weight) * exp(-0.5 * ((v - y) ** 2 + (u - x) ** 2) / (spread * spread))
-
-
-@kernel
 def _vote(colors, values, pixels):
     """The disparities (N) that pixels (flat indices) get from what is known around them; each has something there."""
     height, width = values.shape
-    result, bins = np.empty(len(pixels), np.float32), np.empty(BINS)
+    result, bins, weight = np.empty(len(pixels), np.float32), np.empty(BINS), np.empty(NEARNESS.shape)
     for n in range(len(pixels)):
         y, x = pixels[n] // width, pixels[n] % width
         top, bottom = max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)
@@ -123,8 +115,16 @@ def _vote(colors, values, pixels):
         for v in range(top, bottom):
             for u in range(left, right):
                 d = np.float64(values[v, u])
-                if d == d:
-                    bins[int((d - low) * scale)] += vote_weight(colors, y, x, v, u, ALIKE, SPREAD_PX, UNLIKE_WEIGHT)
+                if d != d:
+                    continue
+                apart = 0.0
+                for c in range(3):
+                    apart += (colors[v, u, c] - colors[y, x, c]) ** 2
+                # Colours that are not finite are like no other.
+                likeness = exp(-0.5 * apart / (ALIKE * ALIKE)) if apart < np.inf else 0.0
+                w = (likeness + UNLIKE_WEIGHT) * NEARNESS[v - y + REACH_PX, u - x + REACH_PX]
+                weight[v - top, u - left] = w
+                bins[int((d - low) * scale)] += w
         # Its mode: a surface that crosses the border of two bins keeps its votes together.
         elected, most = 0, -1.0
         for k in range(BINS):
@@ -137,7 +137,7 @@ def _vote(colors, values, pixels):
             for u in range(left, right):
                 d = np.float64(values[v, u])
                 if d == d and abs(int((d - low) * scale) - elected) <= 1:
-                    w = vote_weight(colors, y, x, v, u, ALIKE, SPREAD_PX, UNLIKE_WEIGHT)
+                    w = weight[v - top, u - left]
                     total, weights = total + w * (d - low), weights + w
         result[n] = min(low + total / weights, high)
     return result

@@ -19,6 +19,31 @@ def cable_before_wall():
     return (photo + noise).astype(np.float32), truth
 
 
+def slow_vote(photo, values, y, x):
+    """The mean of who voted for the mode of a histogram, votes by nearness and likeness."""
+    reach = disparity_by_color.REACH_PX
+    near = [(v, u) for v, u in np.argwhere(~np.isnan(values)) if max(abs(v - y), abs(u - x)) <= reach]
+    d = np.array([values[p] for p in near], np.float64)
+    apart = np.array([np.sum((photo[p] - photo[y, x]) ** 2) for p in near])
+    away = np.array([(v - y) ** 2 + (u - x) ** 2 for v, u in near])
+    likeness = np.exp(-apart / (2 * disparity_by_color.ALIKE**2)) + disparity_by_color.UNLIKE_WEIGHT
+    votes = likeness * np.exp(-away / (2 * disparity_by_color.SPREAD_PX**2))
+    bins = ((d - d.min()) * (disparity_by_color.BINS - 1) / np.ptp(d)).astype(int)
+    total = np.bincount(bins, votes, disparity_by_color.BINS)
+    elected = np.argmax(np.convolve(total, [disparity_by_color.SIDE_BINS, 1, disparity_by_color.SIDE_BINS], "same"))
+    return np.average(d, weights=votes * (abs(bins - elected) <= 1))
+
+
+def test_lone_pixels_get_what_the_slow_vote_says():
+    photo, truth = cable_before_wall()
+    given = truth + np.random.default_rng(5).normal(0, 0.3, truth.shape).astype(np.float32)
+    unknown = np.zeros(truth.shape, np.bool_)
+    unknown[::10, ::9] = True
+    values = np.where(unknown, np.float32(np.nan), given)
+    expected = [slow_vote(photo, values, y, x) for y, x in np.argwhere(unknown)]
+    np.testing.assert_allclose(fill_disparity_by_color(photo, values)[unknown], expected, rtol=1e-5)
+
+
 def test_a_cable_is_whole_again_where_half_of_it_is_unknown():
     photo, truth = cable_before_wall()
     values = truth.copy()
