@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.color import stored_from_encoded
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.specks import without_specks
@@ -55,8 +55,10 @@ class StoredViews:
     def draft(self, offset: ViewOffset) -> Draft:
         """A view in closed form, final where nothing is left to be decided."""
         view, undecided = self._synthesis.render_draft(self._rays, offset)
-        stored = self._stored(view)
-        return Draft(self._update(offset, stored, view.disparity, view.inpainted, not undecided), stored, undecided)
+        stored = encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
+        colors = self._without_specks(offset, stored, view.disparity, view.inpainted)
+        update = self._update(offset, colors, view.disparity, view.inpainted, not undecided)
+        return Draft(update, stored, undecided)
 
     def finish(self, draft: Draft) -> ViewUpdate:
         """The final view: its undecided rays are written over, the draft itself stays as it is."""
@@ -70,39 +72,41 @@ class StoredViews:
             stored[at] = stored_from_encoded(decided.colors, self._is_hdr)
             disparity[at], inpainted[at] = decided.disparity, decided.inpainted
         offset = self._grid.offset(draft.update.row, draft.update.column)
-        return self._update(offset, stored, disparity, inpainted, True)
+        colors = self._without_specks(offset, stored, disparity, inpainted)
+        return self._update(offset, colors, disparity, inpainted, True)
 
     def update(self, offset: ViewOffset, view: RenderedView, is_final: bool = True) -> ViewUpdate:
-        """A rendered view as it is stored, its specks taken out."""
-        return self._update(offset, self._stored(view), view.disparity, view.inpainted, is_final)
+        """A rendered view as it is stored."""
+        colors = stored_colors(self._rays, offset, view, self._is_hdr, self._should_stop)
+        return self._update(offset, colors, view.disparity, view.inpainted, is_final)
 
-    def _stored(self, view: RenderedView) -> StoredColors:
-        return encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
+    def _without_specks(
+        self, offset: ViewOffset, stored: StoredColors, disparity: FloatImage, inpainted: NDArray[np.bool_]
+    ) -> StoredColors:
+        return without_specks(self._rays, offset, stored, disparity, inpainted, self._should_stop, 1)
 
     def _update(
         self,
         offset: ViewOffset,
-        stored: StoredColors,
+        colors: StoredColors,
         disparity: FloatImage,
         inpainted: NDArray[np.bool_],
         is_final: bool,
     ) -> ViewUpdate:
-        colors = stored_without_specks(self._rays, offset, stored, disparity, inpainted, self._should_stop)
         (v, u), (t, s) = self._grid.centre, offset
         return ViewUpdate(v + round(t), u + round(s), colors, disparity, inpainted, is_final)
 
 
-def stored_without_specks(
-    rays: RaySet,
-    offset: ViewOffset,
-    stored: StoredColors,
-    disparity: FloatImage,
-    inpainted: NDArray[np.bool_],
-    should_stop: ShouldStop,
+def stored_colors(
+    rays: RaySet, offset: ViewOffset, view: RenderedView, is_hdr: bool, should_stop: ShouldStop
 ) -> StoredColors:
-    """`without_specks`, told from colours as they are stored: so a draft that was finished is what was made at once."""
-    settled = without_specks(rays, offset, encoded_from_stored(stored), disparity, inpainted, should_stop, 1)
-    return encode_for_storage(settled, stored.dtype == np.float16, should_stop, 1)
+    """The colours (H, W, 3) of a view made of the rays of a photo, as they are stored, without specks.
+
+    Specks are told from what is stored: so a draft that was finished is what was made at once. Raises Cancelled once
+    should_stop is true.
+    """
+    stored = encode_for_storage(view.colors, is_hdr, should_stop, 1)
+    return without_specks(rays, offset, stored, view.disparity, view.inpainted, should_stop, 1)
 
 
 def encode_for_storage(

@@ -8,6 +8,8 @@ within one surface or was inpainted.
 
 from __future__ import annotations
 
+from typing import Any, TypeVar, cast
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,8 @@ from iibr_core.rendering.resampling import OWN_SURFACE_PX
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ViewOffset, image_size
+
+Colors = TypeVar("Colors", bound=NDArray[Any])
 
 STANDS_OUT = 0.05
 STANDS_OUT_TIMES = 3.0
@@ -39,27 +43,30 @@ def measure_detail(photo: FloatImage, should_stop: ShouldStop = never) -> FloatI
 def without_specks(
     rays: RaySet,
     offset: ViewOffset,
-    colors: FloatImage,
+    colors: Colors,
     disparity: FloatImage,
     inpainted: NDArray[np.bool_],
     should_stop: ShouldStop = never,
     threads: int | None = None,
-) -> FloatImage:
-    """The colours (H, W, 3), sRGB-encoded, of a view made of the rays of a photo, without its specks.
+) -> Colors:
+    """The colours (H, W, 3), sRGB-encoded, as floats or as they are stored, of a view made of the rays of a photo,
+    without its specks.
 
     disparity, inpainted (H, W): as in `RenderedView`. threads: None for all. Raises Cancelled once should_stop is true.
     """
     detail, edge_level = rays.photo_detail, rays.arrays[4][0]
     limit = min(round(GAP_PX / OWN_SURFACE_PX) * int(rays.edge_limits(offset)[0]), HIGHEST_LEVEL - 1)
-    settled = np.empty_like(colors)
+    # Kernels know no half precision.
+    shown = colors.astype(np.float32) if colors.dtype == np.float16 else colors
+    settled, white = shown.copy(), 255.0 if colors.dtype == np.uint8 else 1.0
     in_bands(
         lambda first, last: _settle(
-            colors, disparity, inpainted, detail, edge_level, limit,
+            shown, white, disparity, inpainted, detail, edge_level, limit,
             rays.margins.top, rays.margins.left, *offset, first, last, settled,
         ),
         image_size(disparity), should_stop, threads,
     )  # fmt: skip
-    return settled
+    return cast(Colors, settled.astype(colors.dtype, copy=False))
 
 
 @kernel
@@ -76,11 +83,12 @@ def _measure(photo, first, last, detail):
 
 @kernel
 def _settle(
-    colors, disparity, inpainted, detail, edge_level, limit, top, left, t, s, first, last, settled
+    colors, white, disparity, inpainted, detail, edge_level, limit, top, left, t, s, first, last, settled
 ):  # fmt: skip
-    """Rows [first, last) of `without_specks`. limit: the edge_level above which rays are beside a depth edge."""
+    """Write to rows [first, last) of settled where `without_specks` differs from colors. limit: the edge_level above
+    which rays are beside a depth edge.
+    """
     lowest, rightmost = detail.shape[0] - 1, detail.shape[1] - 1
-    settled[first:last] = colors[first:last]
     for y in range(first, last):
         for x in range(disparity.shape[1]):
             v, u = y + disparity[y, x] * t + top, x + disparity[y, x] * s + left
@@ -89,14 +97,14 @@ def _settle(
                 continue
             red, green, blue = _median(colors, y, x, 0), _median(colors, y, x, 1), _median(colors, y, x, 2)
             stands_out = max(abs(colors[y, x, 0] - red), abs(colors[y, x, 1] - green), abs(colors[y, x, 2] - blue))
-            if stands_out > STANDS_OUT + STANDS_OUT_TIMES * _interpolated(detail, v, u):
+            if stands_out > white * (STANDS_OUT + STANDS_OUT_TIMES * _interpolated(detail, v, u)):
                 settled[y, x, 0], settled[y, x, 1], settled[y, x, 2] = red, green, blue
 
 
 @kernel
 def _median(colors, y, x, channel):
     """Of the 3x3 pixels around one, those at the border repeated: of the greatest low, the middle middle and the least
-    high value of its rows.
+    high value of its rows. As a float: a difference of bytes has no sign.
     """
     above, below = max(y - 1, 0), min(y + 1, colors.shape[0] - 1)
     left, right = max(x - 1, 0), min(x + 1, colors.shape[1] - 1)
@@ -104,7 +112,7 @@ def _median(colors, y, x, channel):
     upper = _ordered(colors[above, left, channel], colors[above, x, channel], colors[above, right, channel])
     lower = _ordered(colors[below, left, channel], colors[below, x, channel], colors[below, right, channel])
     low, high = max(low, upper[0], lower[0]), min(high, upper[2], lower[2])
-    return _ordered(low, _ordered(upper[1], middle, lower[1])[1], high)[1]
+    return float(_ordered(low, _ordered(upper[1], middle, lower[1])[1], high)[1])
 
 
 @kernel

@@ -488,7 +488,7 @@ FINITE_BY_CONTRACT = {
     "color.convert": "of a Photo, see color.photo_in_srgb",
     "color.primaries_matrix": "of colour spaces that the reader of profiles checked",
     "color.bytes_from_encoded": "of photos and of views, as for `stored_from_encoded`",
-    "generation.stored_views.stored_without_specks": "of rendered views only, as they are stored",
+    "generation.stored_views.stored_colors": "of rendered views only, as they are stored",
     "generation.stored_views.encode_for_storage": "of rendered views only, as for `stored_from_encoded`",
     "color.stored_from_encoded": "made for every view; Photo and the synthesis see to it",
     "geometry.distance_between": "of lines that `line_of` made",

@@ -27,7 +27,6 @@ from viewer.model.inspection_request import InspectionRequest
 if TYPE_CHECKING:
     from iibr_core.inpainting.protocol import Inpainter
     from iibr_core.rendering.ray_set import RaySet
-    from iibr_core.rendering.view_synthesis import RenderedView
 
 Bytes = NDArray[np.uint8]
 
@@ -147,7 +146,7 @@ class ComparisonJob:
     ) -> StoredColors:
         """The view as the light field stores it; the middle one is the photo."""
         from iibr_core.generation.light_field import transformer_for
-        from iibr_core.generation.stored_views import encode_for_storage
+        from iibr_core.generation.stored_views import encode_for_storage, stored_colors
         from iibr_core.rendering.view_synthesis import ViewSynthesis
 
         loaded, plan = _given(request, inputs)
@@ -159,7 +158,7 @@ class ComparisonJob:
             return self._outer[offset]
         transformer = transformer_for(quality)
         with ViewSynthesis(should_stop, transformer, quality == "exact", inpainter=inpainter) as synthesis:
-            return _as_stored(rays, offset, synthesis.render(rays, offset), loaded.photo.is_hdr, should_stop)
+            return stored_colors(rays, offset, synthesis.render(rays, offset), loaded.photo.is_hdr, should_stop)
 
     def _entropy(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
@@ -186,6 +185,7 @@ class ComparisonJob:
     ) -> RaySet:
         """The ray set of the scene's plan, or of the ground truth's places."""
         from iibr_core.generation.light_field import ray_set
+        from iibr_core.generation.stored_views import stored_colors
 
         loaded, plan = _given(request, inputs)
         rays_of = request.generation, request.truth.grid if request.truth is not None else None
@@ -194,7 +194,7 @@ class ComparisonJob:
             disparity = plan.field_disparity(loaded.disparity)
             rays, outer_views = ray_set(loaded.photo, disparity, plan, should_stop, inpainter)
             is_hdr = loaded.photo.is_hdr
-            self._outer = {at: _as_stored(rays, at, view, is_hdr, should_stop) for at, view in outer_views}
+            self._outer = {at: stored_colors(rays, at, view, is_hdr, should_stop) for at, view in outer_views}
             self._rays, self._rays_of = rays, rays_of
         return self._rays
 
@@ -231,16 +231,6 @@ class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):
             self._comparison_job.forget()
         else:
             yield from self._comparison_job.results_of(request, inputs, job.should_stop)
-
-
-def _as_stored(
-    rays: RaySet, offset: ViewOffset, view: RenderedView, is_hdr: bool, should_stop: Callable[[], bool]
-) -> StoredColors:
-    """The colours of a rendered view as the light field stores them."""
-    from iibr_core.generation.stored_views import encode_for_storage, stored_without_specks
-
-    stored = encode_for_storage(view.colors, is_hdr, should_stop)
-    return stored_without_specks(rays, offset, stored, view.disparity, view.inpainted, should_stop)
 
 
 def _bytes_of(stored: StoredColors, color_space: ColorSpace = SRGB) -> Bytes:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX
 from iibr_core.rendering.specks import GAP_PX, STANDS_OUT, STANDS_OUT_TIMES, measure_detail, without_specks
@@ -53,6 +54,12 @@ def test_the_kernel_is_its_slow_twin() -> None:
     changed = (settled != colors).any(-1)
     assert changed.any()
     assert not changed[view.inpainted].any()
+    for is_hdr in (False, True):
+        stored = stored_from_encoded(colors, is_hdr)
+        expected = slowly(rays, encoded_from_stored(stored), view.disparity, view.inpainted, detail)
+        settled = without_specks(rays, OFFSET, stored, view.disparity, view.inpainted)
+        assert settled.dtype == stored.dtype
+        np.testing.assert_array_equal(settled, stored_from_encoded(expected, is_hdr))
 
 
 def test_pixels_whose_disparity_is_the_other_surfaces_are_specks() -> None:
