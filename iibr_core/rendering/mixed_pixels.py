@@ -92,9 +92,10 @@ def _front_beside(disparity, y, x, edge_step):
 
 
 @kernel
-def _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, spread, brightest):
+def _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, spread, darkest, brightest):
     """Mean colour (2, 3) and its covariance (2, 3, 3) of the pixel's own surface and of that in front, around it, in
-    linear light, and the brightest of both (3), if it is brighter; returns whether there are pixels of both.
+    linear light; the darkest and brightest of its own (3), where they pass what is there; returns whether there are
+    pixels of both.
     """
     height, width = disparity.shape
     weights, color = np.zeros(2), np.empty(3)
@@ -110,7 +111,8 @@ def _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, s
             weights[surface] += weight
             for c in range(3):
                 color[c] = linear_scalar(colors[v, u, c])
-                brightest[c] = max(brightest[c], color[c])
+                if surface == 0:
+                    darkest[c], brightest[c] = min(darkest[c], color[c]), max(brightest[c], color[c])
                 mean[surface, c] += weight * color[c]
                 for e in range(c + 1):
                     spread[surface, c, e] += weight * color[c] * color[e]
@@ -146,18 +148,20 @@ def _split_rows(
 ):  # fmt: skip
     """Rows [first, last) of what `split_mixed_pixels` returns, which hold the photo where nothing is split."""
     mean, spread, precision = np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((3, 3))
-    here, brightest = np.empty(3), np.empty(3)
+    here, darkest, brightest = np.empty(3), np.empty(3), np.empty(3)
     for y in range(first, last):
         for x in range(disparity.shape[1]):
             if not is_rim[y, x]:
                 continue
             front, outline = _front_beside(disparity, y, x, edge_step)
             for c in range(3):
-                here[c] = brightest[c] = linear_scalar(colors[y, x, c])
+                here[c] = darkest[c] = brightest[c] = linear_scalar(colors[y, x, c])
             # A pixel just behind an edge, and colours of both sides.
             if not (
                 front - disparity[y, x] > edge_step
-                and _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, spread, brightest)
+                and _color_statistics(
+                    colors, disparity, is_rim, y, x, front, edge_step, mean, spread, darkest, brightest
+                )
             ):
                 continue
             # Colours of a mixture spread with both surfaces'. The share that fits best, by colours and outline, follows
@@ -183,12 +187,12 @@ def _split_rows(
                 for e in range(3):
                     part = precision[e, 0] * off[0] + precision[e, 1] * off[1] + precision[e, 2] * off[2]
                     back, fore = back + (1.0 - share) * spread[0, c, e] * part, fore + share * spread[1, c, e] * part
-                # Nothing is darker than black, and what is behind not brighter than all around, as a small share of it
-                # may seem: the other part takes what is left.
+                # Nothing is darker than black, and what is behind neither darker nor brighter than its surface all
+                # around, as a small share of it may seem: the other part takes what is left.
                 if fore < 0.0:
                     back, fore = here[c] / (1.0 - share), 0.0
-                if not 0.0 <= back <= brightest[c]:
-                    back = min(max(back, 0.0), brightest[c])
+                if not darkest[c] <= back <= brightest[c]:
+                    back = min(max(back, darkest[c]), brightest[c])
                     fore = (here[c] - (1.0 - share) * back) / share
                 own[y, x, c], fringe[y, x, c] = srgb_scalar(back), srgb_scalar(fore)
             # The fringe ray moves with the foreground and covers its share; the own ray stays and fills the pixel.
