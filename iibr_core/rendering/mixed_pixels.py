@@ -31,8 +31,8 @@ DIAGONAL_SHARE = 0.05
 """Of a pixel that its outline alone gives to the foreground, for each straight and diagonal neighbour that is."""
 SHARE_DEVIATION = 0.2
 """Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
-SLOPE = 0.5
-"""A pixel so many depth edges in front of a neighbour lies on a slope."""
+SLOPE = 0.25
+"""A pixel in front of one neighbour by more than this share of what it is behind another lies on a slope."""
 ROUNDS = 3
 
 
@@ -74,7 +74,7 @@ def _mark_rims(disparity, edge_step, first, last, is_rim):
 @kernel
 def _front_beside(disparity, y, x, edge_step):
     """The disparity most in front beside a pixel, and the share of the pixel that the outline gives to it; its own and
-    0 on a slope, which falls away on the other side.
+    0 on a slope, which falls away on the other side, too.
     """
     height, width = disparity.shape
     here, share = disparity[y, x], 0.0
@@ -82,7 +82,7 @@ def _front_beside(disparity, y, x, edge_step):
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
             front, back = max(front, disparity[v, u]), min(back, disparity[v, u])
-    if here - back > SLOPE * edge_step:
+    if here - back > SLOPE * (front - here):
         return here, share
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):

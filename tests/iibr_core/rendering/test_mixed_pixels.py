@@ -138,6 +138,14 @@ def test_what_is_not_mixed_stays():
     assert flat[3].max() == 0
 
 
+@pytest.mark.parametrize(("fall", "is_split"), [(0.0, True), (0.4, True), (1.4, False)])
+def test_on_a_slope_nothing_is_split(fall, is_split):
+    """What falls away behind a pixel by much less than the step in front of it is a halo of the back."""
+    colors, disparity = edge_photo(0.5)
+    disparity[:, :5] -= fall
+    assert (split_mixed_pixels(colors, disparity, edge_step=0.5)[3][4, 5] > 0) == is_split
+
+
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2), (4, 4)])
 def test_tiny_photos(size):
     own, *_, coverage = split_mixed_pixels(np.ones((*size, 3), np.float32), np.ones(size, np.float32), 0.5)
