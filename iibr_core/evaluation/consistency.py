@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter, minimum_filter
 
 from iibr_core.generation.outer_views import outer_views
-from iibr_core.rendering.view_synthesis import RenderedView
+from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.types import FloatImage, ViewOffset
 
 SAME_SURFACE_PX = 0.5

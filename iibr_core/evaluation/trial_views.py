@@ -18,7 +18,7 @@ from iibr_core.evaluation.trials import Trial
 from iibr_core.generation.free_views import FreeViews
 from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.rendering.free_view import target_from_photo
-from iibr_core.rendering.view_synthesis import RenderedView
+from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.types import Camera, FloatImage, Quality, image_size
 
 LEAST_SHARE = 0.1

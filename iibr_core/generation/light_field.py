@@ -20,7 +20,8 @@ from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter, require_inpainter
 from iibr_core.rendering.ambiguous_rays import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import RenderedView, ShownBefore, ViewSynthesis, rays_of_photo
+from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import (

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from iibr_core.color import stored_from_encoded
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
 from iibr_core.rendering.specks import without_specks
-from iibr_core.rendering.view_synthesis import RenderedView, ShownBefore, ViewSynthesis
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
 

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Iterator
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis
+from iibr_core.rendering.rendered_view import RenderedView
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import ViewOffset
 

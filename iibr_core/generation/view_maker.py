@@ -11,7 +11,8 @@ from iibr_core.generation.light_field import transformer_for
 from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.rendering.view_synthesis import RenderedView, ViewSynthesis, rays_of_photo, settled_view
+from iibr_core.rendering.rendered_view import RenderedView
+from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo, settled_view
 from iibr_core.types import FloatImage, Quality, ViewOffset
 
 

@@ -17,8 +17,8 @@ from iibr_core.inpainting.background import continue_farthest
 from iibr_core.rendering.candidates import SAME_SURFACE_PX, SEALED_GAP_PX
 from iibr_core.rendering.joined_rays import BELOW, RIGHT
 from iibr_core.rendering.ray_set import CELL_PX, HIGHEST_LEVEL, RaySet
+from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
-from iibr_core.rendering.view_synthesis import RenderedView
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, ShouldStop, in_bands, never
 from iibr_core.types import Camera, FloatImage, ImageSize, Margins

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 from types import TracebackType
 from typing import TypeVar
@@ -26,6 +26,7 @@ from iibr_core.rendering.hypothesis_features import describe_rays
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
 from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, RaySet
+from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
 from iibr_core.rendering.specks import measure_detail, without_specks
 from iibr_core.rendering.undecided_rays import find_undecided_rays
@@ -33,80 +34,13 @@ from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
+from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
 
 EDGE_PX = 1.0
 """A step of disparity mixes two surfaces if it opens a gap of at least this many pixels in the outermost view."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
-
-@dataclass(frozen=True, eq=False)
-class RaysBehind:
-    """What was filled behind N rays that surfaces cover in part: their pixels (N), counted row by row, its colors
-    (N, 3), sRGB-encoded, and disparity (N).
-    """
-
-    pixel: NDArray[np.int64]
-    colors: FloatImage
-    disparity: FloatImage
-
-
-@dataclass(frozen=True, eq=False)
-class RenderedView:
-    """A view without holes.
-
-    colors: (H, W, 3) sRGB-encoded. disparity: (H, W). occluded: (H, W), True where no source showed anything, so that
-    it was filled here. inpainted: (H, W), True where the photo showed nothing: filled here or in an earlier view.
-    entropy: (H, W) in [0, 1], of the closed form's weights, or None where it was not asked for. behind: what was filled
-    here and shows beside something in front of it, None without any.
-    """
-
-    colors: FloatImage
-    disparity: FloatImage
-    occluded: NDArray[np.bool_]
-    inpainted: NDArray[np.bool_]
-    entropy: FloatImage | None = None
-    behind: RaysBehind | None = None
-
-    @property
-    def has_filled_rays(self) -> bool:
-        """Whether anything was filled here."""
-        return self.behind is not None or bool(self.occluded.any())
-
-    def filled_rays(self) -> tuple[FloatImage, FloatImage, FloatImage]:
-        """What was filled here, as an image for the ray set: colours (H, W, 3), disparity and coverage (H, W)."""
-        if self.behind is None:
-            return self.colors, self.disparity, self.occluded.astype(np.float32)
-        colors, disparity, filled = self.colors.copy(), self.disparity.copy(), self.occluded.copy()
-        colors.reshape(-1, 3)[self.behind.pixel] = self.behind.colors
-        disparity.reshape(-1)[self.behind.pixel] = self.behind.disparity
-        filled.reshape(-1)[self.behind.pixel] = True
-        return colors, disparity, filled.astype(np.float32)
-
-
-@dataclass(frozen=True, eq=False)
-class DecidedRays:
-    """Rays (N) of one view: pixel, the index into its pixels row by row; colors (N, 3), disparity (N) and inpainted (N)
-    as in `RenderedView`.
-    """
-
-    pixel: NDArray[np.int32]
-    colors: FloatImage
-    disparity: FloatImage
-    inpainted: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class ShownBefore:
-    """A view as it was when the ray set was smaller.
-
-    colors: (H, W, 3), wrong only where later images show. images: how many there were, its own not counted.
-    """
-
-    colors: FloatImage
-    images: int
 
 
 def rays_of_photo(
@@ -256,7 +190,7 @@ class ViewSynthesis:
             raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
         if self._transformer:
             rays.survey(self._should_stop)
-        return _blank_view(rays.view_size, self._keeps_entropy), np.empty(rays.view_size, np.float32)
+        return RenderedView.blank(rays.view_size, self._keeps_entropy), np.empty(rays.view_size, np.float32)
 
     def _fill(
         self, rays: RaySet, offset: ViewOffset, view: RenderedView, covered: FloatImage, threads: int
@@ -389,17 +323,6 @@ def _composite(front: FloatImage, back: FloatImage, share: FloatImage) -> FloatI
     """Colours (N, 3) of a front that covers these shares (N) of its pixels, over a back; summed in linear light."""
     light = linear_from_srgb(back) + share[:, None] * (linear_from_srgb(front) - linear_from_srgb(back))
     return np.asarray(srgb_from_linear(light), np.float32)
-
-
-def _blank_view(size: ImageSize, with_entropy: bool) -> RenderedView:
-    """A view (height, width) to be written to."""
-    return RenderedView(
-        np.empty((*size, 3), np.float32),
-        np.empty(size, np.float32),
-        np.empty(size, np.bool_),
-        np.empty(size, np.bool_),
-        np.empty(size, np.float32) if with_entropy else None,
-    )
 
 
 def settled_view(

@@ -12,7 +12,7 @@ from iibr_core.evaluation.consistency import LineView, consistency, disagreement
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.reference_warp import LOBES, SAMPLES, reference_warp, reference_warp_to
 from iibr_core.evaluation.trials import warp_disparity
-from iibr_core.rendering.view_synthesis import RenderedView
+from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import FRONT, HEIGHT, WALL, WIDTH, disparity_of_square, view_of_square, view_of_wall
 from tests.iibr_core.scenes import smooth_texture
