@@ -143,7 +143,13 @@ def views_of_tile(
     rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
     for offset in offsets:
         view = settled_view(rays, offset, synthesis.render(rays, offset), should_stop)
-        yield RenderedView(view.colors[shown], view.disparity[shown], view.occluded[shown], view.inpainted[shown])
+        # Copies: a part is laid out like a whole view, and kernels need no second kind.
+        yield RenderedView(
+            view.colors[shown].copy(),
+            view.disparity[shown].copy(),
+            view.occluded[shown].copy(),
+            view.inpainted[shown].copy(),
+        )
 
 
 def _fills_in(fills: RaySet, size: ImageSize, part: Part, offsets: Sequence[ViewOffset]) -> list[int]:

@@ -13,6 +13,7 @@ import pytest
 
 from iibr_core.formats.images.photo import write_image
 from tests.viewer.conftest import write_scene
+from viewer.precompile import digest_of_sources
 
 ROOT = Path(__file__).parents[2]
 
@@ -44,8 +45,19 @@ def kernels_in(folder: Path) -> list[str]:
 def test_they_are_few_and_small(site: Path) -> None:
     files = [path for path in (site / "iibr_core" / "_kernels").rglob("*") if path.is_file()]
     assert 100 < len(files) < 400
-    assert {path.suffix for path in files} == {".nbi", ".nbc"}
+    assert {path.suffix for path in files} == {".nbi", ".nbc", ".sha256"}
     assert sum(path.stat().st_size for path in files) < 12e6
+
+
+def test_they_count_for_their_sources_only(tmp_path: Path) -> None:
+    """What an installation has is taken where nothing has changed, and nowhere else."""
+    source = tmp_path / "iibr_core" / "rendering" / "rays.py"
+    source.parent.mkdir(parents=True)
+    source.write_text("STEPS = 1")
+    before = digest_of_sources(tmp_path)
+    assert digest_of_sources(tmp_path) == before != digest_of_sources(ROOT)
+    source.write_text("STEPS = 2")
+    assert digest_of_sources(tmp_path) != before
 
 
 DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
@@ -59,15 +71,21 @@ DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
         ("generate", "scene.png", "--grid", 3, "--out", "field", "--quality", "exact"),
         ("screenshot", "unmapped.png", "--view", "1,1", "-o", "picture.png"),
         ("screenshot", DEMO, "--max-pixels", 250000, "--gloss", "gloss.toml", "-o", "picture.png"),
+        ("screenshot", "scene.png", "--max-pixels", 3000, "--full", "--aperture", 3, "-o", "picture.png"),
+        ("depth", "views", "-o", "map.pfm"),
     ],
-    ids=["screenshot", "generate", "exact", "guessed", "gloss"],
+    ids=["screenshot", "generate", "exact", "guessed", "gloss", "full", "depth"],
 )
 def test_the_first_run_compiles_nothing(site: Path, tmp_path: Path, words: tuple[object, ...]) -> None:
     write_scene(tmp_path)
     random = np.random.default_rng(0)
     write_image(tmp_path / "unmapped.png", random.integers(0, 255, (90, 120, 3), np.uint8))
     (tmp_path / "gloss.toml").write_text("photo_shines = true\nlight.color = [0, 0, 0]")
-    made = ("field", "gloss.toml", "picture.png", "scene.png", "unmapped.png")
+    views = random.integers(0, 255, (3, 3, 90, 120, 3), np.uint8)
+    (tmp_path / "views").mkdir()
+    for row, column in np.ndindex(3, 3):
+        write_image(tmp_path / "views" / f"v{row}_u{column}.png", views[row, column])
+    made = ("field", "gloss.toml", "map.pfm", "picture.png", "scene.png", "unmapped.png", "views")
     places = [tmp_path / word if word in made else word for word in words]
     run_in(site, "viewer", *places, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
     assert kernels_in(tmp_path / "kept") == []
@@ -75,6 +93,7 @@ def test_the_first_run_compiles_nothing(site: Path, tmp_path: Path, words: tuple
 
 def test_another_processor_compiles_its_own(site: Path, tmp_path: Path) -> None:
     write_scene(tmp_path)
-    words = ("generate", tmp_path / "scene.png", "--grid", 1, "--quality", "fast", "--out", tmp_path / "field")
-    run_in(site, "viewer", *words, NUMBA_CACHE_DIR=str(tmp_path / "kept"), NUMBA_CPU_NAME="generic")
-    assert kernels_in(tmp_path / "kept") != []
+    words = ("generate", tmp_path / "scene.png", "--grid", 1, "--refine", "off", "--quality", "fast")
+    kept = tmp_path / "kept"
+    run_in(site, "viewer", *words, "--out", tmp_path / "field", NUMBA_CACHE_DIR=str(kept), NUMBA_CPU_NAME="generic")
+    assert kernels_in(kept) != []
