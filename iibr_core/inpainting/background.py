@@ -107,6 +107,7 @@ def _fill_view(
     known = nearest_known(hole, pixels, should_stop, threads)
     rims, number = rims_of_holes(known, image_size(hole), should_stop, threads)
     mixed, lines = mixed_beside(hole), np.empty((len(rims), 2), np.float32)
+    pure = np.where(mixed, np.float32(np.nan), disparity)
     reach = np.empty(len(pixels), np.float32)
     changed = np.empty((len(pixels), 3), np.float32)
 
@@ -129,7 +130,7 @@ def _fill_view(
         lambda part: _write_disparity(changed[part], pixels[part], disparity),
         *chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX),
     ]  # fmt: skip
-    run(lambda part: find_lines(colors, disparity, mixed, rims[part], one_surface, lines[part]), len(rims))
+    run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
     for step in steps:
         run(step, len(pixels))
     tiles, place = tiles_of(pixels, image_size(hole)), np.empty(tile_rows_and_columns(image_size(hole)), np.int8)

@@ -43,7 +43,7 @@ def extend_beyond_frame(
     frame = _frame_pixels(size)
     means = _means_along_frame(colors.reshape(-1, 3)[frame], max(margins))
     lines = np.empty((len(frame), 2), np.float32)
-    find_lines(colors, disparity, np.zeros(size, np.bool_), frame, np.inf, lines)
+    find_lines(colors, disparity, disparity, frame, np.inf, lines)
 
     def band(first: int, last: int) -> None:
         _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)

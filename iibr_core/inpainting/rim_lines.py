@@ -33,34 +33,35 @@ def mixed_beside(hole: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 @kernel
-def find_lines(colors, disparity, mixed, rims, one_surface, lines):
+def find_lines(colors, disparity, pure, rims, one_surface, lines):
     """Write lines (M, 2) at the rims, flat indices (M,): (cos 2a, sin 2a), a the angle at which colours change the
     least; as long as they change across that line only, 0 where no way differs from others. Only a rim's own surface
-    counts, disparities that differ by one_surface at most, and nothing that is `mixed` (H, W).
+    counts: where the disparities `pure` (H, W), NaN for what is mixed, differ from the rim's by one_surface at most.
     """
-    height, width = mixed.shape
+    height, width = disparity.shape
     for i in range(len(rims)):
         y, x = rims[i] // width, rims[i] % width
         d = disparity[y, x]
-        # The structure tensor, summed over colours.
-        xx = xy = yy = 0.0
+        left, right = max(x - REACH_PX, 0), min(x + REACH_PX + 1, width - 1)
+        # The structure tensor, summed over colours, along the diagonals of 2 x 2 pixels: unlike steps to the right and
+        # down, those are of one place.
+        falls = both = rises = 0.0
         for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height - 1)):
-            for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width - 1)):
-                is_own = True
-                for j in range(2):
-                    for k in range(2):
-                        is_own &= not mixed[v + j, u + k] and abs(disparity[v + j, u + k] - d) <= one_surface
-                if not is_own:
-                    continue
-                for c in range(3):
-                    # Steps along both diagonals of 2 x 2 pixels: unlike those to the right and below, of one place.
-                    falling = colors[v + 1, u + 1, c] - colors[v, u, c]
-                    rising = colors[v, u + 1, c] - colors[v + 1, u, c]
-                    across, down = 0.5 * falling + 0.5 * rising, 0.5 * falling - 0.5 * rising
-                    xx, xy, yy = xx + across * across, xy + across * down, yy + down * down
-        # Its eigenvalues differ by sqrt((xx - yy)^2 + 4 xy^2); the line runs across the larger one's direction.
-        noise = 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2
-        lines[i, 0], lines[i, 1] = (yy - xx) / (xx + yy + noise), -2.0 * xy / (xx + yy + noise)
+            is_own = abs(pure[v, left] - d) <= one_surface and abs(pure[v + 1, left] - d) <= one_surface
+            for u in range(left, right):
+                was_own = is_own
+                is_own = abs(pure[v, u + 1] - d) <= one_surface and abs(pure[v + 1, u + 1] - d) <= one_surface
+                if was_own and is_own:
+                    for c in range(3):
+                        falling = colors[v + 1, u + 1, c] - colors[v, u, c]
+                        rising = colors[v, u + 1, c] - colors[v + 1, u, c]
+                        falls += falling * falling
+                        both += falling * rising
+                        rises += rising * rising
+        # Turned by 45 degrees, xx + yy = (falls + rises) / 2, yy - xx = -both, 4 xy = falls - rises. The eigenvalues
+        # differ by sqrt((xx - yy)^2 + 4 xy^2); the line runs across the larger one's direction.
+        total = 0.5 * (falls + rises) + 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2
+        lines[i, 0], lines[i, 1] = -both / total, 0.5 * (rises - falls) / total
 
 
 @kernel
