@@ -51,8 +51,10 @@ RELUCTANCE = 0.7
 """How much the map counts against them: share of the log odds of its being right where they are clear."""
 MOST_MISLED = 0.15
 """Where colours contradict the map beside steps, and a pixel farther in this share as often, they tell shade from
-light rather than surfaces.
+light rather than surfaces. ...
 """
+TALL_EDGES = 5.0
+"""... Then steps of more than so many least edges are judged alone: lower ones of noisy maps are no outlines."""
 ROUNDS, PASSES = 2, 12
 """Rims move by their width at most in a round; in each, so many passes of mean field (Kraehenbuehl and Koltun 2011)."""
 MOST_PIECE_PIXELS = 1 << 12
@@ -66,7 +68,7 @@ def choose_sides(
     unknown: (H, W), where the map says nothing by itself. Where colours do not tell surfaces apart, or tell shade from
     light only, it stays as it is. Raises Cancelled once should_stop is true.
     """
-    reluctance = None
+    reluctance, least_step = None, 0.0
     for _ in range(ROUNDS):
         distance = step_distance(values, least_edge)
         pixels = np.flatnonzero(distance <= RIM_PX)
@@ -80,11 +82,16 @@ def choose_sides(
         weighed = in_pieces(weigh, parts, should_stop, tiling.THREADS)
         other, evidence = (np.concatenate([pair[k] for pair in weighed]) for k in (0, 1))
         away, known = distance.reshape(-1)[pixels], ~unknown.reshape(-1)[pixels]
+        step = np.abs(other - values.reshape(-1)[pixels])
         if reluctance is None:
-            reluctance = _reluctance(evidence, away, known)
+            reluctance = _reluctance(evidence[known], away[known])
+        if reluctance is None:
+            least_step = TALL_EDGES * least_edge
+            is_tall = known & (step > least_step)
+            reluctance = _reluctance(evidence[is_tall], away[is_tall])
         if reluctance is None:
             return values
-        drive = evidence + np.where(known, reluctance[away], 0)
+        drive = np.where(step >= least_step, evidence + np.where(known, reluctance[away], 0), np.float32(np.inf))
         belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
         values = values.copy()
         values.reshape(-1)[pixels] = np.where(belief < 0.5, other, values.reshape(-1)[pixels])
@@ -105,11 +112,11 @@ def _mean_color_step(colors: FloatImage, pixels: NDArray[np.int64]) -> float:
     return max(float(np.sqrt(np.nanmean(np.square(steps, dtype=np.float64).sum(axis=1)))), 1e-3)
 
 
-def _reluctance(evidence: FloatImage, away: NDArray[np.uint8], known: NDArray[np.bool_]) -> FloatImage | None:
+def _reluctance(evidence: FloatImage, away: NDArray[np.uint8]) -> FloatImage | None:
     """(RIM_PX + 1): how much the map counts so far from a step, in log odds; None where colours mislead."""
     shares = np.empty(RIM_PX + 1)
     for k in range(RIM_PX + 1):
-        clear = evidence[(away == k) & known & (np.abs(evidence) > CLEAR)]
+        clear = evidence[(away == k) & (np.abs(evidence) > CLEAR)]
         shares[k] = (np.count_nonzero(clear < 0) + 1) / (len(clear) + 20)
     if shares[1] > MOST_MISLED * shares[0]:
         return None

@@ -82,7 +82,7 @@ def slow_pass(colors, values, other, drive, alike, believed):
 
 
 def slow_sides(colors, values, unknown):
-    reluctance = None
+    reluctance, only_tall = None, False
     for _ in range(rim_sides.ROUNDS):
         distance = slow_distance(values)
         rim = distance <= rim_sides.RIM_PX
@@ -92,8 +92,15 @@ def slow_sides(colors, values, unknown):
             weighed = slow_weigh(colors, values, unknown, distance, y, x, rim_sides.ALIKE * contrast)
             other[y, x], drive[y, x] = weighed
         if reluctance is None:
-            reluctance = rim_sides._reluctance(drive[rim], distance[rim], ~unknown[rim])
+            counted = rim & ~unknown
+            reluctance = rim_sides._reluctance(drive[counted], distance[counted])
+            if reluctance is None:
+                only_tall = True
+                counted &= np.abs(other - values) > rim_sides.TALL_EDGES * EDGE
+                reluctance = rim_sides._reluctance(drive[counted], distance[counted])
         drive[rim] += np.where(unknown[rim], 0, reluctance[distance[rim]])
+        if only_tall:
+            drive[np.abs(other - values) <= rim_sides.TALL_EDGES * EDGE] = np.inf
         belief = np.ones(values.shape)
         for _ in range(rim_sides.PASSES):
             belief = slow_pass(colors, values, other, drive, rim_sides.LIKE_NEIGHBOUR * contrast, belief)
@@ -113,6 +120,18 @@ def test_colours_that_contradict_the_map_inside_surfaces_change_nothing():
     photo, _, unknown, truth = shifted_square()
     shaded = np.roll(np.roll(photo, 3, axis=1), 3, axis=0)
     np.testing.assert_array_equal(choose_sides(shaded, truth, unknown, EDGE, never), truth)
+
+
+def test_outlines_are_mended_beside_low_steps_that_the_photo_contradicts():
+    """Patches of a noisy map, a little nearer than the wall, and shades that are elsewhere."""
+    photo, given, unknown, truth = (np.tile(a, (1, 2, 1)[: a.ndim]) for a in shifted_square())
+    given[:, 26:], truth[:, 26:] = FAR, FAR
+    given[6:20, 32:46] = truth[6:20, 32:46] = FAR + 2 * EDGE
+    photo[:, 26:] = np.roll(photo[:, 26:], 2, axis=0)
+    chosen = choose_sides(photo, given, unknown, EDGE, never)
+    assert (np.abs(chosen - truth) > 1).sum() <= 2
+    np.testing.assert_array_equal(chosen[:, 29:], given[:, 29:])
+    np.testing.assert_allclose(chosen, slow_sides(photo, given, unknown), atol=1e-4)
 
 
 def test_a_map_without_steps_stays_as_it_is():
