@@ -37,7 +37,7 @@ PARTS: dict[str, tuple[tuple[ModuleType, str], ...]] = {
     "rims": ((refining, "settle_rims"),),
     "mixed": ((view_synthesis, "split_mixed_pixels"),),
     "lines": ((background, "find_lines"), (background, "mixed_beside")),
-    "texture": ((background, "choose_places"), (background, "carry_texture")),
+    "texture": ((background, "copy_exemplars"),),
     "frame": ((view_synthesis, "extend_beyond_frame"),),
     "specks": (
         (view_synthesis, "measure_detail"),

@@ -13,10 +13,16 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, rims_of_holes
+from iibr_core.inpainting.exemplars import copy_exemplars
+from iibr_core.inpainting.nearest_known import (
+    MOST_PIECE_PIXELS,
+    flat_indices,
+    nearest_known,
+    number_holes,
+    rims_of_holes,
+)
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.inpainting.rim_lines import find_lines, line_weight, mixed_beside
-from iibr_core.inpainting.rim_texture import TILE_PX, carry_texture, choose_places, tile_rows_and_columns, tiles_of
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage, ViewOffset, image_size
@@ -133,16 +139,8 @@ def _fill_view(
     run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
     for step in steps:
         run(step, len(pixels))
-    tiles, place = tiles_of(pixels, image_size(hole)), np.empty(tile_rows_and_columns(image_size(hole)), np.int8)
-    run(
-        lambda part: choose_places(colors, disparity, hole, mixed, tiles[part], one_surface, place),
-        len(tiles), MOST_PIECE_PIXELS // TILE_PX**2,
-    )  # fmt: skip
-    run(
-        lambda part: carry_texture(colors, disparity, mixed, pixels[part], one_surface, place, changed[part]),
-        len(pixels),
-    )
-    run(lambda part: _add_texture(changed[part], pixels[part], colors), len(pixels))
+    number_holes(pixels, number)
+    copy_exemplars(colors, disparity, mixed, pixels, number, one_surface, should_stop, threads)
 
 
 def background_inpainter() -> Inpainter:
@@ -287,15 +285,6 @@ def _write_colors(smoothed, pixels, colors):
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = smoothed[i, 0], smoothed[i, 1], smoothed[i, 2]
-
-
-@kernel
-def _add_texture(texture, pixels, colors):
-    width = colors.shape[1]
-    for i in range(len(pixels)):
-        y, x = pixels[i] // width, pixels[i] % width
-        for c in range(3):
-            colors[y, x, c] = max(colors[y, x, c] + texture[i, c], 0.0)
 
 
 @kernel

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.rim_lines import find_lines, line_weight
-from iibr_core.inpainting.rim_texture import BINOMIAL
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, Margins, image_size
 
+BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
+"""Texture is what differs from a mean with these weights, each way."""
 SPREAD = 1.6
 """Colours at distance r are a mean with a standard deviation of 0.41 px times 2 to the power of this, times r."""
 TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0

@@ -60,6 +60,12 @@ def rims_of_holes(
     return rims, number
 
 
+def number_holes(pixels: NDArray[np.int64], number: NDArray[np.int32]) -> None:
+    """Write to number (H, W) which one of these pixels (N,) each of them is; -1 elsewhere."""
+    number[:] = -1
+    _number(pixels, number)
+
+
 @kernel
 def _number(pixels, number):
     """Tell each of these pixels which one it is."""

@@ -19,7 +19,7 @@ from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.rim_texture import MOST_TEXTURE
+from iibr_core.inpainting.exemplars import MOST_FINE
 from iibr_core.ray_transformer.inference import SHAPES, TrainedWeights
 from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE, AmbiguousRays
 from iibr_core.rendering.candidates import find_candidates
@@ -308,8 +308,8 @@ def test_a_hole_that_covers_the_whole_frame_border(tmp_path):
     colors, filled = np.where(hole[..., None], 0, photo.pixels), np.where(hole, 0, np.float32(1.0))
     fill_background(colors, filled, hole, np.ones_like(filled), ViewOffset(2.0, 2.0))
     inside = photo.pixels[~hole]
-    assert (colors >= inside.min(axis=0) - MOST_TEXTURE - 1e-6).all()
-    assert (colors <= inside.max(axis=0) + MOST_TEXTURE + 1e-6).all()
+    assert (colors >= inside.min(axis=0) - MOST_FINE - 1e-6).all()
+    assert (colors <= inside.max(axis=0) + MOST_FINE + 1e-6).all()
     assert filled == pytest.approx(1.0)
 
 

@@ -12,8 +12,8 @@ from iibr_core.inpainting.background import (
 )
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.inpainting.rim_lines import ANGLE_POWER, MIXED_PX, NOISE, REACH_PX, STRENGTH_POWER
-from iibr_core.inpainting.rim_texture import BINOMIAL, MISSING, MOST_TEXTURE, MULTIPLES, PART_PX, STEP_PX, TILE_PX
 from iibr_core.types import ViewOffset
+from tests.iibr_core.inpainting.test_exemplars import copy_slowly
 
 
 def own_surface(disparity, hole, pixel, one_surface):
@@ -44,44 +44,6 @@ def along_line(line, way):
     """How well a way (x, y) runs along it."""
     angle = np.arctan2(way[1], way[0]) - np.arctan2(line[1], line[0]) / 2
     return np.hypot(*line) ** STRENGTH_POWER * np.cos(angle) ** ANGLE_POWER
-
-
-def add_texture_slowly(colors, disparity, hole, mixed, one_surface):
-    """colors (H, W, 3) with the texture of each tile's place."""
-    textured, far = colors.copy(), MULTIPLES * STEP_PX
-    surfaces, impure = np.pad(disparity, far + 2), np.pad(mixed, far + 2, constant_values=True)
-    wide = np.pad(colors, [(far + 2, far + 2)] * 2 + [(0, 0)])
-    ways = [way * n * STEP_PX // np.abs(way).max() for n in range(1, MULTIPLES + 1) for way in DIRECTIONS]
-
-    def around(image, y, x, way):
-        return image[far + y + way[1] :, far + x + way[0] :][:5, :5]
-
-    def own_around(y, x, way):
-        return (np.abs(around(surfaces, y, x, way) - disparity[y, x]) <= one_surface) & ~around(impure, y, x, way)
-
-    def unlike(pixels, way):
-        parts, missing = {}, 0
-        for y, x in pixels:
-            if own_around(y, x, way)[2, 2]:
-                difference = around(wide, y, x, way)[2, 2] - colors[y, x]
-                parts.setdefault((y // PART_PX, x // PART_PX), []).append(difference)
-            else:
-                missing += MISSING
-        return missing + sum(np.abs(np.sum(part, axis=0)).sum() for part in parts.values())
-
-    tiles = {}
-    for y, x in np.argwhere(hole):
-        tiles.setdefault((y // TILE_PX, x // TILE_PX), []).append((y, x))
-    for pixels in tiles.values():
-        place = min(ways, key=lambda way, pixels=pixels: unlike(pixels, way))
-        for y, x in pixels if unlike(pixels, place) < MISSING * len(pixels) else []:
-            own = own_around(y, x, place)
-            if own[2, 2]:
-                there = around(wide, y, x, place)
-                texture = there[2, 2] - np.average(there[own], axis=0, weights=np.outer(BINOMIAL, BINOMIAL)[own])
-                texture *= min(MOST_TEXTURE / max(np.abs(texture).max(), 1e-9), 1)
-                textured[y, x] = np.maximum(colors[y, x] + texture, 0)
-    return textured
 
 
 def agree_slowly(disparity, hole):
@@ -145,7 +107,7 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     for step in SMOOTH_STEPS_PX:
         filled_colors = smooth_slowly(filled_colors, hole, reach, step)
     agreed = agree_slowly(filled_disparity, hole)
-    return add_texture_slowly(filled_colors, agreed, hole, mixed, one_surface), agreed
+    return copy_slowly(filled_colors, agreed, hole, mixed, one_surface), agreed
 
 
 @pytest.mark.parametrize("contrast", [1.0, 0.15])
@@ -237,8 +199,9 @@ def test_a_line_goes_on_straight():
     colors = np.where(hole[..., None], np.float32(0.5), truth)
     fill_background(colors, disparity, hole, disparity, ViewOffset(0.0, 1.0))
     found, expected = colors[:, 83, 0], truth[:, 83, 0]
-    assert abs(found.argmax() - expected.argmax()) <= 1
-    assert found.max() > 0.5
+    middle, true_middle = (np.flatnonzero(line > line.max() / 2).mean() for line in (found, expected))
+    assert abs(middle - true_middle) <= 1
+    assert found.max() > 0.6
     assert found[expected < 0.01].max() < 0.2
 
 

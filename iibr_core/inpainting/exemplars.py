@@ -1,0 +1,213 @@
+"""What was filled smoothly looks like its surface: patches of it are copied, from the rim inwards, each from the place
+around that looks most like what is there (Efros & Leung, 1999; Criminisi et al., 2004).
+
+Where a patch fits what is known it is taken as it is, so that lines go on; farther in, and where nothing fits, only its
+fine texture: nobody sees that the place of that is wrong. Content is only copied within one surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_pieces
+from iibr_core.types import FloatImage, ImageSize, image_size
+
+RADIUS_PX = 3
+"""Patches are 7 x 7 pixels."""
+SEARCH_PX, STEP_PX = 32, 4
+"""Places are looked for so far away each way, so far apart; then around the best."""
+GUESS = np.float32(0.3)
+"""What a pixel that is only filled smoothly counts when patches are compared; known and copied ones count 1."""
+MISSING = np.float32(0.1)
+"""Where a place does not show a pixel's surface, their colours count as this different, squared and summed."""
+FIT = np.float32(0.1)
+"""Patches that differ by this from what is known, root mean square, are hardly trusted."""
+MOST_FINE = np.float32(0.06)
+"""Larger differences are no texture: of them so much is copied where patches are not trusted."""
+LEAST_TRUST = np.float32(1e-6)
+"""In what was copied."""
+FINE_PX = 5
+"""Texture is what differs from the mean so far around."""
+BLOCK_PX = 64
+"""Blocks of this side are filled side by side; no two that touch."""
+
+
+def copy_exemplars(
+    colors: FloatImage,
+    disparity: FloatImage,
+    mixed: NDArray[np.bool_],
+    pixels: NDArray[np.int64],
+    number: NDArray[np.int32],
+    one_surface: float,
+    should_stop: ShouldStop,
+    threads: int,
+) -> None:
+    """Give the hole pixels, flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of their
+    surface. number (H, W): of each hole pixel among them, negative elsewhere. mixed (H, W): holes, and what may show no
+    surface purely. Surfaces are one whose disparities (H, W) differ by one_surface at most. Raises Cancelled once
+    should_stop is true.
+    """
+    smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
+    trust = np.zeros(len(pixels), np.float32)
+    for blocks in _blocks_apart(pixels, image_size(mixed)):
+        in_pieces(
+            lambda block: _copy_block(colors, disparity, mixed, number, *block, np.float32(one_surface), trust),
+            blocks, should_stop, threads,
+        )  # fmt: skip
+    change = np.take(colors.reshape(-1, 3), pixels, axis=0) - smooth
+    parts = [slice(first, first + BLOCK_PX**2) for first in range(0, len(pixels), BLOCK_PX**2)]
+    in_pieces(
+        lambda part: _settle(number, pixels, part.start, smooth, change, trust, colors), parts, should_stop, threads
+    )
+
+
+def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple[int, int]]]:
+    """Row and column of the blocks in which these pixels lie, in four lists of blocks that do not touch."""
+    columns = -(-size.width // BLOCK_PX)
+    y, x = np.divmod(pixels, size.width)
+    found = [divmod(int(block), columns) for block in np.unique(y // BLOCK_PX * columns + x // BLOCK_PX)]
+    return [
+        [block for block in found if (block[0] % 2, block[1] % 2) == odd] for odd in ((0, 0), (1, 1), (0, 1), (1, 0))
+    ]
+
+
+@kernel
+def _copy_block(colors, disparity, mixed, number, row, column, one_surface, trust):
+    """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet."""
+    height, width = mixed.shape
+    top, left = row * BLOCK_PX, column * BLOCK_PX
+    bottom, right = min(top + BLOCK_PX, height), min(left + BLOCK_PX, width)
+    queue, is_queued, end = np.empty(BLOCK_PX**2, np.int64), np.zeros((BLOCK_PX, BLOCK_PX), np.bool_), 0
+    # First those beside what is known of their surface, then what lies around each patch.
+    for y in range(top, bottom):
+        for x in range(left, right):
+            if number[y, x] < 0:
+                continue
+            for v, u in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
+                if 0 <= v < height and 0 <= u < width and not is_queued[y - top, x - left]:
+                    is_known = number[v, u] < 0 or trust[number[v, u]] > 0
+                    if is_known and abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                        queue[end], end = y * width + x, end + 1
+                        is_queued[y - top, x - left] = True
+    tap = np.empty(((2 * RADIUS_PX + 1) ** 2, 2), np.int64)
+    patch = np.empty((len(tap), 5), np.float32)
+    first = 0
+    while first < end:
+        y, x = queue[first] // width, queue[first] % width
+        first += 1
+        if trust[number[y, x]] > 0:
+            continue
+        taps, known_trust = _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
+        source_y, source_x, unlike = _find_place(colors, disparity, mixed, y, x, one_surface, tap[:taps], patch[:taps])
+        if source_y < 0:
+            continue
+        # How far in it is, and how well it fits there.
+        patch_trust = max(np.float32(known_trust / taps * np.exp(-unlike / FIT**2)), LEAST_TRUST)
+        for k in range(taps):
+            v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
+            i = number[v, u]
+            if i >= 0 and trust[i] == 0 and not mixed[a, b] and abs(disparity[a, b] - patch[k, 3]) <= one_surface:
+                colors[v, u] = colors[a, b]
+                trust[i] = patch_trust
+        for v in range(max(y - RADIUS_PX - 1, top), min(y + RADIUS_PX + 2, bottom)):
+            for u in range(max(x - RADIUS_PX - 1, left), min(x + RADIUS_PX + 2, right)):
+                if number[v, u] < 0 or trust[number[v, u]] > 0 or is_queued[v - top, u - left]:
+                    continue
+                if abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                    queue[end], end = v * width + u, end + 1
+                    is_queued[v - top, u - left] = True
+
+
+@kernel
+def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch):
+    """Write where a patch shows the surface of its middle, tap (M, 2), and what is there, patch (M, 5): colour,
+    disparity, what it counts. Returns M and the sum of its pixels' trust, which is 1 for known ones.
+    """
+    height, width = number.shape
+    taps, total = 0, np.float32(0.0)
+    for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
+        for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
+            if abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                i = number[v, u]
+                here = np.float32(1.0) if i < 0 else trust[i]
+                tap[taps, 0], tap[taps, 1] = v - y, u - x
+                patch[taps, 0], patch[taps, 1], patch[taps, 2] = colors[v, u, 0], colors[v, u, 1], colors[v, u, 2]
+                patch[taps, 3], patch[taps, 4] = disparity[v, u], np.float32(1.0) if here > 0 else GUESS
+                taps, total = taps + 1, total + here
+    return taps, total
+
+
+@kernel
+def _find_place(colors, disparity, mixed, y, x, one_surface, tap, patch):
+    """Where the surface looks most like a patch, row and column, -1 if it shows nowhere; and by how much that differs
+    from what is known, mean square.
+    """
+    height, width = mixed.shape
+    side, around = 2 * (SEARCH_PX // STEP_PX) + 1, 2 * STEP_PX - 1
+    best, best_y, best_x, middle_y, middle_x = np.float32(np.inf), -1, -1, -1, -1
+    for k in range(side**2 + around**2):
+        if k < side**2:
+            v, u = y + (k // side) * STEP_PX - SEARCH_PX, x + (k % side) * STEP_PX - SEARCH_PX
+            middle_y, middle_x = best_y, best_x
+        else:
+            j = k - side**2
+            v, u = middle_y + j // around - STEP_PX + 1, middle_x + j % around - STEP_PX + 1
+        if not (RADIUS_PX <= v < height - RADIUS_PX and RADIUS_PX <= u < width - RADIUS_PX) or mixed[v, u]:
+            continue
+        if abs(disparity[v, u] - disparity[y, x]) > one_surface:
+            continue
+        unlike = np.float32(0.0)
+        for m in range(len(tap)):
+            a, b = v + tap[m, 0], u + tap[m, 1]
+            if mixed[a, b] or abs(disparity[a, b] - patch[m, 3]) > one_surface:
+                unlike += patch[m, 4] * MISSING
+            else:
+                red, green = colors[a, b, 0] - patch[m, 0], colors[a, b, 1] - patch[m, 1]
+                blue = colors[a, b, 2] - patch[m, 2]
+                unlike += patch[m, 4] * (red * red + green * green + blue * blue)
+            # Given up once it is worse than the best.
+            if unlike >= best:
+                break
+        if unlike < best:
+            best, best_y, best_x = unlike, v, u
+    unlike, total = np.float32(0.0), 0
+    for m in range(len(tap)):
+        a, b = best_y + tap[m, 0], best_x + tap[m, 1]
+        if best_y >= 0 and patch[m, 4] == 1:
+            total += 1
+            if mixed[a, b] or abs(disparity[a, b] - patch[m, 3]) > one_surface:
+                unlike += MISSING
+            else:
+                for c in range(3):
+                    unlike += (colors[a, b, c] - patch[m, c]) ** 2
+    return best_y, best_x, unlike / max(total, 1)
+
+
+@kernel
+def _settle(number, pixels, first, smooth, change, trust, colors):
+    """Write up to BLOCK_PX^2 hole pixels, from `first` on: what was filled smoothly (N, 3), changed (N, 3) as far as it
+    is trusted (N,).
+    """
+    height, width = number.shape
+    mean, fine = np.empty(3, np.float32), np.empty(3, np.float32)
+    for i in range(first, min(first + BLOCK_PX**2, len(pixels))):
+        y, x = pixels[i] // width, pixels[i] % width
+        mean[:] = 0.0
+        total = 0
+        for v in range(max(y - FINE_PX, 0), min(y + FINE_PX + 1, height)):
+            for u in range(max(x - FINE_PX, 0), min(x + FINE_PX + 1, width)):
+                j = number[v, u]
+                if j >= 0:
+                    total += 1
+                    for c in range(3):
+                        mean[c] += change[j, c]
+        most = np.float32(0.0)
+        for c in range(3):
+            fine[c] = change[i, c] - mean[c] / total
+            most = max(most, abs(fine[c]))
+        scale, share = MOST_FINE / max(most, MOST_FINE), trust[i]
+        for c in range(3):
+            changed = share * change[i, c] + (1 - share) * scale * fine[c]
+            colors[y, x, c] = max(smooth[i, c] + changed, np.float32(0.0))
