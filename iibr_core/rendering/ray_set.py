@@ -29,6 +29,8 @@ SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
 IN_FRONT_PX = 1.0
 """What was made up is in front of what the photo shows if it parts from it by this much in the farthest view."""
+DOUBTED_PX = 4
+"""What was made up within so many pixels of that, each way, is no better: its slivers would fly about as crumbs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +96,8 @@ class RaySet:
         should_stop: ShouldStop = never,
     ) -> None:
         """Add the rays of one image (H, W), or of one view. All but the photo's, which come first, were made up: those
-        in front of what the photo shows are left out, as it would show them. Raises Cancelled once should_stop is true;
-        then nothing is added.
+        in front of what the photo shows are left out, as it would show them, and those beside them. Raises Cancelled
+        once should_stop is true; then nothing is added.
         """
         if image_size(disparity) != self.size:
             colors, disparity, coverage = (
@@ -107,7 +109,9 @@ class RaySet:
             self._joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
             self._steep = _any_in_cells(joined_either_way(joined))
         elif any(offset):
-            coverage = self._not_in_front(offset, disparity, coverage, should_stop)
+            step = IN_FRONT_PX / max(self._farthest_views, 1e-9)
+            coverage = coverage.copy()
+            _leave_out_in_front(disparity, self._disparity[0], self._margins, *offset, step, coverage)
 
         def band(first: int, last: int) -> None:
             rows = slice(first, last)
@@ -231,19 +235,6 @@ class RaySet:
             raise ValueError("these rays are no photo's: make them by rays_of_photo")
         return self._photo_detail
 
-    def _not_in_front(
-        self, offset: ViewOffset, disparity: FloatImage, coverage: FloatImage, should_stop: ShouldStop
-    ) -> FloatImage:
-        """The coverage (H, W) of rays seen from there, without those in front of what the photo shows."""
-        kept, step = np.empty_like(coverage, order="C"), IN_FRONT_PX / max(self._farthest_views, 1e-9)
-
-        def band(first: int, last: int) -> None:
-            kept[first:last] = coverage[first:last]
-            _leave_out_in_front(disparity, self._disparity[0], self._margins, *offset, step, first, last, kept)
-
-        in_bands(band, self.size, should_stop)
-        return kept
-
     def _with_margins(self, view: FloatImage, around: float) -> FloatImage:
         """A view (H, W, ...) as large as the images."""
         image = np.full((*self.size, *view.shape[2:]), around, np.float32)
@@ -258,18 +249,21 @@ def _any_in_cells(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 @kernel
-def _leave_out_in_front(disparity, photo_disparity, margins, t, s, step, first, last, coverage):
-    """Rows [first, last): no coverage for rays seen from (t, s) that lie more than a step in front of the photo's."""
+def _leave_out_in_front(disparity, photo_disparity, margins, t, s, step, coverage):
+    """No coverage for rays seen from (t, s) that lie more than a step in front of the photo's, or beside such a ray."""
     height, width = disparity.shape
     top, bottom, left, right = margins
-    for y in range(first, last):
+    made_up = coverage > 0
+    for y in range(height):
         for x in range(width):
-            if coverage[y, x] > 0:
+            if made_up[y, x]:
                 d = disparity[y, x]
                 # Only within its frame the photo shows anything.
                 v, u = nearest_pixel(y + d * t), nearest_pixel(x + d * s)
                 if top <= v < height - bottom and left <= u < width - right and d > photo_disparity[v, u] + step:
-                    coverage[y, x] = 0.0
+                    for j in range(max(y - DOUBTED_PX, 0), min(y + DOUBTED_PX + 1, height)):
+                        for i in range(max(x - DOUBTED_PX, 0), min(x + DOUBTED_PX + 1, width)):
+                            coverage[j, i] = 0.0
 
 
 @kernel

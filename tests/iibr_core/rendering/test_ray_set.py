@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.rendering.ray_set import CELL_PX, HIGHEST_LEVEL, IN_FRONT_PX, SMOOTH_SHARE, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, DOUBTED_PX, HIGHEST_LEVEL, IN_FRONT_PX, SMOOTH_SHARE, RaySet
 from iibr_core.types import ImageSize, Margins, ViewOffset
 
 SURFACE_STEP = 0.6
@@ -68,9 +68,9 @@ def test_in_nearer_views_larger_steps_are_those_of_one_surface():
 
 
 @pytest.mark.parametrize("margins", [Margins(), Margins(3, 2, 0, 4)])
-def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out(margins):
+def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_is_beside_it(margins):
     random, size, offset = np.random.default_rng(2), ImageSize(20, 24), ViewOffset(-2.0, 1.0)
-    photo, made_up = (random.uniform(-3, 3, size).astype(np.float32) for _ in range(2))
+    photo, made_up = (random.uniform(low, low + 6, size).astype(np.float32) for low in (1.3, -3))
     coverage, black = (random.random(size) > 0.3).astype(np.float32), np.zeros((*size, 3), np.float32)
     rays = RaySet(3, size, SURFACE_STEP, 2.0, margins)
     rays.add(ViewOffset(0.0, 0.0), black, photo, np.ones(size, np.float32))
@@ -82,7 +82,7 @@ def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out(margins):
         v, u = round(y + d * offset.t), round(x + d * offset.s)
         is_shown = v in range(margins.top, 20 - margins.bottom) and u in range(margins.left, 24 - margins.right)
         if is_shown and d > photo[v, u] + IN_FRONT_PX / 2.0:
-            expected[y, x] = 0
+            expected[max(y - DOUBTED_PX, 0) : y + DOUBTED_PX + 1, max(x - DOUBTED_PX, 0) : x + DOUBTED_PX + 1] = 0
     np.testing.assert_array_equal(rays.arrays[3], [np.ones(size), coverage, expected])
     np.testing.assert_array_equal(
         rays.cells.high[2], slow_cells(np.where(expected > 0, made_up, np.float32(-np.inf)), np.max)
