@@ -29,6 +29,8 @@ SMALL_WINDOW = 0, 0, 720, 800
 """x, y, width, height: high enough for most of the panel; a small picture, as each test waits for it to converge."""
 SCROLL_DOWN = 5
 """The button that the X server takes for a turn of the wheel."""
+FRAME_CORNERS = 8
+"""Of those that ImGui draws a frame with, inside and outside: more than that may be a line to the pointer."""
 DEADLINE_S = 120.0
 """For a condition that always comes true; generous, because the first run compiles the core."""
 
@@ -117,26 +119,43 @@ class Driver:
         return round(picture.x + x_share * picture.width), round(picture.y + y_share * picture.height)
 
     def find(self, widget: str, window: str = "panel") -> tuple[int, int]:
-        """Move the pointer down a window until it is over the widget of this ImGui name, and say where that is; where
-        nothing is found, scroll on.
+        """Move the pointer onto the widget of this ImGui name in a window, and say where that is; where it is not to be
+        seen, scroll down.
         """
         from imgui_bundle import imgui
 
         self.until(lambda app: imgui.internal.find_window_by_name(window) is not None)
         frame = imgui.internal.find_window_by_name(window)
         wanted = frame.get_id(widget)
-        while True:
-            for share in (0.7, 0.33, 0.5, 0.12, 0.9):
-                x = round(frame.pos.x + share * frame.size.x)
-                for y in range(round(frame.pos.y) + 8, round(frame.pos.y + frame.size.y), 8):
-                    self.send("mousemove", x, y)
-                    self.until(lambda app, y=y: imgui.get_io().mouse_pos.y == y)  # type: ignore[misc]
-                    if imgui.get_current_context().hovered_id == wanted:
-                        return x, y
+        while (place := self._place_of(wanted)) is None:
+            if self.app.wait_s == 0:  # what was sent before may still bring it
+                continue
             before = frame.scroll.y
             assert before < frame.scroll_max.y, f"no {widget} in {window}"
+            self.send("mousemove", round(frame.pos.x + frame.size.x / 2), round(frame.pos.y + frame.size.y / 2))
             self.send("click", "--repeat", 5, SCROLL_DOWN)
             self.until(lambda app, before=before: frame.scroll.y > before)  # type: ignore[misc]
+        self.send("mousemove", *place)
+        self.until(lambda app: imgui.get_current_context().hovered_id == wanted)
+        return place
+
+    def _place_of(self, widget: int) -> tuple[int, int] | None:
+        """The middle of the ImGui item of this id, around which ImGui draws a frame when asked; None where it is not to
+        be seen.
+        """
+        import glfw
+        from imgui_bundle import imgui
+
+        imgui.internal.debug_locate_item(widget)
+        glfw.post_empty_event()
+        self.app.step()
+        drawn = imgui.get_foreground_draw_list(imgui.get_main_viewport()).vtx_buffer
+        corners = [corner.pos for corner in drawn][:FRAME_CORNERS]
+        if not corners:
+            return None
+        left, right = (pick(corner.x for corner in corners) for pick in (min, max))
+        top, bottom = (pick(corner.y for corner in corners) for pick in (min, max))
+        return round((left + right) / 2), round((top + bottom) / 2)
 
     def press(self, widget: str, window: str = "panel") -> None:
         """Click a widget."""

@@ -74,9 +74,9 @@ SAVE_BUDGET_S = 0.025
 IDLE_WAIT_S = 1.0
 """Nothing is expected to happen unannounced; this only bounds the harm of a lost wake-up."""
 
-TOOLTIP_LOOK_S, TOOLTIP_LOOKS = 0.08, 6
-"""How often a pointer that rests on the panel is looked at: ImGui tells what it points at after 0.15 s, counted in
-frames, and needs one to measure the words.
+TOOLTIP_LOOK_S, TOOLTIP_S = 0.08, 0.5
+"""How often, and for how long, a pointer that rests on the panel is looked at: ImGui tells what it points at after
+0.15 s, counted in frames, and needs one to measure the words.
 """
 
 MOTION_FRAME_S = 1 / 60
@@ -155,7 +155,7 @@ class App:
         self._same_frames = 0
         self._is_busy = True
         self._pointer = NO_POINTER
-        self._pointer_rests = 0
+        self._pointer_moved_at = 0.0
 
     def run(self) -> None:
         """Show frames until the user quits."""
@@ -178,7 +178,8 @@ class App:
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
         self._ui.begin(layout, look, sum(self._took_s))
         self._pointer = pointer = read_pointer(self._pointer)
-        self._pointer_rests = 0 if pointer.step_x or pointer.step_y else self._pointer_rests + 1
+        if pointer.step_x or pointer.step_y:
+            self._pointer_moved_at = time.perf_counter()
         actions = gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
@@ -212,7 +213,7 @@ class App:
             return max(self._stepped_at + MOTION_FRAME_S - time.perf_counter(), 0.0)
         if self._is_busy or self._same_frames < SETTLING_FRAMES:
             return 0.0
-        if self._pointer.is_over_panel and self._pointer_rests < TOOLTIP_LOOKS:
+        if self._pointer.is_over_panel and time.perf_counter() - self._pointer_moved_at < TOOLTIP_S:
             return TOOLTIP_LOOK_S
         if self._gamepad is not None:
             return GAMEPAD_LOOK_S if self._gamepad.is_resting else 0.0
