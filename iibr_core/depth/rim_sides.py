@@ -98,10 +98,10 @@ def choose_sides(
     return values
 
 
-def step_distance(values: FloatImage, least_edge: float) -> NDArray[np.uint8]:
-    """(H, W): how many pixels lie between each and the nearest step larger than least_edge; at most RIM_PX + 1."""
-    distance = np.full(values.shape, RIM_PX + 1, np.uint8)
-    _measure_distance(values, least_edge, distance)
+def step_distance(values: FloatImage, least_edge: float, reach_px: int = RIM_PX) -> NDArray[np.uint8]:
+    """(H, W): how many pixels lie between each and the nearest step larger than least_edge; at most reach_px + 1."""
+    distance = np.full(values.shape, reach_px + 1, np.uint8)
+    _measure_distance(values, least_edge, reach_px, distance)
     return distance
 
 
@@ -145,7 +145,7 @@ def _mean_field(
 
 
 @kernel
-def _measure_distance(values, least_edge, distance):
+def _measure_distance(values, least_edge, reach, distance):
     """What `step_distance` returns, where that is less than distance (H, W) has."""
     height, width = values.shape
     for y in range(height):
@@ -153,8 +153,8 @@ def _measure_distance(values, least_edge, distance):
             for v, u in ((y, min(x + 1, width - 1)), (min(y + 1, height - 1), x)):
                 if not abs(values[v, u] - values[y, x]) > least_edge:
                     continue
-                for j in range(max(y - RIM_PX, 0), min(v + RIM_PX + 1, height)):
-                    for i in range(max(x - RIM_PX, 0), min(u + RIM_PX + 1, width)):
+                for j in range(max(y - reach, 0), min(v + reach + 1, height)):
+                    for i in range(max(x - reach, 0), min(u + reach + 1, width)):
                         away = np.uint8(max(y - j, j - v, x - i, i - u, 0))
                         distance[j, i] = min(distance[j, i], away)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.depth.crumbs import fill_crumbs
 from iibr_core.depth.rim_sides import RIM_PX, choose_sides, step_distance
+from iibr_core.depth.soft_outlines import widen_fronts
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -30,6 +31,8 @@ MOST_CLEAR_FELLOWS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_FELLOWS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
+OUTLINE_EDGES = 3.0
+"""Times the least edge: fronts that stand out by more have soft outlines."""
 CRUMB_EDGES = 2.0
 """Times the least edge: what stands off by less is a surface's noise."""
 CROWD_PX = 5
@@ -63,6 +66,7 @@ def settle_rims(
     elif np.count_nonzero(unknown & rim) <= least:
         return values
     values = choose_sides(colors, values, between | unknown, least_edge, should_stop)
+    values = widen_fronts(colors, values, OUTLINE_EDGES * least_edge, should_stop)
     return fill_crumbs(colors, values, CRUMB_EDGES * least_edge, should_stop)
 
 

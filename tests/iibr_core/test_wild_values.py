@@ -26,6 +26,7 @@ from iibr_core.depth import (
     rims,
     scaling,
     search,
+    soft_outlines,
     subject,
 )
 from iibr_core.depth.choice import DepthChoice
@@ -340,6 +341,10 @@ FINITE = {
         rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
     ],
     "depth.rim_sides.step_distance": lambda v, _: rim_sides.step_distance(depths(v), 0.5),
+    "depth.soft_outlines.widen_fronts": lambda v, _: [
+        soft_outlines.widen_fronts(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
+        soft_outlines.widen_fronts(image(v), mixed_between_surfaces(), 0.5, never),
+    ],
     "depth.rim_sides.choose_sides": lambda v, _: [
         rim_sides.choose_sides(scene()[0].pixels, np.nan_to_num(known(v)), np.isnan(known(v)), 0.5, never),
         rim_sides.choose_sides(image(v), mixed_between_surfaces(), np.ones(SIZE, np.bool_), 0.5, never),
