@@ -112,8 +112,8 @@ def _fill_view(
     pixels = flat_indices(hole, should_stop, threads)
     known = nearest_known(hole, pixels, should_stop, threads)
     rims, number = rims_of_holes(known, image_size(hole), should_stop, threads)
-    mixed, lines = mixed_beside(hole), np.empty((len(rims), 2), np.float32)
-    pure = np.where(mixed, np.float32(np.nan), disparity)
+    pure = np.where(mixed_beside(hole), np.float32(np.nan), disparity)
+    lines = np.empty((len(rims), 2), np.float32)
     reach = np.empty(len(pixels), np.float32)
     changed = np.empty((len(pixels), 3), np.float32)
 
@@ -140,7 +140,7 @@ def _fill_view(
     for step in steps:
         run(step, len(pixels))
     number_holes(pixels, number)
-    copy_exemplars(colors, disparity, mixed, pixels, number, one_surface, should_stop, threads)
+    copy_exemplars(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
 
 
 def background_inpainter() -> Inpainter:

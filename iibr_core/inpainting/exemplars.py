@@ -37,7 +37,7 @@ BLOCK_PX = 64
 def copy_exemplars(
     colors: FloatImage,
     disparity: FloatImage,
-    mixed: NDArray[np.bool_],
+    pure: FloatImage,
     pixels: NDArray[np.int64],
     number: NDArray[np.int32],
     one_surface: float,
@@ -45,15 +45,15 @@ def copy_exemplars(
     threads: int,
 ) -> None:
     """Give the hole pixels, flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of their
-    surface. number (H, W): of each hole pixel among them, negative elsewhere. mixed (H, W): holes, and what may show no
-    surface purely. Surfaces are one whose disparities (H, W) differ by one_surface at most. Raises Cancelled once
-    should_stop is true.
+    surface. number (H, W): of each hole pixel among them, negative elsewhere. pure (H, W): disparities, NaN in holes
+    and where no surface may show purely. Surfaces are one whose disparities (H, W) differ by one_surface at most.
+    Raises Cancelled once should_stop is true.
     """
     smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
     trust = np.zeros(len(pixels), np.float32)
-    for blocks in _blocks_apart(pixels, image_size(mixed)):
+    for blocks in _blocks_apart(pixels, image_size(pure)):
         in_pieces(
-            lambda block: _copy_block(colors, disparity, mixed, number, *block, np.float32(one_surface), trust),
+            lambda block: _copy_block(colors, disparity, pure, number, *block, np.float32(one_surface), trust),
             blocks, should_stop, threads,
         )  # fmt: skip
     change = np.take(colors.reshape(-1, 3), pixels, axis=0) - smooth
@@ -74,9 +74,9 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
 
 
 @kernel
-def _copy_block(colors, disparity, mixed, number, row, column, one_surface, trust):
+def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust):
     """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet."""
-    height, width = mixed.shape
+    height, width = number.shape
     top, left = row * BLOCK_PX, column * BLOCK_PX
     bottom, right = min(top + BLOCK_PX, height), min(left + BLOCK_PX, width)
     queue, is_queued, end = np.empty(BLOCK_PX**2, np.int64), np.zeros((BLOCK_PX, BLOCK_PX), np.bool_), 0
@@ -100,7 +100,7 @@ def _copy_block(colors, disparity, mixed, number, row, column, one_surface, trus
         if trust[number[y, x]] > 0:
             continue
         taps, known_trust = _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
-        source_y, source_x, unlike = _find_place(colors, disparity, mixed, y, x, one_surface, tap[:taps], patch[:taps])
+        source_y, source_x, unlike = _find_place(colors, disparity, pure, y, x, one_surface, tap[:taps], patch[:taps])
         if source_y < 0:
             continue
         # How far in it is, and how well it fits there.
@@ -108,7 +108,7 @@ def _copy_block(colors, disparity, mixed, number, row, column, one_surface, trus
         for k in range(taps):
             v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
             i = number[v, u]
-            if i >= 0 and trust[i] == 0 and not mixed[a, b] and abs(disparity[a, b] - patch[k, 3]) <= one_surface:
+            if i >= 0 and trust[i] == 0 and abs(pure[a, b] - patch[k, 3]) <= one_surface:
                 colors[v, u] = colors[a, b]
                 trust[i] = patch_trust
         for v in range(max(y - RADIUS_PX - 1, top), min(y + RADIUS_PX + 2, bottom)):
@@ -140,11 +140,11 @@ def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
 
 
 @kernel
-def _find_place(colors, disparity, mixed, y, x, one_surface, tap, patch):
+def _find_place(colors, disparity, pure, y, x, one_surface, tap, patch):
     """Where the surface looks most like a patch, row and column, -1 if it shows nowhere; and by how much that differs
     from what is known, mean square.
     """
-    height, width = mixed.shape
+    height, width = pure.shape
     side, around = 2 * (SEARCH_PX // STEP_PX) + 1, 2 * STEP_PX - 1
     best, best_y, best_x, middle_y, middle_x = np.float32(np.inf), -1, -1, -1, -1
     for k in range(side**2 + around**2):
@@ -154,19 +154,20 @@ def _find_place(colors, disparity, mixed, y, x, one_surface, tap, patch):
         else:
             j = k - side**2
             v, u = middle_y + j // around - STEP_PX + 1, middle_x + j % around - STEP_PX + 1
-        if not (RADIUS_PX <= v < height - RADIUS_PX and RADIUS_PX <= u < width - RADIUS_PX) or mixed[v, u]:
+        if not (RADIUS_PX <= v < height - RADIUS_PX and RADIUS_PX <= u < width - RADIUS_PX):
             continue
-        if abs(disparity[v, u] - disparity[y, x]) > one_surface:
+        if not abs(pure[v, u] - disparity[y, x]) <= one_surface:
             continue
         unlike = np.float32(0.0)
         for m in range(len(tap)):
-            a, b = v + tap[m, 0], u + tap[m, 1]
-            if mixed[a, b] or abs(disparity[a, b] - patch[m, 3]) > one_surface:
-                unlike += patch[m, 4] * MISSING
-            else:
+            # Within the frame: unsigned indices need no test for counting from the end.
+            a, b = np.uint64(v + tap[m, 0]), np.uint64(u + tap[m, 1])
+            if abs(pure[a, b] - patch[m, 3]) <= one_surface:
                 red, green = colors[a, b, 0] - patch[m, 0], colors[a, b, 1] - patch[m, 1]
                 blue = colors[a, b, 2] - patch[m, 2]
                 unlike += patch[m, 4] * (red * red + green * green + blue * blue)
+            else:
+                unlike += patch[m, 4] * MISSING
             # Given up once it is worse than the best.
             if unlike >= best:
                 break
@@ -177,11 +178,11 @@ def _find_place(colors, disparity, mixed, y, x, one_surface, tap, patch):
         a, b = best_y + tap[m, 0], best_x + tap[m, 1]
         if best_y >= 0 and patch[m, 4] == 1:
             total += 1
-            if mixed[a, b] or abs(disparity[a, b] - patch[m, 3]) > one_surface:
-                unlike += MISSING
-            else:
+            if abs(pure[a, b] - patch[m, 3]) <= one_surface:
                 for c in range(3):
                     unlike += (colors[a, b, c] - patch[m, c]) ** 2
+            else:
+                unlike += MISSING
     return best_y, best_x, unlike / max(total, 1)
 
 

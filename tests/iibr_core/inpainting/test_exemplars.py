@@ -100,7 +100,8 @@ def copied(smooth, disparity, hole, mixed, should_stop=never, threads=2):
     colors, number = smooth.copy(), np.empty(hole.shape, np.int32)
     pixels = np.flatnonzero(hole)
     number_holes(pixels, number)
-    copy_exemplars(colors, disparity, mixed, pixels, number, ONE_SURFACE, should_stop, threads)
+    pure = np.where(mixed, np.float32(np.nan), disparity)
+    copy_exemplars(colors, disparity, pure, pixels, number, ONE_SURFACE, should_stop, threads)
     return colors
 
 
