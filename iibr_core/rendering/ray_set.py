@@ -29,7 +29,7 @@ SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
 IN_FRONT_PX = 1.0
 """What was made up is in front of what the photo shows if it parts from it by this much in the farthest view."""
-DOUBTED_PX = 4
+DOUBTED_PX = 2
 """What was made up within so many pixels of that, each way, is no better: its slivers would fly about as crumbs."""
 
 
