@@ -53,8 +53,9 @@ def find_lines(colors, disparity, pure, rims, one_surface, lines):
                 is_own = abs(pure[v, u + 1] - d) <= one_surface and abs(pure[v + 1, u + 1] - d) <= one_surface
                 if was_own and is_own:
                     for c in range(3):
-                        falling = colors[v + 1, u + 1, c] - colors[v, u, c]
-                        rising = colors[v, u + 1, c] - colors[v + 1, u, c]
+                        # Squares of huge colours are beyond single precision.
+                        falling = np.float64(colors[v + 1, u + 1, c] - colors[v, u, c])
+                        rising = np.float64(colors[v, u + 1, c] - colors[v + 1, u, c])
                         falls += falling * falling
                         both += falling * rising
                         rises += rising * rising
