@@ -99,12 +99,12 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
         first += 1
         if trust[number[y, x]] > 0:
             continue
-        taps, known_trust = _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
+        taps, trusted = _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
         source_y, source_x, unlike = _find_place(colors, disparity, pure, y, x, one_surface, tap[:taps], patch[:taps])
         if source_y < 0:
             continue
-        # How far in it is, and how well it fits there.
-        patch_trust = max(np.float32(known_trust / taps * np.exp(-unlike / FIT**2)), LEAST_TRUST)
+        # As much as what it goes on from, and less where it does not fit that.
+        patch_trust = max(np.float32(trusted * np.exp(-unlike / FIT**2)), LEAST_TRUST)
         for k in range(taps):
             v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
             i = number[v, u]
@@ -123,10 +123,10 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
 @kernel
 def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch):
     """Write where a patch shows the surface of its middle, tap (M, 2), and what is there, patch (M, 5): colour,
-    disparity, what it counts. Returns M and the sum of its pixels' trust, which is 1 for known ones.
+    disparity, what it counts. Returns M and the mean trust of what is there, which is 1 where it is known.
     """
     height, width = number.shape
-    taps, total = 0, np.float32(0.0)
+    taps, there, total = 0, 0, np.float32(0.0)
     for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
         for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
             if abs(disparity[v, u] - disparity[y, x]) <= one_surface:
@@ -135,8 +135,8 @@ def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
                 tap[taps, 0], tap[taps, 1] = v - y, u - x
                 patch[taps, 0], patch[taps, 1], patch[taps, 2] = colors[v, u, 0], colors[v, u, 1], colors[v, u, 2]
                 patch[taps, 3], patch[taps, 4] = disparity[v, u], np.float32(1.0) if here > 0 else GUESS
-                taps, total = taps + 1, total + here
-    return taps, total
+                taps, there, total = taps + 1, there + (here > 0), total + here
+    return taps, total / max(there, 1)
 
 
 @kernel
