@@ -18,13 +18,13 @@ RADIUS_PX = 3
 """Patches are 7 x 7 pixels."""
 SEARCH_PX, STEP_PX = 32, 4
 """Places are looked for so far away each way, so far apart; then around the best."""
-GUESS = np.float32(0.3)
+GUESS = np.float32(0.6)
 """What a pixel that is only filled smoothly counts when patches are compared; known and copied ones count 1."""
 MISSING = np.float32(0.1)
 """Where a place does not show a pixel's surface, their colours count as this different, squared and summed."""
 FIT = np.float32(0.1)
 """Patches that differ by this from what is known, root mean square, are hardly trusted."""
-MOST_FINE = np.float32(0.06)
+MOST_FINE = np.float32(0.05)
 """Larger differences are no texture: of them so much is copied where patches are not trusted."""
 LEAST_TRUST = np.float32(1e-6)
 """In what was copied."""
