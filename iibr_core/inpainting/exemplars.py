@@ -135,7 +135,7 @@ def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
                 tap[taps, 0], tap[taps, 1] = v - y, u - x
                 patch[taps, 0], patch[taps, 1], patch[taps, 2] = colors[v, u, 0], colors[v, u, 1], colors[v, u, 2]
                 patch[taps, 3], patch[taps, 4] = disparity[v, u], np.float32(1.0) if here > 0 else GUESS
-                taps, there, total = taps + 1, there + (here > 0), total + here
+                taps, there, total = taps + 1, there + (1 if here > 0 else 0), total + here
     return taps, total / max(there, 1)
 
 
