@@ -72,6 +72,7 @@ def train_weights(
     )
     command = shlex.join(["iibr", *sys.argv[1:]])
     published = shown_name(command.replace(str(out), out.name))  # the folder is nobody's business
+    torch.set_num_threads(1)  # batches are small: more threads mostly wait for each other, and spin meanwhile
     torch.manual_seed(seed)
     model = RayTransformer()
 

@@ -36,13 +36,17 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, step: int) -> None:
 def test_three_steps_write_weights_that_say_where_they_come_from(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
+    import torch
+
     from iibr_core.formats.weights import load_weights
     from iibr_core.ray_transformer.model import RayTransformer
 
+    torch.set_num_threads(2)
     out = tmp_path / "w.safetensors"
     assert run(monkeypatch, *WORDS, "--steps", 3, "--out", out) == 0
     assert capsys.readouterr().out == f"{out}: {out.stat().st_size / 1000:.1f} kB after 3 steps\n"
     assert names(tmp_path) == WRITTEN
+    assert torch.get_num_threads() == 1, "several wait for each other"
     expected = f"iibr train --device cpu --seed 3 --steps 3 --out {out.name}"
     assert load_weights(out, RayTransformer())["command"] == expected
     assert len((tmp_path / "w.csv").read_text().splitlines()) == 4
