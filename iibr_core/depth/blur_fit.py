@@ -1,8 +1,8 @@
 """A sharpened map, blurred again, should give the map that it was made of: where it does not, its edges move.
 
-Colours alone leave outlines ragged where both sides are textured, and what lies beside an edge keeps some of the other
-side's height (a halo). Both show in what the blurred map misses. Where maps and photo contradict each other, so that
-no outline satisfies both, or where the map was made soft in some other way than by this blur, nothing changes.
+Colours alone leave outlines ragged where both sides are textured: what the blurred map misses shows it. Where maps and
+photo contradict each other, so that no outline satisfies both, or where the map was made soft in some other way than by
+this blur, nothing changes.
 """
 
 from __future__ import annotations
@@ -19,9 +19,8 @@ REACH_SIGMAS = 3.0
 """Where a Gaussian ends."""
 WIDEST_SIGMA_PX = 4.5
 """Work grows with the blur's area: wider ones stay as they are."""
-ROUNDS = 2
-SWEEPS = 2
-"""Of moving edges, in each round."""
+SWEEPS = 4
+"""Of moving edges."""
 STIRRED_PX = 2
 """Beside a pixel that moved, so far around, the next sweep looks again."""
 COLOR_WEIGHT = 6.0
@@ -34,21 +33,9 @@ COLOR_NOISE = 0.003
 """Squared distance of colours (sRGB-encoded) that tells nothing."""
 SAME_SIDE = 0.3
 """Of the step, up to which a height is that side's."""
-CLEAN = np.float32(0.85)
-"""A pixel of whose blur a smaller share comes from its own surface tells nothing of that surface's height."""
-MOSTLY_CLEAN = np.float32(0.95)
-"""From this share on, a pixel's own height counts, too."""
-SLOPE_DAMPING = 0.1
-"""Squared sigmas, added to the spread of clean pixels."""
-SURFACE_EDGES = 6.0
-"""Times the least edge: heights within it may be one surface's."""
 MOVED_EDGES = 2.0
 """Times the least edge: lower steps stay where they are."""
-LATTICES = ((1, 0), (2, 1), (5, 2), (8, 3), (10, 3))
-"""Of pixels that stand for all of them: every n-th of a row, shifted by so many from row to row."""
-LATTICE_SIGMAS = 0.8
-"""Their spacing, the root of n, is at most that: then a Gaussian has the same means over them."""
-MOST_MISFIT = 0.1
+MOST_MISFIT = 0.09
 """Of the fitted map, blurred again, from the given map, relative to what the blur changed (rms of a cell)."""
 
 
@@ -60,7 +47,7 @@ def fit_to_blur(
     least_edge: float,
     should_stop: ShouldStop = never,
 ) -> FloatImage:
-    """The map `sharp` (H, W) with its edges moved and halos lowered so that, blurred, it gives `values` (H, W).
+    """The map `sharp` (H, W) with its edges moved so that, blurred, it gives `values` (H, W).
 
     photo: (H, W, 3), sRGB-encoded; it counts, too, in where an edge lies. least_edge: the step that counts as one.
     Cells in which no such map is found keep their bits. Raises Cancelled once should_stop is true.
@@ -68,44 +55,22 @@ def fit_to_blur(
     taps, reach = _taps(blur)
     if not reach.any():
         return sharp
-    cells, lattices = (taps, reach, blur.cell_px), (*_lattices(blur, reach), blur.cell_px)
-    surface, margin = np.float32(SURFACE_EDGES * least_edge), int(reach.max())
-    size, cell_rows = image_size(values), ImageSize(len(reach), blur.cell_px * values.shape[1])
-    fitted = sharp.copy()
-    near, clean, missing = np.zeros(sharp.shape, np.bool_), np.ones_like(sharp), np.zeros_like(sharp)
-
-    def mark(first: int, last: int) -> None:
-        _mark_near_edges(sharp, reach, blur.cell_px, surface, first, last, near)
+    cells, width = (taps, reach, blur.cell_px), values.shape[1]
+    fitted, missing, settled = sharp.copy(), np.zeros_like(sharp), np.zeros(sharp.shape, np.bool_)
 
     def find_missing(first: int, last: int) -> None:
         _find_missing(values, fitted, *cells, first, last, missing)
 
-    def find_clean(first: int, last: int) -> None:
-        _find_clean(wide, near, *lattices, surface, first, last, clean)
-
-    def lower(first: int, last: int) -> None:
-        _lower_halos(wide, wide_missing, wide_clean, near, *lattices, blur.sigma_px, surface, first, last, fitted)
-
     def move(first: int, last: int) -> None:
         _move_edges(photo, fitted, missing, *cells, MOVED_EDGES * least_edge, first, last, settled)
 
-    in_bands(mark, size, should_stop)
-    near &= _at_pixels(reach > 0, blur, size)
-    in_bands(find_missing, cell_rows, should_stop)
-    for _ in range(ROUNDS):
-        wide = np.pad(fitted, margin, mode="edge")
-        in_bands(find_clean, size, should_stop)
-        # What lies outside tells nothing.
-        wide_missing, wide_clean = np.pad(missing, margin), np.pad(clean, margin)
-        in_bands(lower, size, should_stop)
-        in_bands(find_missing, cell_rows, should_stop)
-        settled = np.zeros_like(near)
-        for _ in range(SWEEPS):
-            # One band after the other: each move sees what those before it left missing.
-            in_bands(move, size, should_stop, threads=1)
+    in_bands(find_missing, ImageSize(len(reach), blur.cell_px * width), should_stop)
+    for _ in range(SWEEPS):
+        # One band after the other: each move sees what those before it left missing.
+        in_bands(move, image_size(values), should_stop, threads=1)
     changed, misfit = _cell_squares(values - fitted, blur), _cell_squares(missing, blur)
     found = np.isfinite(misfit) & (misfit <= MOST_MISFIT**2 * changed)
-    return np.where(_at_pixels(found, blur, size), fitted, sharp)
+    return np.where(_at_pixels(found, blur, image_size(values)), fitted, sharp)
 
 
 def _taps(blur: EdgeBlur) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
@@ -116,27 +81,6 @@ def _taps(blur: EdgeBlur) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     sigma = np.maximum(blur.sigma_px, 1e-3)[..., None]
     taps = np.where(apart <= reach[..., None], np.exp(-0.5 * (apart / sigma) ** 2), 0.0)
     return (taps / taps.sum(axis=2, keepdims=True)).astype(np.float32), reach
-
-
-def _lattices(blur: EdgeBlur, reach: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Of each cell (M, N): pixels (M, N, K, 2) that stand for those its blur reaches; weights (M, N, K), sums are 1.
-
-    Pixels, down and across, are counted from the corner of what the widest blur reaches.
-    """
-    down, across = np.mgrid[-reach.max() : reach.max() + 1, -reach.max() : reach.max() + 1]
-    apart = down**2 + across**2
-    points, weights = [], []
-    for sigma in np.where(reach > 0, blur.sigma_px, 0).flat:
-        nth, shift = [lattice for lattice in LATTICES if lattice[0] <= max((LATTICE_SIGMAS * sigma) ** 2, 1)][-1]
-        is_on = (apart <= (REACH_SIGMAS * sigma) ** 2) & ((across - shift * down) % nth == 0)
-        weight = np.exp(-0.5 * apart[is_on] / max(sigma, 1e-3) ** 2)
-        points.append(np.argwhere(is_on))
-        weights.append(weight / weight.sum())
-    most = max(map(len, points))
-    # Those of narrow blurs are followed by pixels of no weight.
-    pixels = np.array([np.pad(at, ((0, most - len(at)), (0, 0))) for at in points])
-    shares = np.array([np.pad(weight, (0, most - len(weight))) for weight in weights], np.float32)
-    return pixels.reshape(*reach.shape, most, 2), shares.reshape(*reach.shape, most)
 
 
 def _at_pixels(cells: NDArray[np.bool_], blur: EdgeBlur, size: ImageSize) -> NDArray[np.bool_]:
@@ -182,75 +126,6 @@ def _find_missing(values, fitted, taps, reach, cell, first, last, missing):
 def _add(factor, values, total):
     for x in range(len(total)):
         total[x] += factor * values[x]
-
-
-@kernel
-def _mark_near_edges(sharp, reach, cell, step, first, last, near):
-    """Mark what the blur of edges between these rows and those below them reaches."""
-    height, width = sharp.shape
-    for y in range(first, last):
-        for x in range(width):
-            far = reach[y // cell, x // cell]
-            right, below = sharp[y, min(x + 1, width - 1)], sharp[min(y + 1, height - 1), x]
-            if far > 0 and max(abs(right - sharp[y, x]), abs(below - sharp[y, x])) >= step:
-                near[max(y - far, 0) : y + far + 2, max(x - far, 0) : x + far + 2] = True
-
-
-@kernel
-def _find_clean(wide, near, pixels, weights, cell, surface, first, last, clean):
-    """Rows [first, last): how much of a pixel's blur comes from heights within `surface` of its own, 0..1.
-
-    wide: the fitted map with a margin as wide as any blur reaches, of its border's pixels.
-    """
-    margin = (wide.shape[0] - near.shape[0]) // 2
-    for y in range(first, last):
-        for x in range(near.shape[1]):
-            if not near[y, x]:
-                continue
-            row, column, here, total = y // cell, x // cell, wide[y + margin, x + margin], np.float32(0.0)
-            for k in range(weights.shape[2]):
-                value = wide[y + pixels[row, column, k, 0], x + pixels[row, column, k, 1]]
-                total += weights[row, column, k] if abs(value - here) < surface else np.float32(0.0)
-            clean[y, x] = total
-
-
-@kernel
-def _lower_halos(wide, missing, clean, near, pixels, weights, cell, sigmas, surface, first, last, lowered):
-    """Rows [first, last): what the blur left of the other side's height beside an edge is taken off.
-
-    Clean pixels of the same surface tell it; under the edge itself, their plane goes on. Nothing is added: round
-    things bend away from the view at their outlines, as if something were missing there. wide, missing, clean: with
-    a margin, which is not clean.
-    """
-    margin = (wide.shape[0] - near.shape[0]) // 2
-    for y in range(first, last):
-        for x in range(near.shape[1]):
-            if not near[y, x]:
-                continue
-            row, column, here = y // cell, x // cell, wide[y + margin, x + margin]
-            # Where the pixel itself is clean, only what is missing there is levelled out, and its own detail stays.
-            is_clean = clean[y + margin, x + margin] > MOSTLY_CLEAN
-            # Least squares for level + across * i + down * j.
-            n = i1 = j1 = ii = jj = ij = p0 = pi = pj = np.float32(0.0)
-            for k in range(weights.shape[2]):
-                v, u = y + pixels[row, column, k, 0], x + pixels[row, column, k, 1]
-                if clean[v, u] > CLEAN and abs(wide[v, u] - here) < surface:
-                    i, j = np.float32(u - x - margin), np.float32(v - y - margin)
-                    weight = weights[row, column, k] * (clean[v, u] - CLEAN)
-                    value = missing[v, u] + (np.float32(0.0) if is_clean else wide[v, u] - here)
-                    n, i1, j1, p0 = n + weight, i1 + weight * i, j1 + weight * j, p0 + weight * value
-                    ii, jj, ij = ii + weight * i * i, jj + weight * j * j, ij + weight * i * j
-                    pi, pj = pi + weight * i * value, pj + weight * j * value
-            if not n > 0:
-                continue
-            i1, j1, p0 = i1 / n, j1 / n, p0 / n
-            # Few pixels on a line tell no slope across it.
-            damping = SLOPE_DAMPING * sigmas[row, column] ** 2
-            ii, jj, ij = ii / n - i1 * i1 + damping, jj / n - j1 * j1 + damping, ij / n - i1 * j1
-            pi, pj = pi / n - i1 * p0, pj / n - j1 * p0
-            area = ii * jj - ij * ij
-            level = p0 - i1 * (pi * jj - pj * ij) / area - j1 * (pj * ii - pi * ij) / area
-            lowered[y, x] = here + min(level, 0.0)
 
 
 @kernel

@@ -6,7 +6,7 @@ makes of a step or of something thin are changed, so exact maps, slanted and cur
 
 from __future__ import annotations
 
-from math import ceil, floor, sqrt
+from math import ceil, erfc, floor, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,13 @@ EXTENSION = 0.7
 """How far the plateaus' own slopes are continued under the ramp: 1 = all the way."""
 MOST_EXTENSION = 0.05
 """Limit on those slopes, relative to the ramp's steepest."""
+TAIL_SIGMAS = 3.0
+"""From a step's middle to where its blur ends: what the map rises up to there is the step's, within what a Gaussian
+leaves there."""
+MOST_TAIL = 0.2
+"""Of a step: its middle is only known to a part of a pixel."""
+BEND = 2.0
+"""How much faster than beyond its blur a surface bends away from the view at the edge itself: round things do."""
 STEPS_A_SIGMA = 2.5
 """Ramps are walked in steps so fine, or of a pixel."""
 REACH_SIGMAS = 5.0
@@ -77,13 +84,13 @@ def refine(
     if strength == 0:
         return values
     least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
-    values = _sharpen(colors, values, least_edge, softness, should_stop)
+    sharp = _sharpen(colors, values, least_edge, softness, should_stop)
     if not least_edge > 0:
-        return values
+        return sharp
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
-    settled = settle_rims(colors, values, least_edge, filled, should_stop)
+    settled = settle_rims(colors, sharp, least_edge, filled, sharp is not values, should_stop)
     # Rims, too, go so far only.
-    return settled if strength == 1 else values + np.float32(strength) * (settled - values)
+    return settled if strength == 1 else sharp + np.float32(strength) * (settled - sharp)
 
 
 def _sharpen(
@@ -116,6 +123,20 @@ def _continue_plateau(values, x, y, across, down, length, level, limit):
     far = length + 2
     slope = (height_at(values, x + across * far, y + down * far) - level) / 2
     return level - EXTENSION * length * min(max(slope, -limit), limit)
+
+
+@kernel
+def _beyond_blur(values, x, y, across, down, far, sigma, limit):
+    """The height at (x, y) of a plateau, from where the blur of its edge ends, `far` away, and its slope there."""
+    level = height_at(values, x + across * far, y + down * far)
+    slope = (height_at(values, x + across * (far + sigma), y + down * (far + sigma)) - level) / sigma
+    return level - BEND * far * min(max(slope, -limit), limit)
+
+
+@kernel
+def _tail(far, sigma):
+    """Share of a step, blurred by sigma, that is not reached yet so far from its middle."""
+    return min(0.5 * erfc(far / (sqrt(2.0) * sigma)), MOST_TAIL)
 
 
 @kernel
@@ -224,7 +245,7 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
     if not (max(least_edge, SHARP_PX * unit) <= top - bottom <= TOLERANCE * sigma * unit):
         return here
     # Where the map returns to the other side's height as soon as it can, there is no plateau, but something thin.
-    middle = 0.5 * (top + bottom)
+    middle, height = 0.5 * (top + bottom), top - bottom
     beyond, before = 2 * up - edge + PLATEAU_SIGMAS * sigma, 2 * back + edge + PLATEAU_SIGMAS * sigma
     if height_at(values, x + across * beyond, y + down * beyond) < middle:
         value = _as_structure(values, photo, x, y, across, down, up, 1.0, sigma, least_edge, softness, shares, taps)
@@ -248,6 +269,13 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
     # ... steepened about the middle of the ramp; softness near 0 makes a step.
     place = (here - bottom) / (top - bottom) - 0.5
     place = (place + COLOR_SHARE * (1.0 - softness) * colour) / softness + 0.5
+    # Beside the edge, the blur took from the front and left on the back: as much as the map shows, and a Gaussian does.
+    edge += (middle - height_at(values, x + across * edge, y + down * edge)) / steepest
+    above, below, end = _tail(up - edge, sigma), _tail(back + edge, sigma), TAIL_SIGMAS * sigma
+    step, limit = (1.0 - softness) * height / (1.0 - above - below), BEND * limit
+    lost = _beyond_blur(values, x, y, across, down, end + edge, sigma, limit) - top
+    left = bottom - _beyond_blur(values, x, y, -across, -down, end - edge, sigma, limit)
+    top, bottom = top + min(max(lost, 0.0), above * step), bottom - min(max(left, 0.0), below * step)
     return bottom + (top - bottom) * min(max(place, 0.0), 1.0)
 
 

@@ -27,6 +27,8 @@ MIXED_EDGES = 5.0
 """Times the least edge: what lies between nearer surfaces may be a slope."""
 LEAST_MEASURED = 0.025
 """A map of whose rims a smaller share is clearly between two surfaces, or unknown, is exact: nothing is changed."""
+LEAST_LEFT = 0.022
+"""A sharpened map of whose rims a smaller share is still between two surfaces, lost its blur: only crumbs are left."""
 MOST_CLEAR_FELLOWS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_FELLOWS = (2, 4)
@@ -45,11 +47,13 @@ def settle_rims(
     values: FloatImage,
     least_edge: float,
     unknown: NDArray[np.bool_],
+    is_sharpened: bool = False,
     should_stop: ShouldStop = never,
 ) -> FloatImage:
     """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
+    is_sharpened: whether the map was a soft one.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
     unknown, and all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then
     pixels of rims change sides where the colours say so, and crumbs that are left are filled. An exact map, which has
@@ -59,12 +63,12 @@ def settle_rims(
     colors = np.ascontiguousarray(photo, np.float32)
     rim = step_distance(values, least_edge) < RIM_PX
     between, clear = _find_between(values, least_edge, should_stop)
-    least = LEAST_MEASURED * np.count_nonzero(rim)
-    if clear > least:
+    rims = np.count_nonzero(rim)
+    if np.count_nonzero(between) > LEAST_LEFT * rims if is_sharpened else clear > LEAST_MEASURED * rims:
         between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
         values = fill_disparity_by_color(colors, np.where(between | unknown, np.float32(np.nan), values), should_stop)
-    elif np.count_nonzero(unknown & rim) <= least:
-        return values
+    elif np.count_nonzero(unknown & rim) <= LEAST_MEASURED * rims:
+        return fill_crumbs(colors, values, CRUMB_EDGES * least_edge, should_stop) if is_sharpened else values
     values = choose_sides(colors, values, between | unknown, least_edge, should_stop)
     values = widen_fronts(colors, values, OUTLINE_EDGES * least_edge, should_stop)
     return fill_crumbs(colors, values, CRUMB_EDGES * least_edge, should_stop)

@@ -52,26 +52,6 @@ def test_ragged_outlines_become_whole() -> None:
     assert wrong_side(fitted, exact) < 0.1 * wrong_side(start, exact)
 
 
-def test_halos_beside_edges_go() -> None:
-    """What sharpening leaves: the back's rim keeps a share of the front's height."""
-    photo, exact = disc()
-    soft = blur(exact, SIGMA)
-    start = np.where((soft - exact > 0) & (exact < 1.2), exact + np.minimum(soft - exact, 0.2), exact)
-    assert np.abs(start - exact).max() > 0.15
-    assert np.abs(fit(photo, soft, start) - exact).max() < 0.05
-
-
-def test_round_fronts_are_not_raised() -> None:
-    """A ball falls away from the view at its outline; fitted by a flat rim that would look like a loss."""
-    photo, exact = disc()
-    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
-    ball = exact + np.where(exact > 1.2, np.sqrt(np.maximum(24**2 - (x - 60) ** 2 - (y - 45) ** 2, 0)) / 24 - 1, 0)
-    ball = ball.astype(np.float32)
-    fitted = fit(photo, blur(ball, SIGMA), ball)
-    inside = blur((exact > 1.2).astype(np.float32), 1.0) > 0.99
-    assert (fitted - ball)[inside].mean() <= 0
-
-
 def test_a_map_that_is_the_blur_of_none_keeps_its_bits() -> None:
     photo, exact = disc()
     start = ragged(exact)
@@ -102,17 +82,13 @@ def test_bands_and_threads_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_it_can_be_cancelled() -> None:
     photo, exact = disc()
-    answers = iter([False] * 12)
+    answers = iter([False] * 3)
     with pytest.raises(Cancelled):
         fit_to_blur(photo, blur(exact, SIGMA), ragged(exact), CELLS, LEAST_EDGE, lambda: next(answers, True))
 
 
 def cells() -> tuple[np.ndarray, np.ndarray, int]:
     return *blur_fit._taps(CELLS), CELLS.cell_px
-
-
-def lattices() -> tuple[np.ndarray, np.ndarray, int]:
-    return *blur_fit._lattices(CELLS, cells()[1]), CELLS.cell_px
 
 
 def full_taps() -> np.ndarray:
@@ -133,77 +109,6 @@ def test_what_is_missing_against_a_blur_pixel_by_pixel() -> None:
     blur_fit._find_missing(values, exact, *cells(), 0, 3, missing)
     for y, x in [(0, 0), (45, 35), (45, 83), (95, 127), (31, 64), (20, 60)]:
         assert -missing[y, x] == pytest.approx((window(exact, y, x) * full_taps()).sum(), abs=1e-5)
-
-
-def lattice() -> np.ndarray:
-    """(13, 13): the kernel on every second pixel, as on a chessboard; it ends at three sigmas."""
-    j, i = np.mgrid[-6:7, -6:7]
-    shares = full_taps() * ((i + j) % 2 == 0) * (i**2 + j**2 <= 36)
-    return shares / shares.sum()
-
-
-def clean_shares(exact: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pixels near edges, and what `_find_clean` says of them."""
-    near, clean = np.zeros(SIZE, np.bool_), np.ones(SIZE, np.float32)
-    blur_fit._mark_near_edges(exact, *cells()[1:], 0.3, 0, SIZE[0], near)
-    blur_fit._find_clean(np.pad(exact, 6, mode="edge"), near, *lattices(), np.float32(0.3), 0, SIZE[0], clean)
-    return near, clean
-
-
-def test_clean_shares_against_windows() -> None:
-    _, exact = disc()
-    near, clean = clean_shares(exact)
-    for y, x in np.argwhere(near)[::37]:
-        own = np.abs(window(exact, y, x) - exact[y, x]) < 0.3
-        assert clean[y, x] == pytest.approx((own * lattice()).sum(), abs=1e-5)
-        # The lattice stands for all pixels.
-        assert clean[y, x] == pytest.approx((own * full_taps()).sum(), abs=0.1)
-    # Whatever an edge could make unclean is marked.
-    for y, x in np.argwhere(~near)[::97]:
-        assert np.ptp(window(exact, y, x)) < 0.3
-
-
-@pytest.mark.parametrize("sigma", [0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 4.5])
-def test_lattices_have_the_means_of_all_pixels(sigma: float) -> None:
-    blurs = EdgeBlur(np.array([[sigma, 0, 9.0]], np.float32), 32)
-    reach = blur_fit._taps(blurs)[1]
-    pixels, weights = (part[0, 0] for part in blur_fit._lattices(blurs, reach))
-    j, i = (pixels - reach.max())[weights > 0].T
-    assert len(j) < 90
-    rows, columns = np.mgrid[-15:16, -15:16]
-    whole = np.exp(-0.5 * (rows**2 + columns**2) / sigma**2)
-    whole /= whole.sum()
-    for across, down in [(1, 0), (0, 1), (1, 1), (1, -2), (3, 2)]:
-        # Beyond an edge a sigma away.
-        far = sigma * np.hypot(across, down)
-        share = weights[weights > 0][across * i + down * j > far].sum()
-        assert share == pytest.approx(whole[across * columns + down * rows > far].sum(), abs=0.1)
-
-
-def test_halos_against_least_squares() -> None:
-    _, exact = disc()
-    rng = np.random.default_rng(1)
-    missing = blur(rng.normal(size=SIZE).astype(np.float32), 3.0)
-    near, clean = clean_shares(exact)
-    wide = [np.pad(exact, 6, mode="edge"), np.pad(missing, 6), np.pad(clean, 6)]
-    lowered, step = exact.copy(), np.float32(0.3)
-    blur_fit._lower_halos(*wide, near, *lattices(), CELLS.sigma_px, step, 0, SIZE[0], lowered)
-    j, i = np.mgrid[-6:7, -6:7]
-    for y, x in np.argwhere(near)[::23]:
-        share, heights = np.pad(clean, 6)[y : y + 13, x : x + 13], window(exact, y, x)
-        weight = np.where(np.abs(heights - exact[y, x]) < 0.3, np.maximum(share - blur_fit.CLEAN, 0), 0) * lattice()
-        if not weight.any():
-            assert lowered[y, x] == exact[y, x]
-            continue
-        value = window(missing, y, x) + (0 if clean[y, x] > blur_fit.MOSTLY_CLEAN else heights - exact[y, x])
-        mean_i, mean_j = (np.average(part, weights=weight) for part in (i, j))
-        # A plane about the clean pixels' middle, its slopes damped as if by two further measurements of none.
-        damping = np.sqrt(blur_fit.SLOPE_DAMPING * weight.sum()) * SIGMA
-        rows = np.stack([np.ones_like(value), i - mean_i, j - mean_j], -1) * np.sqrt(weight)[..., None]
-        system = np.concatenate([rows.reshape(-1, 3), [[0, damping, 0], [0, 0, damping]]])
-        level, across, down = np.linalg.lstsq(system, [*(value * np.sqrt(weight)).ravel(), 0, 0])[0]
-        expected = min(level - across * mean_i - down * mean_j, 0)
-        assert lowered[y, x] - exact[y, x] == pytest.approx(expected, abs=1e-4)
 
 
 def test_edges_move_where_the_misfit_falls() -> None:

@@ -164,3 +164,14 @@ def test_bad_arguments_are_told() -> None:
     for strength in (-0.1, 1.5, np.nan):
         with pytest.raises(InputError, match="from 0"):
             refine(photo, disparity, strength)
+
+
+def test_what_the_blur_took_from_the_front_and_left_on_the_back_is_told_by_it() -> None:
+    """Both sides of a step are as high as they were, up to the edge."""
+    y, x = np.mgrid[:96, :128]
+    inside = np.hypot(x - 64, y - 48) < 30
+    photo = np.where(inside[..., None], [0.8, 0.3, 0.2], [0.2, 0.3, 0.7]).astype(np.float32)
+    flat = np.where(inside, 2.0, 0.0).astype(np.float32)
+    refined = refine(photo, blur(flat, 2.0))
+    assert np.mean((refined > 1) == inside) > 0.999
+    assert rms(refined, flat) < 0.02

@@ -22,7 +22,7 @@ def disc(size=64):
 
 def settle(photo, values, unknown=None, should_stop=tiling.never):
     unknown = np.zeros(values.shape, np.bool_) if unknown is None else unknown
-    return settle_rims(photo, values, EDGE, unknown, should_stop)
+    return settle_rims(photo, values, EDGE, unknown, should_stop=should_stop)
 
 
 def resampled(truth):
