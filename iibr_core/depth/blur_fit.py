@@ -70,7 +70,7 @@ def fit_to_blur(
         in_bands(move, image_size(values), should_stop, threads=1)
     changed, misfit = _cell_squares(values - fitted, blur), _cell_squares(missing, blur)
     found = np.isfinite(misfit) & (misfit <= MOST_MISFIT**2 * changed)
-    return np.where(_at_pixels(found, blur, image_size(values)), fitted, sharp)
+    return np.where(blur.at_pixels(found, image_size(values)), fitted, sharp)
 
 
 def _taps(blur: EdgeBlur) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
@@ -81,11 +81,6 @@ def _taps(blur: EdgeBlur) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     sigma = np.maximum(blur.sigma_px, 1e-3)[..., None]
     taps = np.where(apart <= reach[..., None], np.exp(-0.5 * (apart / sigma) ** 2), 0.0)
     return (taps / taps.sum(axis=2, keepdims=True)).astype(np.float32), reach
-
-
-def _at_pixels(cells: NDArray[np.bool_], blur: EdgeBlur, size: ImageSize) -> NDArray[np.bool_]:
-    """(H, W), what is true of a pixel's cell, from (M, N)."""
-    return cells.repeat(blur.cell_px, 0).repeat(blur.cell_px, 1)[: size.height, : size.width]
 
 
 def _cell_squares(values: FloatImage, blur: EdgeBlur) -> NDArray[np.float64]:

@@ -74,6 +74,10 @@ class EdgeBlur:
     """(rows, columns)"""
     cell_px: int
 
+    def at_pixels(self, cells: NDArray[np.bool_], size: ImageSize) -> NDArray[np.bool_]:
+        """(H, W), what is true of a pixel's cell, from (rows, columns)."""
+        return cells.repeat(self.cell_px, 0).repeat(self.cell_px, 1)[: size.height, : size.width]
+
 
 def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never) -> EdgeBlur:
     """The blur of the depth edges of a (H, W) map, place by place. photo: (H, W, 3), sRGB-encoded.

@@ -84,22 +84,24 @@ def refine(
     if strength == 0:
         return values
     least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
-    sharp = _sharpen(colors, values, least_edge, softness, should_stop)
+    sharp, soft = _sharpen(colors, values, least_edge, softness, should_stop)
     if not least_edge > 0:
         return sharp
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
-    settled = settle_rims(colors, sharp, least_edge, filled, sharp is not values, should_stop)
+    settled = settle_rims(colors, sharp, least_edge, filled, soft, should_stop)
     # Rims, too, go so far only.
     return settled if strength == 1 else sharp + np.float32(strength) * (settled - sharp)
 
 
 def _sharpen(
     colors: FloatImage, values: FloatImage, least_edge: float, softness: float, should_stop: ShouldStop
-) -> FloatImage:
-    """The map with its soft edges snapped to the photo's; its bits where nothing says that it is blurred."""
+) -> tuple[FloatImage, NDArray[np.bool_] | None]:
+    """The map with its soft edges snapped to the photo's, its bits where nothing says that it is blurred; and where
+    that is said (H, W), None: nowhere.
+    """
     blur = measure_edge_blur(colors, values, should_stop)
     if not blur.sigma_px.any():
-        return values
+        return values, None
     refined = np.empty_like(values)
 
     def band(first: int, last: int) -> None:
@@ -107,7 +109,9 @@ def _sharpen(
 
     in_bands(band, image_size(values), should_stop)
     # Slopes that are only shortened give no map that this could be the blur of.
-    return fit_to_blur(colors, values, refined, blur, least_edge, should_stop) if softness == FINE_STRENGTH else refined
+    if softness == FINE_STRENGTH:
+        refined = fit_to_blur(colors, values, refined, blur, least_edge, should_stop)
+    return refined, blur.at_pixels(blur.sigma_px > 0, image_size(values))
 
 
 def _fill_unknown(colors: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:

@@ -47,13 +47,13 @@ def settle_rims(
     values: FloatImage,
     least_edge: float,
     unknown: NDArray[np.bool_],
-    is_sharpened: bool = False,
+    soft: NDArray[np.bool_] | None = None,
     should_stop: ShouldStop = never,
 ) -> FloatImage:
     """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
-    is_sharpened: whether the map was a soft one.
+    soft: (H, W), where the map was soft before it was sharpened; None: nowhere.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
     unknown, and all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then
     pixels of rims change sides where the colours say so, and crumbs that are left are filled. An exact map, which has
@@ -63,15 +63,22 @@ def settle_rims(
     colors = np.ascontiguousarray(photo, np.float32)
     rim = step_distance(values, least_edge) < RIM_PX
     between, clear = _find_between(values, least_edge, should_stop)
-    rims = np.count_nonzero(rim)
-    if np.count_nonzero(between) > LEAST_LEFT * rims if is_sharpened else clear > LEAST_MEASURED * rims:
+    least = LEAST_MEASURED * np.count_nonzero(rim)
+    is_exact = clear <= least and np.count_nonzero(unknown & rim) <= least
+    if is_exact and soft is None:
+        return values
+    is_left = soft is not None and np.count_nonzero(between & soft) > LEAST_LEFT * np.count_nonzero(rim & soft)
+    settled = values
+    if clear > least or is_left:
         between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
-        values = fill_disparity_by_color(colors, np.where(between | unknown, np.float32(np.nan), values), should_stop)
-    elif np.count_nonzero(unknown & rim) <= LEAST_MEASURED * rims:
-        return fill_crumbs(colors, values, CRUMB_EDGES * least_edge, should_stop) if is_sharpened else values
-    values = choose_sides(colors, values, between | unknown, least_edge, should_stop)
-    values = widen_fronts(colors, values, OUTLINE_EDGES * least_edge, should_stop)
-    return fill_crumbs(colors, values, CRUMB_EDGES * least_edge, should_stop)
+        known = np.where(between | unknown, np.float32(np.nan), values)
+        settled = fill_disparity_by_color(colors, known, should_stop)
+    if not is_exact or is_left:
+        settled = choose_sides(colors, settled, between | unknown, least_edge, should_stop)
+        settled = widen_fronts(colors, settled, OUTLINE_EDGES * least_edge, should_stop)
+    settled = fill_crumbs(colors, settled, CRUMB_EDGES * least_edge, should_stop)
+    # Where the map was not soft, it is exact.
+    return settled if soft is None or not is_exact else np.where(soft, settled, values)
 
 
 def _find_between(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> tuple[NDArray[np.bool_], int]:
