@@ -47,6 +47,7 @@ def write_kernels(folder: Path) -> None:
     made_of = digest_of_sources()
     if (PRECOMPILED / MADE_OF).is_file() and (PRECOMPILED / MADE_OF).read_text() == made_of:
         if folder != PRECOMPILED:
+            shutil.rmtree(folder, ignore_errors=True)
             shutil.copytree(PRECOMPILED, folder)
         return
     for name in [name for name in os.environ if name.startswith("NUMBA_")]:
