@@ -49,12 +49,10 @@ def test_a_line_that_ends_at_the_frame_s_hole_goes_on_into_it():
     hole = np.zeros(SIZE, bool)
     hole[:, 78:] = True
     disparity = np.full(SIZE, 12.0, np.float32)
-    plain = colors.copy()
-    scene = disparity, hole, disparity, ViewOffset(0.0, 1.0)
-    fill_patches(colors, *scene)
-    fill_background(plain, *scene)
-    steps = [np.abs(np.diff(filled[20:40, 84, 0])).max() for filled in (plain, colors)]
-    assert steps[1] > 1.5 * steps[0]
+    fill_patches(colors, disparity, hole, disparity, ViewOffset(0.0, 1.0))
+    steps = np.abs(np.diff(colors[20:40, 84, 0]))
+    assert steps.max() > 0.4
+    assert steps.sum() == pytest.approx(0.5, abs=0.05)
 
 
 def test_matches_are_whole_never_in_front_and_as_good_as_they_say():
