@@ -56,9 +56,10 @@ def settle_rims(
     soft: (H, W), where the map was soft before it was sharpened; None: nowhere.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
     unknown, and all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then
-    pixels of rims change sides where the colours say so, and crumbs that are left are filled. An exact map, which has
-    neither such disparities nor unknown ones in its rims, comes back as it is. Raises Cancelled once should_stop is
-    true.
+    pixels of rims change sides where the colours say so, fronts grow over outlines that are soft in the photo, and
+    crumbs that are left are filled. An exact map, which has neither such disparities nor unknown ones in its rims,
+    comes back as it is; of one that was soft in places, those lose their crumbs, and all else is done there only if
+    sharpening has left disparities between surfaces. Raises Cancelled once should_stop is true.
     """
     colors = np.ascontiguousarray(photo, np.float32)
     rim = step_distance(values, least_edge) < RIM_PX

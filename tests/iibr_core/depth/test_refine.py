@@ -175,3 +175,16 @@ def test_what_the_blur_took_from_the_front_and_left_on_the_back_is_told_by_it() 
     refined = refine(photo, blur(flat, 2.0))
     assert np.mean((refined > 1) == inside) > 0.999
     assert rms(refined, flat) < 0.02
+
+
+@pytest.mark.parametrize("sigma", [1.0, 1.5, 2.0])
+def test_round_fronts_stay_round(sigma: float) -> None:
+    """A ball falls away from the view at its outline: that is not what the blur took."""
+    y, x = np.mgrid[:96, :128]
+    away = np.hypot(x - 64, y - 48)
+    inside = away < 30
+    photo = np.where(inside[..., None], [0.8, 0.3, 0.2], [0.2, 0.3, 0.7]).astype(np.float32)
+    ball = np.where(inside, 1.5 + np.sqrt(np.maximum(900 - away**2, 0)) / 60, 0.0).astype(np.float32)
+    off = refine(photo, blur(ball, sigma)) - ball
+    assert abs(off[inside & (away > 25)].mean()) < 0.02
+    assert rms(off[inside], np.zeros_like(off[inside])) < 0.03
