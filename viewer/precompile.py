@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PART = (slice(150, 310), slice(200, 400))
 """Of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
 MADE_OF = "made_of.sha256"
-"""Beside the kernels: the digest of their sources."""
+"""Beside the kernels, written after all of them: the digest of their sources."""
 GLOSSY_PIXELS = 250_000
 """So many that normals are smoothed, as those of large photos are."""
 
@@ -48,7 +48,8 @@ def write_kernels(folder: Path) -> None:
     if (PRECOMPILED / MADE_OF).is_file() and (PRECOMPILED / MADE_OF).read_text() == made_of:
         if folder != PRECOMPILED:
             shutil.rmtree(folder, ignore_errors=True)
-            shutil.copytree(PRECOMPILED, folder)
+            shutil.copytree(PRECOMPILED, folder, ignore=shutil.ignore_patterns(MADE_OF))
+            (folder / MADE_OF).write_text(made_of)
         return
     for name in [name for name in os.environ if name.startswith("NUMBA_")]:
         del os.environ[name]

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import write_image
+from iibr_core.runtime import kernel_cache
 from tests.viewer.conftest import write_scene
-from viewer.precompile import digest_of_sources
+from viewer.precompile import MADE_OF, digest_of_sources, write_kernels
 
 ROOT = Path(__file__).parents[2]
 
@@ -58,6 +59,21 @@ def test_they_count_for_their_sources_only(tmp_path: Path) -> None:
     assert digest_of_sources(tmp_path) == before != digest_of_sources(ROOT)
     source.write_text("STEPS = 2")
     assert digest_of_sources(tmp_path) != before
+
+
+def test_a_copy_that_was_cut_off_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept, copy = tmp_path / "kept", tmp_path / "copy"
+    kept.mkdir()
+    (kept / MADE_OF).write_text(digest_of_sources())
+    (kept / "a.nbi").symlink_to("nowhere")
+    monkeypatch.setattr(kernel_cache, "PRECOMPILED", kept)
+    with pytest.raises(shutil.Error):
+        write_kernels(copy)
+    assert not (copy / MADE_OF).exists()
+    (kept / "a.nbi").unlink()
+    (kept / "a.nbi").write_bytes(b"code")
+    write_kernels(copy)
+    assert {path.name: path.read_text() for path in copy.iterdir()} == {"a.nbi": "code", MADE_OF: digest_of_sources()}
 
 
 DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
