@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
@@ -101,6 +101,7 @@ eyes = st.floats(*eye_limits(3))
         st.floats(0, 3),
     )
 )
+@example(Optics(dolly=5e-324))
 def test_refocus_of_a_constant_photo_is_constant(renderer: Renderer, optics: Optics) -> None:
     """Whatever the eye, dolly, focus, tilt, range and aperture that the viewer allows: weights are weights."""
     if renderer.field is None:

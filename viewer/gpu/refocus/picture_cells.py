@@ -41,5 +41,7 @@ def covering_pixels(cell: PictureCell, width: int, height: int) -> tuple[int, in
 def _crossings(eye: float, dolly: float, first: float, last: float) -> list[float]:
     """Texture coordinates along one axis where the ray passes a row or column of views, and the borders."""
     lines = np.arange(first, last + 1)
-    places = 0.5 + (lines - eye) / dolly
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        # Infinite, or NaN, with as good as no dolly along this axis: then no ray passes any.
+        places = 0.5 + (lines - eye) / dolly
     return [0.0, *sorted(places[(places > 0) & (places < 1)].tolist()), 1.0]
