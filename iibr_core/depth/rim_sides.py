@@ -13,6 +13,7 @@ from math import exp, log
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
@@ -133,8 +134,8 @@ def _mean_field(
     should_stop: ShouldStop,
 ) -> FloatImage:
     """(N): how likely each pixel (flat index) is on its own surface rather than on the other."""
-    number = np.full(values.shape, -1, np.int32)
-    number.reshape(-1)[pixels] = np.arange(len(pixels), dtype=np.int32)
+    number = np.empty(values.shape, np.int32)
+    number_pixels(pixels, number)
     belief = np.ones(len(pixels), np.float32)
     firsts = range(0, len(pixels), MOST_PIECE_PIXELS)
     for _ in range(PASSES):

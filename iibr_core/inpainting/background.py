@@ -18,7 +18,7 @@ from iibr_core.inpainting.nearest_known import (
     MOST_PIECE_PIXELS,
     flat_indices,
     nearest_known,
-    number_holes,
+    number_pixels,
     rims_of_holes,
 )
 from iibr_core.inpainting.protocol import Inpainter
@@ -139,7 +139,7 @@ def _fill_view(
     run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
     for step in steps:
         run(step, len(pixels))
-    number_holes(pixels, number)
+    number_pixels(pixels, number)
     copy_exemplars(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
 
 
@@ -154,14 +154,14 @@ def _fill(
 ):  # fmt: skip
     """What `fill_background` says; and how far away the nearest known pixel is, reach (N,)."""
     height, width = disparity.shape
-    directions = known.shape[1]
+    photo, directions = photo_disparity.ravel(), known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
     hidden = one_surface * HIDDEN_PX / SURFACE_PX
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         nearest, farthest = np.inf, np.inf
         any_possible = False
-        # Which of the surfaces around may continue to here: where each would lie in the photo (backward warp), ...
+        # Which of the surfaces around may continue to here, and how likely.
         for k in range(directions):
             weight[k] = 0.0
             if known[i, k] < 0:
@@ -172,13 +172,11 @@ def _fill(
             d = disparity[known_y, known_x]
             surface[k] = d
             farthest = min(farthest, d)
-            # ... something nearer must hide it by HIDDEN_PX, or it must be off the frame.
-            column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
-            inside = 0 <= column < width and 0 <= row < height
             rim = number[known_y, known_x]
             along = line_weight(lines[rim, 0], lines[rim, 1], known_y - y, known_x - x)
             likely = (1.0 + ALONG_LINES * along) / distance
-            if not inside or photo_disparity[row, column] - d > hidden:
+            place = _place_in_photo(y + d * t, x + d * s, height, width)
+            if place < 0 or photo[place] - d > hidden:
                 weight[k] = likely
                 any_possible = True
             else:
@@ -217,22 +215,30 @@ def _fill(
 
 
 @kernel
+def _place_in_photo(y, x, height, width):
+    """Index among the photo's pixels, -1 off its frame: a surface that lies there may go on unseen only where something
+    nearer hides it by HIDDEN_PX, or off the frame.
+    """
+    row, column = nearest_pixel(y), nearest_pixel(x)
+    return row * width + column if 0 <= column < width and 0 <= row < height else -1
+
+
+@kernel
 def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
     """Write `goes_on_in_front` for these pixels."""
     height, width = disparity.shape
-    hidden = one_surface * HIDDEN_PX / SURFACE_PX
+    photo, hidden = photo_disparity.ravel(), one_surface * HIDDEN_PX / SURFACE_PX
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         balance = 0.0
         for k in range(known.shape[1]):
             if known[i, k] < 0:
                 continue
-            # What may continue to here, and how likely: as in `_fill`, but for lines.
+            # As in `_fill`, but for lines.
             known_y, known_x = known[i, k] // width, known[i, k] % width
             d = disparity[known_y, known_x]
-            column, row = nearest_pixel(x + d * s), nearest_pixel(y + d * t)
-            inside = 0 <= column < width and 0 <= row < height
-            if not inside or photo_disparity[row, column] - d > hidden:
+            place = _place_in_photo(y + d * t, x + d * s, height, width)
+            if place < 0 or photo[place] - d > hidden:
                 likely = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
                 balance += likely if d > disparity[y, x] + one_surface else -likely
         in_front[y, x] = balance > 0.0

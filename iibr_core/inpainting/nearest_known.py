@@ -60,7 +60,7 @@ def rims_of_holes(
     return rims, number
 
 
-def number_holes(pixels: NDArray[np.int64], number: NDArray[np.int32]) -> None:
+def number_pixels(pixels: NDArray[np.int64], number: NDArray[np.int32]) -> None:
     """Write to number (H, W) which one of these pixels (N,) each of them is; -1 elsewhere."""
     number[:] = -1
     _number(pixels, number)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, never, pieces_of
@@ -91,8 +92,8 @@ def _targets(
     parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
     in_pieces(lambda part: _add_surroundings(disparity, hole, in_front, part, wanted), parts, should_stop)
     targets = np.flatnonzero(wanted)
-    number = np.full(hole.shape, -1, np.int32)
-    number.reshape(-1)[targets] = np.arange(len(targets))
+    number = np.empty(hole.shape, np.int32)
+    number_pixels(targets, number)
     return targets, number
 
 

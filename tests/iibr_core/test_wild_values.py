@@ -512,7 +512,7 @@ FINITE_BY_CONTRACT = {
     "inpainting.nearest_known.flat_indices": "of masks only",
     "inpainting.nearest_known.nearest_known": "of masks only",
     "inpainting.nearest_known.rims_of_holes": "of indices only",
-    "inpainting.nearest_known.number_holes": "of indices only",
+    "inpainting.nearest_known.number_pixels": "of indices only",
     "inpainting.exemplars.copy_exemplars": "of rendered views only",
     "inpainting.patch.fill_patches": "of rendered views only",
     "inpainting.rim_lines.mixed_beside": "of masks only",

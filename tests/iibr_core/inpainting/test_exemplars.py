@@ -16,7 +16,7 @@ from iibr_core.inpainting.exemplars import (
     STEP_PX,
     copy_exemplars,
 )
-from iibr_core.inpainting.nearest_known import number_holes
+from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime.tiling import Cancelled, never
 
 ONE_SURFACE = 0.5
@@ -99,7 +99,7 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
 def copied(smooth, disparity, hole, mixed, should_stop=never, threads=2):
     colors, number = smooth.copy(), np.empty(hole.shape, np.int32)
     pixels = np.flatnonzero(hole)
-    number_holes(pixels, number)
+    number_pixels(pixels, number)
     pure = np.where(mixed, np.float32(np.nan), disparity)
     copy_exemplars(colors, disparity, pure, pixels, number, ONE_SURFACE, should_stop, threads)
     return colors
