@@ -19,6 +19,7 @@ from benchmarks.speed.processes import JUDGED_SCENES, VIEW_JUDGE, output_lines
 from iibr_core.formats.outputs import atomic_write
 
 SOFT_MAPS = ("antinous-blur1", "antinous-blur2", "antinous-blur4", "antinous-half")
+AGREEING = ("hci_antinous", "mb2014_motorcycle_quarter")
 AGAINST_WARP = "demo,antinous,teddy,moebius,motorcycle"
 TITLE = """# Figures of the README
 
@@ -34,6 +35,8 @@ def measurements(data: str, yardsticks: str | None) -> dict[str, list[str]]:
         "first-picture": ["-m", "benchmarks.full_size", "12", "24", "48", "--save", "12"],
         "window": ["-m", "benchmarks.window"],
         "cancelled": ["-m", "benchmarks.cancel", "--times", "10"],
+        "agreement": ["-m", "benchmarks.agreement", *(f"{data}/{scene}" for scene in AGREEING), "--views", "8"],
+        "path-traced-lens": ["-m", "benchmarks.agreement", "tests/data/thin_lens"],
         "field-disparity": ["-m", "benchmarks.multi_view_depth", "--data", data],
         "refocus": ["-m", "benchmarks.refocus", "--data", f"{data}/blender_shop_9x9"],
     }
