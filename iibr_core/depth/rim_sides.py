@@ -7,6 +7,7 @@ much the map counts is measured on the map itself, by how often colours contradi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from math import exp, log
 
@@ -69,34 +70,46 @@ def choose_sides(
     unknown: (H, W), where the map says nothing by itself. Where colours do not tell surfaces apart, or tell shade from
     light only, it stays as it is. Raises Cancelled once should_stop is true.
     """
-    reluctance, least_step = None, 0.0
+    reluctance: FloatImage | None = None
+    least_step: float | None = None
     for _ in range(ROUNDS):
         distance = step_distance(values, least_edge)
-        pixels = np.flatnonzero(distance <= RIM_PX)
+        # The pixels that tell whether colours mislead come first.
+        near, far = np.flatnonzero(distance < RIM_PX), np.flatnonzero(distance == RIM_PX)
+        pixels = np.concatenate((near, far))
         if not len(pixels):
             return values
         contrast = _mean_color_step(colors, pixels)
-        parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
-
         trust = TRUST[distance] * np.where(unknown, FILLED_TRUST, np.float32(1))
         weigh = partial(_weigh_colors, colors, values, trust, least_edge, ALIKE * contrast)
-        weighed = in_pieces(weigh, parts, should_stop, tiling.THREADS)
-        other, evidence = (np.concatenate([pair[k] for pair in weighed]) for k in (0, 1))
-        away, known = distance.reshape(-1)[pixels], ~unknown.reshape(-1)[pixels]
-        step = np.abs(other - values.reshape(-1)[pixels])
-        if reluctance is None:
-            reluctance = _reluctance(evidence[known], away[known])
-        if reluctance is None:
-            least_step = TALL_EDGES * least_edge
-            is_tall = known & (step > least_step)
-            reluctance = _reluctance(evidence[is_tall], away[is_tall])
-        if reluctance is None:
+        away, own, known = distance.reshape(-1)[pixels], values.reshape(-1)[pixels], ~unknown.reshape(-1)[pixels]
+        weighed = _in_parts(weigh, near, should_stop)
+        if least_step is None:
+            step = np.where(known[: len(near)], np.abs(weighed[0] - own[: len(near)]), np.float32(0))
+            least_step = _least_judged(step, weighed[1], away[: len(near)], least_edge)
+        if least_step is None:
             return values
-        drive = np.where(step >= least_step, evidence + np.where(known, reluctance[away], 0), np.float32(np.inf))
+        other, evidence = map(np.concatenate, zip(weighed, _in_parts(weigh, far, should_stop), strict=True))
+        is_judged = np.abs(other - own) > least_step
+        if reluctance is None:
+            reluctance = _reluctance(evidence[known & is_judged], away[known & is_judged])
+            assert reluctance is not None
+        drive = np.where(is_judged, evidence + np.where(known, reluctance[away], 0), np.float32(np.inf))
         belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
         values = values.copy()
-        values.reshape(-1)[pixels] = np.where(belief < 0.5, other, values.reshape(-1)[pixels])
+        values.reshape(-1)[pixels] = np.where(belief < 0.5, other, own)
     return values
+
+
+def _in_parts(
+    weigh: Callable[[NDArray[np.int64]], tuple[FloatImage, FloatImage]],
+    pixels: NDArray[np.int64],
+    should_stop: ShouldStop,
+) -> tuple[FloatImage, FloatImage]:
+    """What `_weigh_colors` says of pixels (N, flat indices)."""
+    parts = [pixels[part] for part in pieces_of(max(len(pixels), 1), MOST_PIECE_PIXELS)]
+    weighed = in_pieces(weigh, parts, should_stop, tiling.THREADS)
+    return np.concatenate([pair[0] for pair in weighed]), np.concatenate([pair[1] for pair in weighed])
 
 
 def step_distance(values: FloatImage, least_edge: float, reach_px: int = RIM_PX) -> NDArray[np.uint8]:
@@ -122,6 +135,14 @@ def _reluctance(evidence: FloatImage, away: NDArray[np.uint8]) -> FloatImage | N
     if shares[1] > MOST_MISLED * shares[0]:
         return None
     return np.asarray(RELUCTANCE * np.log((1 - shares) / shares), np.float32)
+
+
+def _least_judged(step: FloatImage, evidence: FloatImage, away: NDArray[np.uint8], least_edge: float) -> float | None:
+    """Steps of more than this are judged by colours; None: these mislead."""
+    for least_step in (0.0, TALL_EDGES * least_edge):
+        if _reluctance(evidence[step > least_step], away[step > least_step]) is not None:
+            return least_step
+    return None
 
 
 def _mean_field(

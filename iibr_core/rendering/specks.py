@@ -36,7 +36,8 @@ def measure_detail(photo: FloatImage, should_stop: ShouldStop = never) -> FloatI
     Raises Cancelled once should_stop is true.
     """
     detail = np.empty(photo.shape[:2], np.float32)
-    in_bands(lambda first, last: _measure(photo, first, last, detail), image_size(detail), should_stop)
+    rows = np.pad(photo, ((1, 1), (1, 1), (0, 0)), "edge").reshape(len(photo) + 2, -1)
+    in_bands(lambda first, last: _measure(rows, first, last, detail), image_size(detail), should_stop)
     return detail
 
 
@@ -70,15 +71,23 @@ def without_specks(
 
 
 @kernel
-def _measure(photo, first, last, detail):
+def _measure(rows, first, last, detail):
+    """Rows [first, last) of `measure_detail`. rows: of the photo with one pixel more on all sides, (H + 2, 3 W + 6)."""
+    stands_out = np.empty(3 * detail.shape[1], np.float32)
     for y in range(first, last):
-        for x in range(photo.shape[1]):
+        above, here, below = rows[y], rows[y + 1], rows[y + 2]
+        # All channels of a row at once: left and right are three values away.
+        for k in range(len(stands_out)):
+            upper = _ordered(above[k], above[k + 3], above[k + 6])
+            middle = _ordered(here[k], here[k + 3], here[k + 6])
+            lower = _ordered(below[k], below[k + 3], below[k + 6])
+            stands_out[k] = abs(here[k + 3] - _middle(upper, middle, lower))
+        for x in range(detail.shape[1]):
             detail[y, x] = 0.0
-            for channel in range(3):
-                stands_out = abs(photo[y, x, channel] - _median(photo, y, x, channel))
+            for k in range(3 * x, 3 * x + 3):
                 # Of what is infinite nobody can say; NaN fails the comparison.
-                if detail[y, x] < stands_out < np.inf:
-                    detail[y, x] = stands_out
+                if detail[y, x] < stands_out[k] < np.inf:
+                    detail[y, x] = stands_out[k]
 
 
 @kernel
@@ -103,16 +112,20 @@ def _settle(
 
 @kernel
 def _median(colors, y, x, channel):
-    """Of the 3x3 pixels around one, those at the border repeated: of the greatest low, the middle middle and the least
-    high value of its rows. As a float: a difference of bytes has no sign.
-    """
+    """Of the 3x3 pixels around one, those at the border repeated. As a float: a difference of bytes has no sign."""
     above, below = max(y - 1, 0), min(y + 1, colors.shape[0] - 1)
     left, right = max(x - 1, 0), min(x + 1, colors.shape[1] - 1)
-    low, middle, high = _ordered(colors[y, left, channel], colors[y, x, channel], colors[y, right, channel])
     upper = _ordered(colors[above, left, channel], colors[above, x, channel], colors[above, right, channel])
+    middle = _ordered(colors[y, left, channel], colors[y, x, channel], colors[y, right, channel])
     lower = _ordered(colors[below, left, channel], colors[below, x, channel], colors[below, right, channel])
-    low, high = max(low, upper[0], lower[0]), min(high, upper[2], lower[2])
-    return float(_ordered(low, _ordered(upper[1], middle, lower[1])[1], high)[1])
+    return float(_middle(upper, middle, lower))
+
+
+@kernel
+def _middle(upper, middle, lower):
+    """The median of nine, ordered by threes: that of their greatest low, middle middle and least high value."""
+    low, high = max(upper[0], middle[0], lower[0]), min(upper[2], middle[2], lower[2])
+    return _ordered(low, _ordered(upper[1], middle[1], lower[1])[1], high)[1]
 
 
 @kernel
