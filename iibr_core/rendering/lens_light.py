@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile, whole
+from iibr_core.rendering.resampling import keys_weights
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.jit import kernel, linear_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -227,18 +228,6 @@ def _linear_rows(encoded, gain, exposure, first, last, light):
 
 
 @kernel
-def _keys(f, a):
-    """Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1)."""
-    g = 1.0 - f
-    return (
-        a * f * g * g,
-        1.0 - f * f * (a + 3.0 - (a + 2.0) * f),
-        1.0 - g * g * (a + 3.0 - (a + 2.0) * g),
-        a * g * f * f,
-    )
-
-
-@kernel
 def _add_sharp(
     shown, disparity, around, tile, size, offset, weight,
     focus, tilt, focus_range, diameter, sharp_up_to_px, first, last, light, weights,
@@ -267,8 +256,8 @@ def _add_sharp(
                 continue
             share = weight * min((to_px - blur_px) / (to_px - from_px), 1.0)
             top, left = math.floor(at_y), math.floor(at_x)
-            weights_x = _keys(at_x - left, ENLARGED_BY)
-            weights_y = _keys(at_y - top, ENLARGED_BY)
+            weights_x = keys_weights(at_x - left, ENLARGED_BY)
+            weights_y = keys_weights(at_y - top, ENLARGED_BY)
             red = green = blue = 0.0
             for j in range(4):
                 v = min(max(top + j - 1 - around.top, 0), rows - 1)
@@ -316,11 +305,11 @@ def _add_enlarged(missing, first_row, first_column, step_y, step_x, top, left, f
     for row in range(first, last):
         y = (top + row + 0.5) / step_y - 0.5 - first_row
         above = math.floor(y)
-        weights_y = _keys(y - above, ENLARGED_BY)
+        weights_y = keys_weights(y - above, ENLARGED_BY)
         for column in range(light.shape[1]):
             x = (left + column + 0.5) / step_x - 0.5 - first_column
             before = math.floor(x)
-            weights_x = _keys(x - before, ENLARGED_BY)
+            weights_x = keys_weights(x - before, ENLARGED_BY)
             red = green = blue = 0.0
             for j in range(4):
                 v = min(max(above + j - 1, 0), rows - 1)

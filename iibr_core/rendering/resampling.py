@@ -19,7 +19,7 @@ from iibr_core.rendering.ray_set import RaySet
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.types import FloatImage
 
-KEYS_A = -0.75
+KEYS_A = np.float32(-0.75)
 """The sharper of the usual cubic kernels; it scored as well as longer ones on held-out light fields."""
 OWN_SURFACE_PX = 0.5
 """Pixels whose landing differs by more than this from the candidate's belong to another surface."""
@@ -64,30 +64,12 @@ def heaviest_candidate(
 
 
 @kernel
-def _keys(f):
-    """Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1)."""
+def keys_weights(f, a):
+    """Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1); in single precision if f and a are."""
     # Keys 1981: (a + 2) |t|^3 - (a + 3) |t|^2 + 1 up to one pixel away, a (|t|^3 - 5 |t|^2 + 8 |t| - 4) up to two.
-    g = 1.0 - f
-    a = KEYS_A
-    return (
-        a * f * g * g,
-        1.0 - f * f * (a + 3.0 - (a + 2.0) * f),
-        1.0 - g * g * (a + 3.0 - (a + 2.0) * g),
-        a * g * f * f,
-    )
-
-
-@kernel
-def _keys_single(f):
-    """The same in single precision."""
-    one, a = np.float32(1.0), np.float32(KEYS_A)
+    one, steep, bent = np.float32(1.0), a + np.float32(2.0), a + np.float32(3.0)
     g = one - f
-    return (
-        a * f * g * g,
-        one - f * f * (a + np.float32(3.0) - (a + np.float32(2.0)) * f),
-        one - g * g * (a + np.float32(3.0) - (a + np.float32(2.0)) * g),
-        a * g * f * f,
-    )
+    return a * f * g * g, one - f * f * (bent - steep * f), one - g * g * (bent - steep * g), a * g * f * f
 
 
 @kernel
@@ -95,7 +77,7 @@ def cubic(images, index, x, y):
     """Colour at a position of one image; its border is repeated beyond it."""
     _, height, width, _ = images.shape
     column, row = floor(x), floor(y)
-    (x0, x1, x2, x3), weight_y = _keys(x - column), _keys(y - row)
+    (x0, x1, x2, x3), weight_y = keys_weights(x - column, KEYS_A), keys_weights(y - row, KEYS_A)
     # Columns of the four taps; the border pixel is repeated.
     a, b = max(column - 1, 0), max(column, 0)
     c, d = min(column + 1, width - 1), min(column + 2, width - 1)
@@ -124,7 +106,7 @@ def resample(images, surfaces, index, x, y, d, parallax):
     _, height, width, _ = images.shape
     tolerance = OWN_SURFACE_PX / parallax
     column, row = floor(x), floor(y)
-    weight_x, weight_y = _keys(x - column), _keys(y - row)
+    weight_x, weight_y = keys_weights(x - column, KEYS_A), keys_weights(y - row, KEYS_A)
     # Sums over the taps of the own surface, their range, and the nearest of them.
     total = red = green = blue = 0.0
     low_r = low_g = low_b = nearest = np.inf
@@ -225,8 +207,8 @@ def _gather_plain(
                 continue
             remaining[row, x] = False
             # Separable: along the rows, then across them. Single precision is far finer than an 8-bit step.
-            x0, x1, x2, x3 = _keys_single(np.float32(source_x - left))
-            y0, y1, y2, y3 = _keys_single(np.float32(source_y - top))
+            x0, x1, x2, x3 = keys_weights(np.float32(source_x - left), KEYS_A)
+            y0, y1, y2, y3 = keys_weights(np.float32(source_y - top), KEYS_A)
             for c in range(3):
                 colors[row, x, c] = max(
                     y0 * (x0 * images[k, v - ONE, u - ONE, c] + x1 * images[k, v - ONE, u, c]
