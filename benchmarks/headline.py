@@ -57,10 +57,10 @@ def section(name: str, program: list[str], places: dict[str, str]) -> str:
     return f"## {name}\n\nMade by `{command}` at commit {current_commit()}.\n\n```\n{lines}\n```\n"
 
 
-def sections_in(report: str) -> dict[str, str]:
-    """The sections that a report holds, by their headings."""
-    parts = re.split(r"^(?=## )", report, flags=re.MULTILINE)[1:]
-    return {part.partition("\n")[0].removeprefix("## "): part.rstrip("\n") + "\n" for part in parts}
+def parts_of(report: str) -> tuple[str, dict[str, str]]:
+    """What a report says before its sections, and these by their headings."""
+    head, *parts = (part.rstrip("\n") + "\n" for part in re.split(r"^(?=## )", report, flags=re.MULTILINE))
+    return head, {part.partition("\n")[0].removeprefix("## "): part for part in parts}
 
 
 def main() -> None:
@@ -74,12 +74,12 @@ def main() -> None:
     if options.only and options.only not in programs:
         parser.error(f"--only {options.only}: there are {', '.join(programs)}")
     places = {str(Path(sys.executable).parent) + "/": "", options.data: "DATA", options.yardsticks or "BENCH": "BENCH"}
-    sections = sections_in(options.out.read_text("utf-8")) if options.out.exists() else {}
+    head, sections = parts_of(options.out.read_text("utf-8") if options.out.exists() else TITLE)
     for name in [options.only] if options.only else programs:
         print(name, file=sys.stderr, flush=True)
         sections[name] = section(name, programs[name], places)
         with atomic_write(options.out) as unfinished:
-            unfinished.write_text("\n".join([TITLE, *sections.values()]), "utf-8")
+            unfinished.write_text("\n".join([head, *sections.values()]), "utf-8")
 
 
 if __name__ == "__main__":
