@@ -9,8 +9,10 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.depth.rim_sides import step_distance
+from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
@@ -32,6 +34,10 @@ DEVIATIONS = 3.0
 """... so many standard deviations of the back's colours along it, ..."""
 LEAST_CONTRAST = 0.1
 """... and these differ by so much (sRGB-encoded, all channels together)."""
+LEAST_LENGTH_PX, GAP_PX = 20, 3
+"""An outline goes on for so many pixels, with so many at most from one to the next: what is shorter is an edge of
+something else.
+"""
 MOST_PIECE_PIXELS = 1 << 12
 
 
@@ -40,25 +46,112 @@ def widen_fronts(colors: FloatImage, values: FloatImage, step: float, should_sto
 
     Raises Cancelled once should_stop is true.
     """
-    distance = step_distance(values, step, SOFT_PX)
-    mixed, queued = np.zeros(values.shape, np.bool_), np.zeros(values.shape, np.bool_)
-    pixels = _beside_fronts(values, distance, step, queued)
-    # An outline hangs together with pixels that touch the front.
-    while len(pixels):
-        parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
-        find = partial(_find_mixed, colors, values, distance, step)
-        pixels = pixels[np.concatenate(in_pieces(find, parts, should_stop, tiling.THREADS))]
-        mixed.reshape(-1)[pixels] = True
-        pixels = _around(queued, pixels)
-    mixed = _outlines(colors, values, distance, step, np.flatnonzero(mixed))
+    mixed = _find_mixed(colors, values, step, should_stop)
+    mixed = _outlines(values, mixed, step, np.flatnonzero(mixed))
+    pixels, fronts = _grow(values, mixed, step, np.flatnonzero(mixed))
+    # What is mixed along a few pixels only is the edge of something else.
+    number = np.empty(values.shape, np.int32)
+    number_pixels(pixels, number)
+    goes_on = _goes_on(pixels, number)
+    mixed.reshape(-1)[pixels] = False
+    pixels, fronts = pixels[goes_on], fronts[goes_on]
     for _ in range(SOFT_PX):
-        grown = _grow(values, mixed, step, np.flatnonzero(mixed))
-        if not len(grown[0]):
+        if not len(pixels):
             break
         values = values.copy()
-        values.reshape(-1)[grown[0]] = grown[1]
-        mixed.reshape(-1)[grown[0]] = False
+        values.reshape(-1)[pixels] = fronts
+        mixed.reshape(-1)[pixels] = False
+        pixels, fronts = _grow(values, mixed, step, np.flatnonzero(mixed))
     return values
+
+
+def _find_mixed(colors: FloatImage, values: FloatImage, step: float, should_stop: ShouldStop) -> NDArray[np.bool_]:
+    """(H, W): what is mixed just behind an edge, and what is mixed beside that, and so on."""
+    distance, mixed = step_distance(values, step, SOFT_PX), np.zeros(values.shape, np.bool_)
+    fronts = np.full(values.shape, np.nan, np.float32)
+    ring = _first_ring(values, step, np.flatnonzero(distance == 0), fronts)
+    for _ in range(SOFT_PX):
+        parts = [ring[part] for part in pieces_of(len(ring), MOST_PIECE_PIXELS)]
+        in_pieces(partial(_weigh_colors, colors, values, distance, fronts, mixed), parts, should_stop, tiling.THREADS)
+        ring = _next_ring(values, step, distance, mixed, ring, fronts)
+    return mixed
+
+
+@kernel
+def _first_ring(values, step, pixels, fronts):
+    """Those of these pixels (flat indices) that touch a front; its disparity goes to fronts (H, W)."""
+    width = values.shape[1]
+    ring, count = np.empty(len(pixels), np.int64), 0
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        front = _front_beside(values, y, x, step)
+        if front != values[y, x]:
+            fronts[y, x], ring[count] = front, pixels[i]
+            count += 1
+    return ring[:count]
+
+
+@kernel
+def _next_ring(values, step, distance, mixed, ring, fronts):
+    """Pixels (flat indices) beside mixed ones of a ring, on their surface and in no ring yet; fronts are passed on."""
+    height, width = values.shape
+    beyond, count = np.empty(8 * len(ring), np.int64), 0
+    for i in range(len(ring)):
+        y, x = ring[i] // width, ring[i] % width
+        if not mixed[y, x]:
+            continue
+        for v in range(max(y - 1, 0), min(y + 2, height)):
+            for u in range(max(x - 1, 0), min(x + 2, width)):
+                is_new = distance[v, u] <= SOFT_PX and np.isnan(fronts[v, u])
+                if is_new and abs(values[v, u] - values[y, x]) <= step:
+                    fronts[v, u], beyond[count] = fronts[y, x], v * width + u
+                    count += 1
+    return beyond[:count]
+
+
+@kernel
+def _weigh_colors(colors, values, distance, fronts, mixed, pixels):
+    """Which of these pixels (flat indices) have colours on the way from their surface's to those of fronts (H, W)."""
+    height, width = values.shape
+    total, mean = np.empty(2), np.empty((2, 3))
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        own, front = values[y, x], fronts[y, x]
+        half = 0.5 * (front - own)
+        # Colours of both surfaces, where nothing is mixed.
+        total[:], mean[:] = 0.0, 0.0
+        for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height), STRIDE_PX):
+            for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width), STRIDE_PX):
+                if distance[v, u] > SOFT_PX and abs(values[v, u] - own) <= half:
+                    total[0] += 1
+                    for c in range(3):
+                        mean[0, c] += colors[v, u, c]
+                elif distance[v, u] > FRONT_PX and abs(values[v, u] - front) <= half:
+                    total[1] += 1
+                    for c in range(3):
+                        mean[1, c] += colors[v, u, c]
+        if total.min() < LEAST_SAMPLES:
+            continue
+        back, way = mean[0] / total[0], mean[1] / total[1] - mean[0] / total[0]
+        contrast = along = apart = 0.0
+        for c in range(3):
+            off = colors[y, x, c] - back[c]
+            contrast, along, apart = contrast + way[c] ** 2, along + way[c] * off, apart + off**2
+        if not (
+            contrast > LEAST_CONTRAST**2
+            and LEAST_SHARE * contrast < along < MOST_SHARE * contrast
+            and apart - along**2 / contrast < MOST_ASIDE**2 * contrast
+        ):
+            continue
+        spread = 0.0
+        for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height), STRIDE_PX):
+            for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width), STRIDE_PX):
+                if distance[v, u] > SOFT_PX and abs(values[v, u] - own) <= half:
+                    off = 0.0
+                    for c in range(3):
+                        off += way[c] * (colors[v, u, c] - back[c])
+                    spread += off**2
+        mixed[y, x] = along**2 > DEVIATIONS**2 * spread / total[0]
 
 
 @kernel
@@ -75,100 +168,25 @@ def _nearest_front(values, y, x, step):
 
 
 @kernel
-def _is_mixed(colors, values, distance, y, x, step):
-    """Whether a pixel behind an edge has a colour on the way from the back's to the front's."""
-    height, width = values.shape
-    if distance[y, x] > SOFT_PX:
-        return False
-    front_y, front_x = _nearest_front(values, y, x, step)
-    own, front = values[y, x], values[front_y, front_x]
-    if front == own:
-        return False
-    # Colours of both surfaces, where nothing is mixed.
-    half = 0.5 * (front - own)
-    rows = range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height), STRIDE_PX)
-    columns = range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width), STRIDE_PX)
-    backs = fronts = r0 = g0 = b0 = r1 = g1 = b1 = 0.0
-    for v in rows:
-        for u in columns:
-            if distance[v, u] > SOFT_PX and abs(values[v, u] - own) <= half:
-                backs += 1
-                r0, g0, b0 = r0 + colors[v, u, 0], g0 + colors[v, u, 1], b0 + colors[v, u, 2]
-            elif distance[v, u] > FRONT_PX and abs(values[v, u] - front) <= half:
-                fronts += 1
-                r1, g1, b1 = r1 + colors[v, u, 0], g1 + colors[v, u, 1], b1 + colors[v, u, 2]
-    if min(backs, fronts) < LEAST_SAMPLES:
-        return False
-    back = r0 / backs, g0 / backs, b0 / backs
-    way = r1 / fronts - back[0], g1 / fronts - back[1], b1 / fronts - back[2]
-    contrast = along = apart = 0.0
-    for c in range(3):
-        contrast += way[c] ** 2
-        along += way[c] * (colors[y, x, c] - back[c])
-        apart += (colors[y, x, c] - back[c]) ** 2
-    if not (
-        contrast > LEAST_CONTRAST**2
-        and LEAST_SHARE * contrast < along < MOST_SHARE * contrast
-        and apart - along**2 / contrast < MOST_ASIDE**2 * contrast
-    ):
-        return False
-    # Few are left to be told from what the back's colours differ by themselves.
-    spread = 0.0
-    for v in rows:
-        for u in columns:
-            if distance[v, u] > SOFT_PX and abs(values[v, u] - own) <= half:
-                off = 0.0
-                for c in range(3):
-                    off += way[c] * (colors[v, u, c] - back[c])
-                spread += off * off
-    return along**2 > DEVIATIONS**2 * spread / backs
-
-
-@kernel
-def _find_mixed(colors, values, distance, step, pixels):
-    """Which of these pixels (N, flat indices) are mixed."""
-    found, width = np.empty(len(pixels), np.bool_), values.shape[1]
-    for i in range(len(pixels)):
-        found[i] = _is_mixed(colors, values, distance, pixels[i] // width, pixels[i] % width, step)
-    return found
-
-
-@kernel
-def _around(queued, pixels):
-    """The pixels that touch these (flat indices), and are not queued yet; now they are."""
-    height, width = queued.shape
-    found, count = np.empty(8 * len(pixels), np.int64), 0
-    for pixel in pixels:
-        y, x = pixel // width, pixel % width
-        for v in range(max(y - 1, 0), min(y + 2, height)):
-            for u in range(max(x - 1, 0), min(x + 2, width)):
-                if not queued[v, u]:
-                    queued[v, u] = True
-                    found[count] = v * width + u
-                    count += 1
-    return found[:count]
-
-
-@kernel
-def _ends_clean(colors, values, distance, y, x, step):
+def _ends_clean(values, mixed, y, x, step):
     """Whether what is mixed around a pixel ends within SOFT_PX of the front: else it is the back's own."""
     height, width = values.shape
     front_y, front_x = _nearest_front(values, y, x, step)
     away = max(abs(y - front_y), abs(x - front_x))
     for k in range(SOFT_PX - 1, SOFT_PX + 1):
         v, u = front_y + nearest_pixel((y - front_y) * k / away), front_x + nearest_pixel((x - front_x) * k / away)
-        if not (0 <= v < height and 0 <= u < width) or _is_mixed(colors, values, distance, v, u, step):
+        if not (0 <= v < height and 0 <= u < width) or mixed[v, u]:
             return False
     return True
 
 
 @kernel
-def _outlines(colors, values, distance, step, pixels):
+def _outlines(values, mixed, step, pixels):
     """Those of mixed pixels (flat indices), (H, W), that end clean."""
-    outlines = np.zeros(values.shape, np.bool_)
+    outlines = np.zeros_like(mixed)
     for i in range(len(pixels)):
         y, x = pixels[i] // values.shape[1], pixels[i] % values.shape[1]
-        outlines[y, x] = _ends_clean(colors, values, distance, y, x, step)
+        outlines[y, x] = _ends_clean(values, mixed, y, x, step)
     return outlines
 
 
@@ -181,20 +199,6 @@ def _front_beside(values, y, x, step):
         for u in range(max(x - 1, 0), min(x + 2, width)):
             front = max(front, values[v, u])
     return front if front - values[y, x] > step else values[y, x]
-
-
-@kernel
-def _beside_fronts(values, distance, step, queued):
-    """The pixels (flat indices) that touch a front; they are marked as queued. distance (H, W): see `step_distance`."""
-    height, width = values.shape
-    found, count = np.empty(values.size, np.int64), 0
-    for y in range(height):
-        for x in range(width):
-            if distance[y, x] <= SOFT_PX and _front_beside(values, y, x, step) != values[y, x]:
-                queued[y, x] = True
-                found[count] = y * width + x
-                count += 1
-    return found[:count]
 
 
 @kernel
@@ -217,3 +221,28 @@ def _grow(values, mixed, step, pixels):
             grown[count], fronts[count] = pixels[i], front
             count += 1
     return grown[:count], fronts[:count]
+
+
+@kernel
+def _goes_on(pixels, number):
+    """Which of these pixels (flat indices) are LEAST_LENGTH_PX and more, each within GAP_PX of another. number (H, W):
+    which one each pixel is, or -1; those that were looked at come back as -1.
+    """
+    height, width = number.shape
+    together, goes_on = np.empty(len(pixels), np.int64), np.zeros(len(pixels), np.bool_)
+    for first in range(len(pixels)):
+        together[0], count, looked_at = first, 0, 0
+        if number[pixels[first] // width, pixels[first] % width] == first:
+            number[pixels[first] // width, pixels[first] % width], count = -1, 1
+        while looked_at < count:
+            y, x = pixels[together[looked_at]] // width, pixels[together[looked_at]] % width
+            looked_at += 1
+            for v in range(max(y - GAP_PX, 0), min(y + GAP_PX + 1, height)):
+                for u in range(max(x - GAP_PX, 0), min(x + GAP_PX + 1, width)):
+                    if number[v, u] >= 0:
+                        together[count], number[v, u] = number[v, u], -1
+                        count += 1
+        if count >= LEAST_LENGTH_PX:
+            for n in range(count):
+                goes_on[together[n]] = True
+    return goes_on
