@@ -128,12 +128,13 @@ class FreeViews:
         self.scale_px = camera.focal_px[0] * reach.step
         disparity = inverse_depth * np.float32(self.scale_px)
         self._step = rounding_step(disparity)
-        colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, should_stop)
+        farthest = farthest_views(reach.outer)
+        colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, farthest, should_stop)
         x, y = camera.centre_px
         centre_px = x + reach.margins.left, y + reach.margins.top
         self._camera = replace(camera, size=image_size(disparity), centre_px=centre_px)
         outer = reach.outer if inpainter is not None else ()
-        self._rays = rays_of_photo(colors, disparity, farthest_views(reach.outer), len(outer), should_stop)
+        self._rays = rays_of_photo(colors, disparity, farthest, len(outer), should_stop)
         completing = render_outer_views(self._rays, outer, should_stop, inpainter or fill_background)
         for done, _ in enumerate(completing, 1):
             report_progress(done, len(outer), "what cameras may see beside the photo's surfaces")

@@ -1,6 +1,6 @@
 """The photo continued beyond its frame, once, so that all views show the same there.
 
-Surfaces go on as they leave the frame, and lines straight on. Other colours are those of the frame's nearest pixels,
+Surfaces go on along their outlines, and lines straight on. Other colours are those that a surface has where it leaves,
 averaged along the frame ever wider the farther out: who can tell which of them goes on. They get the fine texture of
 what lies as far inside.
 """
@@ -12,6 +12,7 @@ from math import hypot, log2
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.leaving_surfaces import follow_surfaces
 from iibr_core.inpainting.rim_lines import find_lines, line_weight
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -25,16 +26,23 @@ TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0
 """So much of the photo's texture is seen far beyond its frame, half of that at this distance: its place there is a
 guess, and close to the frame nobody misses it.
 """
+SURFACE_PX = 2.0
+"""Surfaces that part by less than this are one."""
 SLANT, PLACES = 2.0, 8
 """Lines are followed from so many places each way on the frame, from up to SLANT times as far as the frame is."""
 
 
 def extend_beyond_frame(
-    colors: FloatImage, disparity: FloatImage, margins: Margins, should_stop: ShouldStop = never
+    colors: FloatImage,
+    disparity: FloatImage,
+    margins: Margins,
+    farthest_views: float,
+    should_stop: ShouldStop = never,
 ) -> tuple[FloatImage, FloatImage]:
     """The photo's colors (H, W, 3) and disparity (H, W) in the middle of larger ones, which are filled around it.
 
-    margins: so many pixels on each side. Raises Cancelled once should_stop is true.
+    margins: so many pixels on each side. farthest_views: surfaces are one that part by less than SURFACE_PX so many
+    view steps away. Raises Cancelled once should_stop is true.
     """
     size = image_size(disparity)
     if not any(margins):
@@ -46,8 +54,12 @@ def extend_beyond_frame(
     lines = np.empty((len(frame), 2), np.float32)
     find_lines(colors, disparity, disparity, frame, np.inf, lines)
 
+    continued = follow_surfaces(disparity, margins, SURFACE_PX / farthest_views)
+
     def band(first: int, last: int) -> None:
-        _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
+        _extend_rows(
+            colors, disparity, frame, continued, means, margins.top, margins.left, first, last, grown, surfaces
+        )
         _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
 
     in_bands(band, larger, should_stop)
@@ -106,22 +118,24 @@ def _texture(colors, y, x, c):
 
 
 @kernel
-def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfaces):
+def _extend_rows(colors, disparity, frame, continued, means, top, left, first, last, grown, surfaces):
     height, width = disparity.shape
     for row in range(first, last):
         for column in range(grown.shape[1]):
-            # The nearest pixel of the photo: its surface goes on.
             y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
-            surfaces[row, column] = disparity[y, x]
             away = hypot(row - top - y, column - left - x)
             if away == 0.0:
+                surfaces[row, column] = disparity[y, x]
                 for c in range(3):
                     grown[row, column, c] = colors[y, x, c]
                 continue
-            level, place = _level(away), _place_on_frame(height, width, y, x)
+            # The place on the frame whose surface goes on.
+            place, level = continued[row, column], _level(away)
+            y, x = frame[place] // width, frame[place] % width
+            surfaces[row, column] = disparity[y, x]
             k = min(int(level), len(means) - 2)
             part = np.float32(level - k)
-            # What lies as far inside gives the texture.
+            # What lies as far inside, on the other side of that place, gives the texture.
             share = np.float32(TEXTURE_SHARE * away / (away + TEXTURE_PX))
             v = min(max(2 * y - row + top, 0), height - 1)
             u = min(max(2 * x - column + left, 0), width - 1)

@@ -56,7 +56,7 @@ def rays_of_photo(
     farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
     margins: so far beyond its frame the photo is continued. Raises Cancelled once should_stop is true.
     """
-    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop)
+    colors, disparity = extend_beyond_frame(colors, disparity, margins, farthest_views, should_stop)
     centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
     detail = measure_detail(colors, should_stop)

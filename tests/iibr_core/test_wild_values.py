@@ -42,7 +42,7 @@ from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
 from iibr_core.generation import cost_model, dense_field, free_views, outer_views, plan, relief
 from iibr_core.generation import light_field as generating
-from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes
+from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes, leaving_surfaces
 from iibr_core.rendering import (
     candidates,
     coherent_cells,
@@ -402,8 +402,11 @@ FINITE = {
         camera(), camera(position=np.array([0.0, v, 0.1]), focal_px=(v, 20.0)), 10.0
     ),
     "inpainting.beyond_frame.extend_beyond_frame": lambda v, _: beyond_frame.extend_beyond_frame(
-        np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2)
+        np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2), 1.0
     )[0],
+    "inpainting.leaving_surfaces.follow_surfaces": lambda v, _: leaving_surfaces.follow_surfaces(
+        known(v), Margins(1, 2, 3, 2), 1.0
+    ),
     "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
     "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0.0, 1.0)),
     "rendering.resampling.heaviest_candidate": lambda v, _: resampling.heaviest_candidate(
