@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.crumbs import fill_crumbs
+from iibr_core.depth.rim_noise import steady_rims
 from iibr_core.depth.rim_sides import RIM_PX, choose_sides, step_distance
 from iibr_core.depth.soft_outlines import widen_fronts
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
@@ -35,7 +36,7 @@ MOST_FELLOWS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
 OUTLINE_EDGES = 3.0
 """Times the least edge: fronts that stand out by more have soft outlines."""
-CRUMB_EDGES = 2.0
+NOISE_EDGES = 2.0
 """Times the least edge: what stands off by less is a surface's noise."""
 CROWD_PX = 5
 CROWDED = 0.3
@@ -56,10 +57,11 @@ def settle_rims(
     soft: (H, W), where the map was soft before it was sharpened; None: nowhere.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
     unknown, and all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then
-    pixels of rims change sides where the colours say so, fronts grow over outlines that are soft in the photo, and
-    crumbs that are left are filled. An exact map, which has neither such disparities nor unknown ones in its rims,
-    comes back as it is; of one that was soft in places, those lose their crumbs, and all else is done there only if
-    sharpening has left disparities between surfaces. Raises Cancelled once should_stop is true.
+    pixels of rims change sides where the colours say so, fronts grow over outlines that are soft in the photo, rims
+    that waver are smoothed along themselves, and crumbs that are left are filled. An exact map, which has neither such
+    disparities nor unknown ones in its rims, comes back as it is; of one that was soft in places, those lose their
+    crumbs, and all else is done there only if sharpening has left disparities between surfaces. Raises Cancelled once
+    should_stop is true.
     """
     colors = np.ascontiguousarray(photo, np.float32)
     rim = step_distance(values, least_edge) < RIM_PX
@@ -77,7 +79,8 @@ def settle_rims(
     if not is_exact or is_left:
         settled = choose_sides(colors, settled, between | unknown, least_edge, should_stop)
         settled = widen_fronts(colors, settled, OUTLINE_EDGES * least_edge, should_stop)
-    settled = fill_crumbs(colors, settled, CRUMB_EDGES * least_edge, should_stop)
+        settled = steady_rims(colors, settled, NOISE_EDGES * least_edge, should_stop)
+    settled = fill_crumbs(colors, settled, NOISE_EDGES * least_edge, should_stop)
     # Where the map was not soft, it is exact.
     return settled if soft is None or not is_exact else np.where(soft, settled, values)
 

@@ -22,6 +22,7 @@ from iibr_core.depth import (
     edge_blur,
     pictorial_cues,
     refine,
+    rim_noise,
     rim_sides,
     rims,
     scaling,
@@ -341,6 +342,10 @@ FINITE = {
         rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
     ],
     "depth.rim_sides.step_distance": lambda v, _: rim_sides.step_distance(depths(v), 0.5),
+    "depth.rim_noise.steady_rims": lambda v, _: [
+        rim_noise.steady_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
+        rim_noise.steady_rims(image(v), mixed_between_surfaces(), 0.5, never),
+    ],
     "depth.soft_outlines.widen_fronts": lambda v, _: [
         soft_outlines.widen_fronts(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
         soft_outlines.widen_fronts(image(v), mixed_between_surfaces(), 0.5, never),
