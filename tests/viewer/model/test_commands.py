@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from iibr_core.types import ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
+from viewer.cli.demo import demo_photo
 from viewer.model.actions import AskToSave
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
 from viewer.model.lens.presets import PRESETS
@@ -76,11 +77,11 @@ def test_recent_files_come_first_in_the_list_but_for_the_open_one() -> None:
     assert [command.name for command in commands_matching("two", recent_commands(state))] == ["Open two.jpg"]
 
 
-def test_nothing_is_proposed_to_be_put_among_pasted_pictures() -> None:
-    """They lie in a cache that is emptied."""
-    pasted = Source("/home/a/.cache/iibr/clipboard/pasted/pasted-1.png")
-    state = state_with(replace(scene_of(source=pasted), name="pasted-1"))
+@pytest.mark.parametrize("path", ["/home/a/.cache/iibr/clipboard/pasted/photo.png", str(demo_photo())])
+def test_nothing_is_proposed_to_be_put_into_a_folder_of_the_program(path: str) -> None:
+    """A cache that is emptied, the demo's in the installation."""
+    state = state_with(replace(scene_of(source=Source(path)), name="photo"))
     saved, exported = (reduce(state, action).prompt for action in (AskToSave(), AskToExport()))
     assert isinstance(saved, SavePrompt)
     assert isinstance(exported, ExportPrompt)
-    assert (saved.path, exported.path) == ("~/pasted-1-iibr.png", "~/pasted-1-quilt.png")
+    assert (saved.path, exported.path) == ("~/photo-iibr.png", "~/photo-quilt.png")

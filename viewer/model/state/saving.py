@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.runtime.resources import resource_folder
 from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import Optics
 from viewer.model.state.scene import Source
@@ -15,9 +16,12 @@ PASTED_FOLDER = "pasted"
 
 
 def path_beside(path: str, name: str) -> str:
-    """Where a file of this name is saved that is made of the photo at path: beside it, of a pasted one at home."""
+    """Where a file of this name is saved that is made of the photo at path: beside it; at home, of a pasted one and of
+    the demo, whose folder is the program's.
+    """
     folder = PurePath(path).parent
-    return str((PurePath("~") if folder.name == PASTED_FOLDER else folder) / name)
+    is_ours = folder.name == PASTED_FOLDER or folder.is_relative_to(resource_folder("assets"))
+    return str((PurePath("~") if is_ours else folder) / name)
 
 
 @dataclass(frozen=True)
