@@ -19,6 +19,8 @@ from iibr_core.types import ImageSize, InputError, image_size
 
 # Some cameras pad their JPEGs; the decoder complains and loses nothing.
 HARMLESS_MESSAGE = "extraneous bytes"
+NO_READER = "could not find a format reader"
+"""OpenImageIO's words for a file of a kind that it does not know."""
 ROWS_AT_ONCE = 64
 """Of a file without tiles: a multiple of what most strips hold."""
 MOST_PNG_SIDE = 1_000_000
@@ -171,7 +173,10 @@ def _open(path: Path) -> Any:
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(oiio_name(path), hints)
     if source is None:
-        raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint_of(oiio), path)})")
+        complaint = complaint_of(oiio)
+        if NO_READER in complaint:
+            raise InputError(f"{path}: cannot be read as a picture (of no known kind); save it as JPEG, PNG or TIFF")
+        raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint, path)})")
     spec = source.spec()
     if spec.width * spec.height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {spec.width}x{spec.height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")

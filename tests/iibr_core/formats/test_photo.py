@@ -288,8 +288,10 @@ def test_max_pixels_of_zero_is_refused(tmp_path):
 def test_missing_folder_empty_or_no_picture(tmp_path):
     (tmp_path / "empty.png").touch()
     (tmp_path / "text.jpg").write_text("this is no picture")
+    (tmp_path / "notes.txt").write_text("this is no picture")
     (tmp_path / "folder.png").mkdir()
     for name, reason in [
+        ("notes.txt", r"no known kind\); save it as JPEG"),
         ("none.png", "no such file"),
         ("empty.png", "empty"),
         ("text.jpg", "cannot be read"),
