@@ -6,6 +6,7 @@ import pytest
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
 from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.inpainting.beyond_frame import (
+    LINES_PX,
     PLACES,
     SLANT,
     SURFACE_PX,
@@ -63,7 +64,8 @@ def extend_slowly(colors, disparity, margins, farthest):
         v, u = 2 * y - row + margins.top, 2 * x - column + margins.left
         detail = colors[v, u] - np.einsum("ij,ijc->c", kernel, around[v : v + 5, u : u + 5])
         colour = np.maximum(mean + TEXTURE_SHARE * away / (away + TEXTURE_PX) * detail, 0)
-        total, step = 1.0, SLANT * away / PLACES
+        other, step = away / (away + LINES_PX), SLANT * away / PLACES
+        total, colour = other, other * colour
         for j in range(-PLACES, PLACES + 1):
             n = int(np.floor(nearest + j * step + 0.5)) % len(places)
             way = column - margins.left - places[n][1], row - margins.top - places[n][0]
