@@ -20,8 +20,11 @@ def height_at(values, x, y):
     x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
     left, top = min(int(x), width - 2), min(int(y), height - 2)
     u, v = x - left, y - top
-    above = values[top, left] * (1.0 - u) + values[top, left + 1] * u
-    below = values[top + 1, left] * (1.0 - u) + values[top + 1, left + 1] * u
+    # Unsigned indices need no test for counting from the end.
+    left, top = np.uint64(left), np.uint64(top)
+    right, under = left + np.uint64(1), top + np.uint64(1)
+    above = values[top, left] * (1.0 - u) + values[top, right] * u
+    below = values[under, left] * (1.0 - u) + values[under, right] * u
     return above * (1.0 - v) + below * v
 
 

@@ -45,8 +45,10 @@ def _color_at(photo, x, y):
     height, width = photo.shape[:2]
     x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
     left, top = int(x), int(y)
-    right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
     u, v = x - left, y - top
+    # Unsigned indices need no test for counting from the end.
+    right, bottom = np.uint64(min(left + 1, width - 1)), np.uint64(min(top + 1, height - 1))
+    left, top = np.uint64(left), np.uint64(top)
     a, b, c, d = (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v
     red = a * photo[top, left, 0] + b * photo[top, right, 0] + c * photo[bottom, left, 0] + d * photo[bottom, right, 0]
     green = (
@@ -66,11 +68,12 @@ def _product(a, b, origin):
 
 
 @kernel
-def _structure_shares(photo, x, y, across, down, feet, shares):
+def _structure_shares(photo, x, y, across, down, feet, widest, shares):
     """How much of a structure each place of the line across its crest (x, y) shows, by its colour, into shares (N,).
 
     Place k lies (k - N // 2) / SAMPLES_A_PX px from the crest; feet: where what is beside the structure begins on
-    both sides, px. Returns first and last place that show any of it; last < first where the photo has no outline of it.
+    both sides, px. Returns first and last place that show any of it; last < first where the photo has no outline of it,
+    or one of more than so many px.
     """
     before = _color_at(photo, x - across * feet[0], y - down * feet[0])
     after = _color_at(photo, x + across * feet[1], y + down * feet[1])
@@ -100,6 +103,8 @@ def _structure_shares(photo, x, y, across, down, feet, shares):
                 break
             shares[k] = share
             first, last = min(first, k), max(last, k)
+            if last - first > widest * SAMPLES_A_PX:
+                return 1, 0
             k += side
     if first == 0 or last == len(shares) - 1:
         return 1, 0
@@ -170,6 +175,8 @@ def _feet(values, x, y, across, down, sign, reach, least_edge):
     """
     crest = height_at(values, x, y)
     before, low, _, _, _ = walk(values, x, y, sign * across, sign * down, -sign, reach, 1.0, np.inf)
+    if not sign * (crest - low) >= least_edge:
+        return 0.0, 0.0
     after, high, _, _, _ = walk(values, x, y, -sign * across, -sign * down, -sign, reach, 1.0, np.inf)
     drops = sign * (crest - low), sign * (crest - high)
     if not (min(drops) >= max(least_edge, LEAST_SIDE * max(drops)) and min(before, after) > 0):
@@ -196,8 +203,8 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     feet = _feet(values, crest_x, crest_y, across, down, sign, min(reach, SEARCHED_PX - 4), least_edge)
     if feet[0] == 0:
         return 0.0, 0.0, 0.0
-    first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, shares)
-    if not 0 <= last - first <= (WIDEST_SIGMAS * sigma + 1) * SAMPLES_A_PX:
+    first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, WIDEST_SIGMAS * sigma + 1, shares)
+    if last < first:
         return 0.0, 0.0, 0.0
     height, ground, slope, misfit = _fit_structure(
         values, crest_x, crest_y, across, down, shares, first, last, sigma, taps
@@ -230,7 +237,7 @@ def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, 
         beyond = height_at(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down)
         if not abs(beyond - level) <= FLAT_SIDE * abs(crest - level):
             return 0.0, 0.0, 0.0
-    first, last = _structure_shares(photo, x, y, across, down, feet, shares)
+    first, last = _structure_shares(photo, x, y, across, down, feet, np.inf, shares)
     best, sigma, height = MOST_MISFIT, 0.0, 0.0
     if first <= last:
         for blur in BLURS:
