@@ -32,12 +32,19 @@ def fill_crumbs(photo: FloatImage, values: FloatImage, step: float, should_stop:
 
 @kernel
 def _find_crumbs(values, step, first, last, crumbs):
-    """Rows [first, last): pixels that hang together with fewer than MOST_PX others, diagonally too."""
+    """Mark in rows [first, last) the pixels that hang together with fewer than MOST_PX others, diagonally too."""
     height, width = values.shape
     together = np.empty((MOST_PX + 9, 2), np.int64)
     for y in range(first, last):
         for x in range(width):
-            # A flood that ends as soon as it is too large: mostly after the first pixel's neighbours.
+            # Most pixels have enough neighbours.
+            fellows = -1
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    fellows += abs(values[v, u] - values[y, x]) <= step
+            if fellows >= MOST_PX:
+                continue
+            # A flood that ends as soon as it is too large.
             together[0, 0], together[0, 1], count, looked_at = y, x, 1, 0
             while looked_at < count <= MOST_PX:
                 near_y, near_x = together[looked_at]

@@ -91,16 +91,14 @@ def _mean_along(colors, values, distance, step, pixels):
     nearer they are and the more they look alike; once more without those far off it. NaN where there are few.
     """
     height, width = values.shape
-    means, weight = np.full(len(pixels), np.float32(np.nan)), np.empty(NEARNESS.shape)
+    means = np.full(len(pixels), np.float32(np.nan))
+    off, weight = np.empty(NEARNESS.size), np.empty(NEARNESS.size)
     for n in range(len(pixels)):
         y, x = pixels[n] // width, pixels[n] % width
-        own, away = values[y, x], distance[y, x]
-        top, bottom = max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)
-        left, right = max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)
+        own, away, count = values[y, x], distance[y, x], 0
         total = weights = 0.0
-        for v in range(top, bottom):
-            for u in range(left, right):
-                w = 0.0
+        for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)):
+            for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
                 if distance[v, u] == away and abs(values[v, u] - own) <= step:
                     apart = 0.0
                     for c in range(3):
@@ -108,22 +106,18 @@ def _mean_along(colors, values, distance, step, pixels):
                     # Colours that are not finite are like no other.
                     likeness = exp(-0.5 * apart / (ALIKE * ALIKE)) if apart < np.inf else 0.0
                     w = (likeness + UNLIKE_WEIGHT) * NEARNESS[v - y + REACH_PX, u - x + REACH_PX]
+                    off[count], weight[count], count = values[v, u] - own, w, count + 1
                     total, weights = total + w * (values[v, u] - own), weights + w
-                weight[v - top, u - left] = w
         if weights < LEAST_WEIGHT:
             continue
         mean, deviation = total / weights, 0.0
-        for v in range(top, bottom):
-            for u in range(left, right):
-                if weight[v - top, u - left] > 0:
-                    deviation += weight[v - top, u - left] * abs(values[v, u] - own - mean)
+        for k in range(count):
+            deviation += weight[k] * abs(off[k] - mean)
         limit = OUTLIER * deviation / weights
         total = weights = 0.0
-        for v in range(top, bottom):
-            for u in range(left, right):
-                if weight[v - top, u - left] > 0:
-                    off = abs(values[v, u] - own - mean)
-                    w = weight[v - top, u - left] * (limit / off if off > limit else 1.0)
-                    total, weights = total + w * (values[v, u] - own), weights + w
+        for k in range(count):
+            far = abs(off[k] - mean)
+            w = weight[k] * (limit / far if far > limit else 1.0)
+            total, weights = total + w * off[k], weights + w
         means[n] = own + total / weights
     return means
