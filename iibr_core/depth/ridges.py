@@ -44,11 +44,10 @@ def _color_at(photo, x, y):
     """The photo's colour at a real position, bilinear."""
     height, width = photo.shape[:2]
     x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
-    left, top = int(x), int(y)
-    u, v = x - left, y - top
+    u, v = x - int(x), y - int(y)
     # Unsigned indices need no test for counting from the end.
-    right, bottom = np.uint64(min(left + 1, width - 1)), np.uint64(min(top + 1, height - 1))
-    left, top = np.uint64(left), np.uint64(top)
+    left, right = np.uint64(x), np.uint64(min(int(x) + 1, width - 1))
+    top, bottom = np.uint64(y), np.uint64(min(int(y) + 1, height - 1))
     a, b, c, d = (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v
     red = a * photo[top, left, 0] + b * photo[top, right, 0] + c * photo[bottom, left, 0] + d * photo[bottom, right, 0]
     green = (
