@@ -39,7 +39,7 @@ SAMPLED = 8
 LEAST_SAMPLES = 20
 """Fewer tell nothing."""
 LEAST_SHARE = 0.5
-"""Of a rim's variance that must be noise: less is a surface's own, told too exactly."""
+"""Of a rim's variance that must be noise, or it stays: smaller shares are not told exactly."""
 MOST_PIECE_PIXELS = 1 << 12
 
 
