@@ -1,7 +1,8 @@
 """Soft outlines: of fronts out of focus, and of hair, maps leave to the back what is mixed with it, pixels wide.
 
 There it would stay behind as a ghost, and tint all that is filled beside it. Single mixed pixels beside an edge are
-left to matting (`rendering/mixed_pixels.py`): a front grows only where the second pixel behind its edge is mixed, too.
+left to matting (`rendering/mixed_pixels.py`): a front grows only where the second pixel behind its edge is mixed, too,
+and along outlines that go on and fade. Edges of other things look like the front here and there, but do neither.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.depth.rim_sides import step_distance
 from iibr_core.inpainting.nearest_known import number_pixels
@@ -34,10 +34,10 @@ DEVIATIONS = 3.0
 """... so many standard deviations of the back's colours along it, ..."""
 LEAST_CONTRAST = 0.1
 """... and these differ by so much (sRGB-encoded, all channels together)."""
-LEAST_LENGTH_PX, GAP_PX = 20, 3
-"""An outline goes on for so many pixels, with so many at most from one to the next: what is shorter is an edge of
-something else.
-"""
+LEAST_LENGTH_PX, GAP_PX = 24, 3
+"""An outline goes on for so many pixels, with so many at most from one to the next, ..."""
+MOST_BEYOND = 0.5
+"""... and the front's mean share falls, to less than this at its second pixel. Else it is an edge of something else."""
 MOST_PIECE_PIXELS = 1 << 12
 
 
@@ -46,35 +46,34 @@ def widen_fronts(colors: FloatImage, values: FloatImage, step: float, should_sto
 
     Raises Cancelled once should_stop is true.
     """
-    mixed = _find_mixed(colors, values, step, should_stop)
-    mixed = _outlines(values, mixed, step, np.flatnonzero(mixed))
-    pixels, fronts = _grow(values, mixed, step, np.flatnonzero(mixed))
-    # What is mixed along a few pixels only is the edge of something else.
+    shares = _find_mixed(colors, values, step, should_stop)
+    shares = _outlines(values, shares, step, np.flatnonzero(shares))
+    pixels, fronts, beyond = _grow(values, shares, step, np.flatnonzero(shares))
     number = np.empty(values.shape, np.int32)
     number_pixels(pixels, number)
-    goes_on = _goes_on(pixels, number)
-    mixed.reshape(-1)[pixels] = False
-    pixels, fronts = pixels[goes_on], fronts[goes_on]
+    fades = _fades(pixels, shares.reshape(-1)[pixels], beyond, number)
+    shares.reshape(-1)[pixels] = 0
+    pixels, fronts = pixels[fades], fronts[fades]
     for _ in range(SOFT_PX):
         if not len(pixels):
             break
         values = values.copy()
         values.reshape(-1)[pixels] = fronts
-        mixed.reshape(-1)[pixels] = False
-        pixels, fronts = _grow(values, mixed, step, np.flatnonzero(mixed))
+        shares.reshape(-1)[pixels] = 0
+        pixels, fronts, _ = _grow(values, shares, step, np.flatnonzero(shares))
     return values
 
 
-def _find_mixed(colors: FloatImage, values: FloatImage, step: float, should_stop: ShouldStop) -> NDArray[np.bool_]:
-    """(H, W): what is mixed just behind an edge, and what is mixed beside that, and so on."""
-    distance, mixed = step_distance(values, step, SOFT_PX), np.zeros(values.shape, np.bool_)
+def _find_mixed(colors: FloatImage, values: FloatImage, step: float, should_stop: ShouldStop) -> FloatImage:
+    """(H, W): the front's share in what is mixed just behind an edge, what is mixed beside that, and so on; or 0."""
+    distance, shares = step_distance(values, step, SOFT_PX), np.zeros(values.shape, np.float32)
     fronts = np.full(values.shape, np.nan, np.float32)
     ring = _first_ring(values, step, np.flatnonzero(distance == 0), fronts)
     for _ in range(SOFT_PX):
         parts = [ring[part] for part in pieces_of(len(ring), MOST_PIECE_PIXELS)]
-        in_pieces(partial(_weigh_colors, colors, values, distance, fronts, mixed), parts, should_stop, tiling.THREADS)
-        ring = _next_ring(values, step, distance, mixed, ring, fronts)
-    return mixed
+        in_pieces(partial(_weigh_colors, colors, values, distance, fronts, shares), parts, should_stop, tiling.THREADS)
+        ring = _next_ring(values, step, distance, shares, ring, fronts)
+    return shares
 
 
 @kernel
@@ -92,13 +91,13 @@ def _first_ring(values, step, pixels, fronts):
 
 
 @kernel
-def _next_ring(values, step, distance, mixed, ring, fronts):
+def _next_ring(values, step, distance, shares, ring, fronts):
     """Pixels (flat indices) beside mixed ones of a ring, on their surface and in no ring yet; fronts are passed on."""
     height, width = values.shape
     beyond, count = np.empty(8 * len(ring), np.int64), 0
     for i in range(len(ring)):
         y, x = ring[i] // width, ring[i] % width
-        if not mixed[y, x]:
+        if shares[y, x] == 0:
             continue
         for v in range(max(y - 1, 0), min(y + 2, height)):
             for u in range(max(x - 1, 0), min(x + 2, width)):
@@ -110,8 +109,10 @@ def _next_ring(values, step, distance, mixed, ring, fronts):
 
 
 @kernel
-def _weigh_colors(colors, values, distance, fronts, mixed, pixels):
-    """Which of these pixels (flat indices) have colours on the way from their surface's to those of fronts (H, W)."""
+def _weigh_colors(colors, values, distance, fronts, shares, pixels):
+    """How far these pixels' colours (flat indices) are on the way from their surface's to those of fronts (H, W), where
+    they are on it, goes to shares (H, W).
+    """
     height, width = values.shape
     total, mean = np.empty(2), np.empty((2, 3))
     for i in range(len(pixels)):
@@ -151,7 +152,8 @@ def _weigh_colors(colors, values, distance, fronts, mixed, pixels):
                     for c in range(3):
                         off += way[c] * (colors[v, u, c] - back[c])
                     spread += off**2
-        mixed[y, x] = along**2 > DEVIATIONS**2 * spread / total[0]
+        if along**2 > DEVIATIONS**2 * spread / total[0]:
+            shares[y, x] = along / contrast
 
 
 @kernel
@@ -168,25 +170,26 @@ def _nearest_front(values, y, x, step):
 
 
 @kernel
-def _ends_clean(values, mixed, y, x, step):
+def _ends_clean(values, shares, y, x, step):
     """Whether what is mixed around a pixel ends within SOFT_PX of the front: else it is the back's own."""
     height, width = values.shape
     front_y, front_x = _nearest_front(values, y, x, step)
     away = max(abs(y - front_y), abs(x - front_x))
     for k in range(SOFT_PX - 1, SOFT_PX + 1):
         v, u = front_y + nearest_pixel((y - front_y) * k / away), front_x + nearest_pixel((x - front_x) * k / away)
-        if not (0 <= v < height and 0 <= u < width) or mixed[v, u]:
+        if not (0 <= v < height and 0 <= u < width) or shares[v, u] > 0:
             return False
     return True
 
 
 @kernel
-def _outlines(values, mixed, step, pixels):
-    """Those of mixed pixels (flat indices), (H, W), that end clean."""
-    outlines = np.zeros_like(mixed)
+def _outlines(values, shares, step, pixels):
+    """The shares (H, W) of those pixels (flat indices) that end clean."""
+    outlines = np.zeros_like(shares)
     for i in range(len(pixels)):
         y, x = pixels[i] // values.shape[1], pixels[i] % values.shape[1]
-        outlines[y, x] = _ends_clean(values, mixed, y, x, step)
+        if _ends_clean(values, shares, y, x, step):
+            outlines[y, x] = shares[y, x]
     return outlines
 
 
@@ -202,47 +205,51 @@ def _front_beside(values, y, x, step):
 
 
 @kernel
-def _grow(values, mixed, step, pixels):
-    """Of these pixels (flat indices), those that touch a front and have a mixed neighbour that touches none; the
-    disparity of that front.
+def _grow(values, shares, step, pixels):
+    """Of these pixels (flat indices), those that touch a front and have mixed neighbours that touch none; the disparity
+    of that front, and those neighbours' mean share.
     """
     height, width = values.shape
-    grown, fronts, count = np.empty(len(pixels), np.int64), np.empty(len(pixels), np.float32), 0
+    grown, count = np.empty(len(pixels), np.int64), 0
+    fronts, beyond = np.empty(len(pixels), np.float32), np.empty(len(pixels), np.float32)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        front, is_wide = _front_beside(values, y, x, step), False
+        front, total, places = _front_beside(values, y, x, step), 0.0, 0
         if front == values[y, x]:
             continue
         for v in range(max(y - 1, 0), min(y + 2, height)):
             for u in range(max(x - 1, 0), min(x + 2, width)):
-                if mixed[v, u] and abs(values[v, u] - values[y, x]) <= step:
-                    is_wide |= _front_beside(values, v, u, step) == values[v, u]
-        if is_wide:
-            grown[count], fronts[count] = pixels[i], front
+                is_beside = shares[v, u] > 0 and abs(values[v, u] - values[y, x]) <= step
+                if is_beside and _front_beside(values, v, u, step) == values[v, u]:
+                    total, places = total + shares[v, u], places + 1
+        if places > 0:
+            grown[count], fronts[count], beyond[count] = pixels[i], front, total / places
             count += 1
-    return grown[:count], fronts[:count]
+    return grown[:count], fronts[:count], beyond[:count]
 
 
 @kernel
-def _goes_on(pixels, number):
-    """Which of these pixels (flat indices) are LEAST_LENGTH_PX and more, each within GAP_PX of another. number (H, W):
-    which one each pixel is, or -1; those that were looked at come back as -1.
+def _fades(pixels, shares, beyond, number):
+    """Which of these pixels (flat indices) are of an outline that fades: LEAST_LENGTH_PX and more, each within GAP_PX
+    of another. shares, beyond (N,): the front's in each, and just beyond it. number (H, W): which one each pixel is, or
+    -1; comes back as -1.
     """
     height, width = number.shape
-    together, goes_on = np.empty(len(pixels), np.int64), np.zeros(len(pixels), np.bool_)
+    together, fades = np.empty(len(pixels), np.int64), np.zeros(len(pixels), np.bool_)
     for first in range(len(pixels)):
-        together[0], count, looked_at = first, 0, 0
+        together[0], count, looked_at, own_share, beyond_share = first, 0, 0, 0.0, 0.0
         if number[pixels[first] // width, pixels[first] % width] == first:
             number[pixels[first] // width, pixels[first] % width], count = -1, 1
         while looked_at < count:
-            y, x = pixels[together[looked_at]] // width, pixels[together[looked_at]] % width
-            looked_at += 1
+            n = together[looked_at]
+            y, x, looked_at = pixels[n] // width, pixels[n] % width, looked_at + 1
+            own_share, beyond_share = own_share + shares[n], beyond_share + beyond[n]
             for v in range(max(y - GAP_PX, 0), min(y + GAP_PX + 1, height)):
                 for u in range(max(x - GAP_PX, 0), min(x + GAP_PX + 1, width)):
                     if number[v, u] >= 0:
                         together[count], number[v, u] = number[v, u], -1
                         count += 1
-        if count >= LEAST_LENGTH_PX:
+        if count >= LEAST_LENGTH_PX and beyond_share < min(own_share, MOST_BEYOND * count):
             for n in range(count):
-                goes_on[together[n]] = True
-    return goes_on
+                fades[together[n]] = True
+    return fades

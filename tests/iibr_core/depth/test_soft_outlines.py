@@ -9,6 +9,7 @@ from iibr_core.depth.soft_outlines import (
     FRONT_PX,
     GAP_PX,
     LEAST_LENGTH_PX,
+    MOST_BEYOND,
     REACH_PX,
     SOFT_PX,
     STRIDE_PX,
@@ -41,81 +42,84 @@ def slow_front(values, y, x):
     return min(fronts, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2, default=None)
 
 
-def slow_is_mixed(colors, values, distance, y, x, front):
+def slow_share(colors, values, distance, y, x, front):
     half = 0.5 * (front - values[y, x])
     samples = around(y, x, REACH_PX, STRIDE_PX)
     back = [colors[p] for p in samples if distance[p] > SOFT_PX and abs(values[p] - values[y, x]) <= half]
     fore = [colors[p] for p in samples if distance[p] > FRONT_PX and abs(values[p] - front) <= half]
     if min(len(back), len(fore)) < soft_outlines.LEAST_SAMPLES:
-        return False
+        return 0.0
     way = np.mean(fore, axis=0, dtype=np.float64) - np.mean(back, axis=0, dtype=np.float64)
     length = np.linalg.norm(way)
     off = colors[y, x] - np.mean(back, axis=0, dtype=np.float64)
     along = off @ way / length
-    return (
+    is_mixed = (
         length > soft_outlines.LEAST_CONTRAST
         and soft_outlines.LEAST_SHARE * length < along < soft_outlines.MOST_SHARE * length
         and np.linalg.norm(off - along * way / length) < soft_outlines.MOST_ASIDE * length
         and along > soft_outlines.DEVIATIONS * np.std(np.array(back, np.float64) @ way / length)
     )
+    return along / length if is_mixed else 0.0
 
 
-def slow_ends_clean(values, mixed, y, x):
+def slow_ends_clean(values, shares, y, x):
     front = np.array(slow_front(values, y, x))
     off = np.array([y, x]) - front
     for k in (SOFT_PX - 1, SOFT_PX):
         v, u = (front[i] + nearest_pixel(off[i] * k / abs(off).max()) for i in range(2))
-        if not (0 <= v < SIZE[0] and 0 <= u < SIZE[1]) or mixed[v, u]:
+        if not (0 <= v < SIZE[0] and 0 <= u < SIZE[1]) or shares[v, u] > 0:
             return False
     return True
 
 
 def slow_find_mixed(colors, values):
-    distance, mixed = step_distance(values, STEP, SOFT_PX), np.zeros(SIZE, bool)
+    distance, shares = step_distance(values, STEP, SOFT_PX), np.zeros(SIZE)
     beside = {p: max(values[q] for q in around(*p, 1)) for p in np.ndindex(SIZE)}
     ring = {p: front for p, front in beside.items() if front - values[p] > STEP}
     fronts = dict(ring)
     for _ in range(SOFT_PX):
         for p, front in ring.items():
-            mixed[p] = slow_is_mixed(colors, values, distance, *p, front)
+            shares[p] = slow_share(colors, values, distance, *p, front)
         ring = {
             q: fronts[p] for p in ring for q in around(*p, 1)
-            if mixed[p] and distance[q] <= SOFT_PX and q not in fronts and abs(values[q] - values[p]) <= STEP
+            if shares[p] > 0 and distance[q] <= SOFT_PX and q not in fronts and abs(values[q] - values[p]) <= STEP
         }  # fmt: skip
         fronts |= ring
-    return mixed
+    return shares
 
 
-def slow_goes_on(pixels):
-    """Those that are at least LEAST_LENGTH_PX, each near another."""
-    left, long = set(pixels), set()
+def slow_fades(shares, beyond):
+    """Those, of which the shares just beyond them are known, that belong to an outline which fades."""
+    left, outlines = set(beyond), set()
     while left:
         together, new = set(), {left.pop()}
         while new:
             together, new = together | new, {q for p in new for q in around(*p, GAP_PX) if q in left}
             left -= new
-        if len(together) >= LEAST_LENGTH_PX:
-            long |= together
-    return long
+        own, beside = (np.mean([of[p] for p in together]) for of in (shares, beyond))
+        if len(together) >= LEAST_LENGTH_PX and beside < min(own, MOST_BEYOND):
+            outlines |= together
+    return outlines
 
 
 def slow_grown(values, mixed):
+    """The disparity in front of mixed pixels beside an edge, and the mixed pixels just beyond them."""
     in_front = {p: max(values[q] for q in around(*p, 1)) for p in mixed}
     touching = {p for p in mixed if in_front[p] - values[p] > STEP}
-    return {
-        p: in_front[p] for p in touching
-        if any(q in mixed - touching and abs(values[q] - values[p]) <= STEP for q in around(*p, 1))
-    }  # fmt: skip
+    beyond = {
+        p: [q for q in around(*p, 1) if q in mixed - touching and abs(values[q] - values[p]) <= STEP] for p in touching
+    }
+    return {p: (in_front[p], others) for p, others in beyond.items() if others}
 
 
 def slow_widen(colors, values):
-    mixed = slow_find_mixed(colors, values)
-    mixed = {(y, x) for y, x in np.argwhere(mixed).tolist() if slow_ends_clean(values, mixed, y, x)}
+    shares = slow_find_mixed(colors, values)
+    mixed = {(y, x) for y, x in np.argwhere(shares).tolist() if slow_ends_clean(values, shares, y, x)}
     first = slow_grown(values, mixed)
-    mixed -= first.keys() - slow_goes_on(first)
+    mixed -= first.keys() - slow_fades(shares, {p: np.mean([shares[q] for q in qs]) for p, (_, qs) in first.items()})
     for _ in range(SOFT_PX):
         values, grown = values.copy(), slow_grown(values, mixed)
-        for p, front in grown.items():
+        for p, (front, _) in grown.items():
             values[p] = front
         mixed -= grown.keys()
     return values
@@ -139,12 +143,19 @@ def test_a_front_out_of_focus_takes_its_outline_along():
     assert (widened[share[SOFT_PX:-SOFT_PX] == 0] == FAR).all()
 
 
-@pytest.mark.parametrize("length_px", [14, 28])
+def test_what_does_not_fade_is_the_edge_of_something_else():
+    """A dark stripe along the front, three pixels wide."""
+    _, photo, values = soft_front(1)
+    photo[:, 30:33] = photo[:, :1]
+    assert widen_fronts(photo, values, STEP, never) is values
+
+
+@pytest.mark.parametrize("length_px", [18, 32])
 def test_what_is_soft_for_a_few_pixels_only_is_the_edge_of_something_else(length_px):
     _, photo, values = soft_front(8)
     photo[: SIZE[0] - length_px] = soft_front(1)[1][: SIZE[0] - length_px]
     widened = widen_fronts(photo, values, STEP, never)
-    assert (widened is not values) == (length_px == 28)
+    assert (widened is not values) == (length_px == 32)
 
 
 def test_single_mixed_pixels_are_left_to_matting():
