@@ -67,7 +67,7 @@ class RaySet:
         """size: of the images, margins: of them around every view. surface_step: disparities closer than this are one
         surface for look-ups. farthest_views: the largest view offset that will be rendered. photo_detail: see there.
         """
-        self._count = 0
+        self._count, self._photo_images = 0, 0
         self._margins = margins
         self._surface_step = surface_step
         self._farthest_views = farthest_views
@@ -126,6 +126,7 @@ class RaySet:
         self._row_ranges[k, :, 0], self._row_ranges[k, :, 1] = self._low[k].min(axis=1), self._high[k].max(axis=1)
         self._offsets[k] = offset
         self._count += 1
+        self._photo_images += not any(offset)
         self._statistics = None
 
     def survey(self, should_stop: ShouldStop = never) -> DisparityStatistics:
@@ -219,7 +220,7 @@ class RaySet:
     @property
     def photo_images(self) -> int:
         """How many images, from the first on, hold what the photo shows; the others are inpainted."""
-        return int((self._offsets[: self._count] == 0).all(axis=1).sum())
+        return self._photo_images
 
     @property
     def photo_disparity(self) -> FloatImage:
