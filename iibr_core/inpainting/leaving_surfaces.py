@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage, Margins, image_size
 
-TRACED_PX, LEAST_PX = 10, 4
+TRACED_PX, LEAST_PX = 10, 3
 """Outlines are followed so far inwards, and count if they can be at least so far."""
 MOST_SLANT = 4
 """They may run so many pixels along the frame for each away from it."""
+NOTCH_PX = 4
+"""What is as narrow goes on only if both its outlines do."""
 ALIKE = 0.33
 """The same two surfaces meet as long as their disparities have changed by less than this share of the step."""
 SPREAD_PX, STRAIGHT = 4.0, 0.05
@@ -36,16 +38,18 @@ def follow_surfaces(disparity: FloatImage, margins: Margins, one_surface: float)
         side = np.ascontiguousarray(np.rot90(disparity, turn)[: TRACED_PX + 1])
         beyond = np.rot90(continued, turn)[: (margins.top, margins.right, margins.bottom, margins.left)[turn]]
         rows = np.ascontiguousarray(beyond[::-1])
-        places = np.arange(first, first + side.shape[1], dtype=np.int32) % count
-        _follow_side(places, _outline_slopes(side, one_surface), around, before, rows)
+        slopes, weights = _trace_outlines(side, one_surface)
+        places = (first + _without_notches(side[0], weights, one_surface)) % count
+        _follow_side(places, _surface_slopes(slopes, weights), around, before, rows)
         beyond[::-1] = rows
         first += side.shape[1] - 1
     return continued
 
 
 @kernel
-def _outline_slopes(side, one_surface):
-    """(L,): how many pixels surfaces go to the right, for each out of the frame; 0 in its corners.
+def _trace_outlines(side, one_surface):
+    """(L,): how many pixels the outline between a pixel of the frame and the next goes to the right for each out of the
+    frame, times its weight. (L,): the weights, 0 where there is no outline.
 
     side (D, L): disparity, the frame's row first.
     """
@@ -74,9 +78,27 @@ def _outline_slopes(side, one_surface):
             # The straight line through the outline at the frame that fits best.
             weights[p] = steps / TRACED_PX
             slopes[p] = -weights[p] * along / squares
-    slopes = _spread(slopes) / (_spread(weights) + STRAIGHT)
-    slopes[0] = slopes[length - 1] = 0.0
-    return slopes
+    return slopes, weights
+
+
+@kernel
+def _without_notches(row, weights, one_surface):
+    """(L,): the place whose surface goes on from each of the frame's: another's where its own ends just inside."""
+    lasting, begin = np.arange(len(row), dtype=np.int32), 0
+    for p in range(len(row) - 1):
+        if abs(row[p + 1] - row[p]) > one_surface:
+            # From one step to the next.
+            if begin > 0 and p + 1 - begin <= NOTCH_PX and weights[begin - 1] * weights[p] == 0.0:
+                lasting[begin : p + 1] = lasting[begin - 1]
+            begin = p + 1
+    return lasting
+
+
+def _surface_slopes(slopes: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(L,): how surfaces go between their outlines; straight on in the corners."""
+    between = _spread(slopes) / (_spread(weights) + STRAIGHT)
+    between[[0, -1]] = 0.0
+    return np.asarray(between)
 
 
 @kernel

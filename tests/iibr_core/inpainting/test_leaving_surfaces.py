@@ -1,5 +1,6 @@
 """Surfaces leave the frame along their outlines."""
 
+import itertools
 from math import exp
 
 import numpy as np
@@ -9,10 +10,13 @@ from iibr_core.inpainting.leaving_surfaces import (
     ALIKE,
     LEAST_PX,
     MOST_SLANT,
+    NOTCH_PX,
     SPREAD_PX,
     STRAIGHT,
     TRACED_PX,
-    _outline_slopes,
+    _surface_slopes,
+    _trace_outlines,
+    _without_notches,
     follow_surfaces,
 )
 from iibr_core.types import ImageSize, Margins
@@ -56,11 +60,17 @@ def slopes_slowly(side, one_surface):
         if len(met) > LEAST_PX:
             k = np.arange(len(met))
             outlines.append((p, -(k * (np.array(met) - p)).sum() / (k**2).sum(), (len(met) - 1) / TRACED_PX))
+    traced = {p for p, _, _ in outlines}
+    steps = [p for p in range(length - 1) if abs(side[0, p + 1] - side[0, p]) > one_surface]
+    lasting = np.arange(length)
+    for p, after in itertools.pairwise(steps):
+        if after - p <= NOTCH_PX and not {p, after} <= traced:
+            lasting[p + 1 : after + 1] = lasting[p]
     slopes = np.zeros(length)
     for place in range(1, length - 1):
         shares = [(weight * exp(-abs(place - p) / SPREAD_PX), slope) for p, slope, weight in outlines]
         slopes[place] = sum(w * s for w, s in shares) / (sum(w for w, _ in shares) + STRAIGHT)
-    return slopes
+    return slopes, lasting
 
 
 def follow_slowly(disparity, margins, one_surface):
@@ -70,14 +80,15 @@ def follow_slowly(disparity, margins, one_surface):
         side, around = np.rot90(disparity, turn), np.rot90(nearest, turn)
         far, before = ((margins.top, margins.left), (margins.right, margins.top), (margins.bottom, margins.right),
                        (margins.left, margins.bottom))[turn]  # fmt: skip
-        slopes, last = slopes_slowly(side[: TRACED_PX + 1], one_surface), side.shape[1] - 1
+        slopes, lasting = slopes_slowly(side[: TRACED_PX + 1], one_surface)
+        row_out, last = side[0][lasting], side.shape[1] - 1
         for row, column in np.ndindex(far, around.shape[1]):
             reach = np.arange(last + 1) + (far - row) * slopes
             x = column - before
-            found = [side[0, 0]] if x <= 0 else [side[0, last]] if x >= last else []
+            found = [row_out[0]] if x <= 0 else [row_out[last]] if x >= last else []
             for p in range(last):
                 if reach[p] <= x <= reach[p + 1]:
-                    found.append(side[0, p if x - reach[p] < reach[p + 1] - x else p + 1])
+                    found.append(row_out[p if x - reach[p] < reach[p + 1] - x else p + 1])
             around[row, column] = max([around[row, column], *found])
     nearest[np.isneginf(nearest)] = 0
     return nearest
@@ -96,9 +107,11 @@ def two_outlines():
 def test_slopes_against_the_definition(two_outlines):
     for turn in range(4):
         side = np.ascontiguousarray(np.rot90(two_outlines, turn)[: TRACED_PX + 1])
-        found = _outline_slopes(side, 1.0)
-        np.testing.assert_allclose(found, slopes_slowly(side, 1.0), atol=1e-9)
-    assert abs(found).max() == 0  # no outline leaves to the left
+        outlines = _trace_outlines(side, 1.0)
+        found = _surface_slopes(*outlines), _without_notches(side[0], outlines[1], 1.0)
+        for of_kernel, expected in zip(found, slopes_slowly(side, 1.0)):
+            np.testing.assert_allclose(of_kernel, expected, atol=1e-9)
+    assert abs(found[0]).max() == 0  # no outline leaves to the left
 
 
 def test_surfaces_against_the_definition(two_outlines):
@@ -112,6 +125,14 @@ def test_a_slanted_post_goes_on_as_wide_as_it_is(two_outlines):
         post = np.flatnonzero(found[MARGINS.top + 33 + below] > 3) - MARGINS.left
         assert abs(post.mean() - (33 + below) / 2 - 8) <= 1
         assert 4 <= len(post) <= 7
+
+
+def test_a_notch_at_the_frame_does_not_go_on():
+    disparity = np.ones((20, 30), np.float32)
+    disparity[-2:, 12:15] = 0.0
+    disparity[-12:, 20:22] = 0.0
+    found = surfaces_of(disparity, follow_surfaces(disparity, MARGINS, 0.5), MARGINS)
+    np.testing.assert_array_equal(np.flatnonzero(found[-1] == 0) - MARGINS.left, [20, 21])
 
 
 def test_a_map_without_steps_goes_on_straight():
