@@ -2,7 +2,8 @@
 around that looks most like what is there (Efros & Leung, 1999; Criminisi et al., 2004).
 
 Where a patch fits what is known it is taken as it is, so that lines go on; farther in, and where nothing fits, only its
-fine texture: nobody sees that the place of that is wrong. Content is only copied within one surface.
+fine texture: nobody sees that the place of that is wrong. Content is only copied within one surface. Patches overlap; a
+pixel gets the mean of what all of them show there (Wexler et al., 2007), or seams between them would look like grain.
 """
 
 from __future__ import annotations
@@ -51,12 +52,14 @@ def copy_exemplars(
     """
     smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
     trust = np.zeros(len(pixels), np.float32)
+    shown = np.zeros((len(pixels), 4), np.float32)
     for blocks in _blocks_apart(pixels, image_size(pure)):
         in_pieces(
-            lambda block: _copy_block(colors, disparity, pure, number, *block, np.float32(one_surface), trust),
+            lambda block: _copy_block(colors, disparity, pure, number, *block, np.float32(one_surface), trust, shown),
             blocks, should_stop, threads,
         )  # fmt: skip
-    change = np.take(colors.reshape(-1, 3), pixels, axis=0) - smooth
+    patches = shown[:, 3:]
+    change = np.where(patches > 0, shown[:, :3] / np.maximum(patches, 1) - smooth, np.float32(0.0))
     parts = [slice(first, first + BLOCK_PX**2) for first in range(0, len(pixels), BLOCK_PX**2)]
     in_pieces(
         lambda part: _settle(number, pixels, part.start, smooth, change, trust, colors), parts, should_stop, threads
@@ -74,8 +77,10 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
 
 
 @kernel
-def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust):
-    """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet."""
+def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust, shown):
+    """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet. shown (N, 4): the sum of what
+    patches show, and how many do.
+    """
     height, width = number.shape
     top, left = row * BLOCK_PX, column * BLOCK_PX
     bottom, right = min(top + BLOCK_PX, height), min(left + BLOCK_PX, width)
@@ -108,7 +113,13 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
         for k in range(taps):
             v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
             i = number[v, u]
-            if i >= 0 and trust[i] == 0 and abs(pure[a, b] - patch[k, 3]) <= one_surface:
+            if i < 0 or not abs(pure[a, b] - patch[k, 3]) <= one_surface:
+                continue
+            for c in range(3):
+                shown[i, c] += colors[a, b, c]
+            shown[i, 3] += 1
+            # The next patches are compared with the first, which is sharp.
+            if trust[i] == 0:
                 colors[v, u] = colors[a, b]
                 trust[i] = patch_trust
         for v in range(max(y - RADIUS_PX - 1, top), min(y + RADIUS_PX + 2, bottom)):

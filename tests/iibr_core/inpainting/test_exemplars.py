@@ -36,6 +36,7 @@ def steps_beside(size, y, x):
 def copy_slowly(smooth, disparity, hole, mixed, one_surface):
     """What `copy_exemplars` makes of a smoothly filled image, which stays as it is."""
     size, colors, trust = hole.shape, smooth.astype(np.float64), np.where(hole, 0.0, 1.0)
+    shown = {at: [] for at in map(tuple, np.argwhere(hole))}
 
     def is_one(one, other):
         return abs(disparity[one] - disparity[other]) <= one_surface
@@ -73,8 +74,10 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
         trusted = max(np.mean([trust[at] for at in patch if trust[at] > 0]) * np.exp(-misfit / FIT**2), LEAST_TRUST)
         for at in patch:
             source = at[0] - middle[0] + place[0], at[1] - middle[1] + place[1]
-            if trust[at] == 0 and not mixed[source] and is_one(at, source):
-                colors[at], trust[at] = colors[source], trusted
+            if hole[at] and not mixed[source] and is_one(at, source):
+                shown[at].append(colors[source].copy())
+                if trust[at] == 0:
+                    colors[at], trust[at] = colors[source], trusted
         return True
 
     blocks = sorted({(y // BLOCK_PX, x // BLOCK_PX) for y, x in np.argwhere(hole)})
@@ -88,7 +91,9 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
                     queue += [
                         at for at in around if at in own and trust[at] == 0 and is_one(at, middle) and at not in queue
                     ]
-    change, settled = np.where(hole[..., None], colors - smooth, 0), smooth.copy()
+    change, settled = np.zeros_like(smooth, np.float64), smooth.copy()
+    for at, patches in shown.items():
+        change[at] = np.mean(patches, axis=0) - smooth[at] if patches else 0
     for at in map(tuple, np.argwhere(hole)):
         fine = change[at] - np.mean([change[b] for b in window(size, *at, FINE_PX) if hole[b]], axis=0)
         fine *= MOST_FINE / max(np.abs(fine).max(), MOST_FINE)
