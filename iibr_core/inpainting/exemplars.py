@@ -3,7 +3,7 @@ around that looks most like what is there (Efros & Leung, 1999; Criminisi et al.
 
 Where a patch fits what is known it is taken as it is, so that lines go on; farther in, and where nothing fits, only its
 fine texture: nobody sees that the place of that is wrong. Content is only copied within one surface. Patches overlap; a
-pixel gets the mean of what all of them show there (Wexler et al., 2007), or seams between them would look like grain.
+pixel gets a mean of what all of them show there (Wexler et al., 2007), or seams between them would look like grain.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ MOST_FINE = np.float32(0.05)
 """Larger differences are no texture: of them so much is copied where patches are not trusted."""
 LEAST_TRUST = np.float32(1e-6)
 """In what was copied."""
+FIRST = np.float32(3.0)
+"""What the first patch over a pixel counts in the mean; those that follow count 1."""
 FINE_PX = 5
 """Texture is what differs from the mean so far around."""
 BLOCK_PX = 64
@@ -58,8 +60,8 @@ def copy_exemplars(
             lambda block: _copy_block(colors, disparity, pure, number, *block, np.float32(one_surface), trust, shown),
             blocks, should_stop, threads,
         )  # fmt: skip
-    patches = shown[:, 3:]
-    change = np.where(patches > 0, shown[:, :3] / np.maximum(patches, 1) - smooth, np.float32(0.0))
+    counts = shown[:, 3:]
+    change = np.where(counts > 0, shown[:, :3] / np.maximum(counts, 1) - smooth, np.float32(0.0))
     parts = [slice(first, first + BLOCK_PX**2) for first in range(0, len(pixels), BLOCK_PX**2)]
     in_pieces(
         lambda part: _settle(number, pixels, part.start, smooth, change, trust, colors), parts, should_stop, threads
@@ -79,7 +81,7 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
 @kernel
 def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust, shown):
     """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet. shown (N, 4): the sum of what
-    patches show, and how many do.
+    patches show, and what they count.
     """
     height, width = number.shape
     top, left = row * BLOCK_PX, column * BLOCK_PX
@@ -115,13 +117,14 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
             i = number[v, u]
             if i < 0 or not abs(pure[a, b] - patch[k, 3]) <= one_surface:
                 continue
-            for c in range(3):
-                shown[i, c] += colors[a, b, c]
-            shown[i, 3] += 1
-            # The next patches are compared with the first, which is sharp.
+            count = np.float32(1.0)
             if trust[i] == 0:
+                # Those that follow are compared with this one.
                 colors[v, u] = colors[a, b]
-                trust[i] = patch_trust
+                trust[i], count = patch_trust, FIRST
+            for c in range(3):
+                shown[i, c] += count * colors[a, b, c]
+            shown[i, 3] += count
         for v in range(max(y - RADIUS_PX - 1, top), min(y + RADIUS_PX + 2, bottom)):
             for u in range(max(x - RADIUS_PX - 1, left), min(x + RADIUS_PX + 2, right)):
                 if number[v, u] < 0 or trust[number[v, u]] > 0 or is_queued[v - top, u - left]:

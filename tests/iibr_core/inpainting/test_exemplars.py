@@ -6,6 +6,7 @@ import pytest
 from iibr_core.inpainting.exemplars import (
     BLOCK_PX,
     FINE_PX,
+    FIRST,
     FIT,
     GUESS,
     LEAST_TRUST,
@@ -75,7 +76,7 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
         for at in patch:
             source = at[0] - middle[0] + place[0], at[1] - middle[1] + place[1]
             if hole[at] and not mixed[source] and is_one(at, source):
-                shown[at].append(colors[source].copy())
+                shown[at] += [colors[source].copy()] * (int(FIRST) if trust[at] == 0 else 1)
                 if trust[at] == 0:
                     colors[at], trust[at] = colors[source], trusted
         return True
