@@ -55,7 +55,6 @@ def extend_beyond_frame(
     means = _means_along_frame(colors.reshape(-1, 3)[frame], max(margins))
     lines = np.empty((len(frame), 2), np.float32)
     find_lines(colors, disparity, disparity, frame, np.inf, lines)
-
     continued = follow_surfaces(disparity, margins, SURFACE_PX / farthest_views)
 
     def band(first: int, last: int) -> None:
