@@ -175,6 +175,9 @@ def _ends_clean(values, shares, y, x, step):
     height, width = values.shape
     front_y, front_x = _nearest_front(values, y, x, step)
     away = max(abs(y - front_y), abs(x - front_x))
+    # What hangs together may have risen as high as its front.
+    if away == 0:
+        return False
     for k in range(SOFT_PX - 1, SOFT_PX + 1):
         v, u = front_y + nearest_pixel((y - front_y) * k / away), front_x + nearest_pixel((x - front_x) * k / away)
         if not (0 <= v < height and 0 <= u < width) or shares[v, u] > 0:

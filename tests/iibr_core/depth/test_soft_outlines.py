@@ -63,6 +63,8 @@ def slow_share(colors, values, distance, y, x, front):
 
 
 def slow_ends_clean(values, shares, y, x):
+    if slow_front(values, y, x) is None:
+        return False
     front = np.array(slow_front(values, y, x))
     off = np.array([y, x]) - front
     for k in (SOFT_PX - 1, SOFT_PX):
@@ -134,6 +136,13 @@ def test_fronts_grow_as_the_slow_ones_do():
     widened = widen_fronts(photo, values, STEP, never)
     assert (widened != values).sum() > 30
     np.testing.assert_array_equal(widened, slow_widen(photo, values))
+
+
+def test_a_surface_that_rises_to_its_front_beside_an_edge_has_no_outline_there():
+    _, photo, values = soft_front(8)
+    values[:], values[:, :30], values[:, 30] = FAR + 0.9 * STEP, FAR + 1.2 * STEP, FAR
+    values[:, 36:42] = FAR + 0.5 * STEP
+    np.testing.assert_array_equal(widen_fronts(photo, values, STEP, never), slow_widen(photo, values))
 
 
 def test_a_front_out_of_focus_takes_its_outline_along():
