@@ -72,7 +72,9 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
     """Row and column of the blocks in which these pixels lie, in four lists of blocks that do not touch."""
     columns = -(-size.width // BLOCK_PX)
     y, x = np.divmod(pixels, size.width)
-    found = [divmod(int(block), columns) for block in np.unique(y // BLOCK_PX * columns + x // BLOCK_PX)]
+    is_found = np.zeros((-(-size.height // BLOCK_PX), columns), np.bool_)
+    is_found[y // BLOCK_PX, x // BLOCK_PX] = True
+    found = [(int(row), int(column)) for row, column in np.argwhere(is_found)]
     return [
         [block for block in found if (block[0] % 2, block[1] % 2) == odd] for odd in ((0, 0), (1, 1), (0, 1), (1, 0))
     ]
@@ -206,21 +208,31 @@ def _settle(number, pixels, first, smooth, change, trust, colors):
     is trusted (N,).
     """
     height, width = number.shape
-    mean, fine = np.empty(3, np.float32), np.empty(3, np.float32)
+    mean, fine = np.empty(4, np.float32), np.empty(3, np.float32)
+    # Of each column around a pixel: the sum of its changes, and their number. The next pixel needs one column more.
+    columns, before = np.empty((2 * FINE_PX + 1, 4), np.float32), -2
     for i in range(first, min(first + BLOCK_PX**2, len(pixels))):
         y, x = pixels[i] // width, pixels[i] % width
-        mean[:] = 0.0
-        total = 0
-        for v in range(max(y - FINE_PX, 0), min(y + FINE_PX + 1, height)):
-            for u in range(max(x - FINE_PX, 0), min(x + FINE_PX + 1, width)):
+        goes_on = x > 0 and pixels[i] == before + 1
+        before = pixels[i]
+        for u in range(x + FINE_PX if goes_on else x - FINE_PX, x + FINE_PX + 1):
+            column = columns[u % len(columns)]
+            column[:] = 0.0
+            if not 0 <= u < width:
+                continue
+            for v in range(max(y - FINE_PX, 0), min(y + FINE_PX + 1, height)):
                 j = number[v, u]
                 if j >= 0:
-                    total += 1
+                    column[3] += 1
                     for c in range(3):
-                        mean[c] += change[j, c]
+                        column[c] += change[j, c]
+        mean[:] = 0.0
+        for k in range(len(columns)):
+            for c in range(4):
+                mean[c] += columns[k, c]
         most = np.float32(0.0)
         for c in range(3):
-            fine[c] = change[i, c] - mean[c] / total
+            fine[c] = change[i, c] - mean[c] / mean[3]
             most = max(most, abs(fine[c]))
         scale, share = MOST_FINE / max(most, MOST_FINE), trust[i]
         for c in range(3):
