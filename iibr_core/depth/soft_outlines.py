@@ -47,8 +47,9 @@ def widen_fronts(colors: FloatImage, values: FloatImage, step: float, should_sto
     Raises Cancelled once should_stop is true.
     """
     shares = _find_mixed(colors, values, step, should_stop)
-    shares = _outlines(values, shares, step, np.flatnonzero(shares))
-    pixels, fronts, beyond = _grow(values, shares, step, np.flatnonzero(shares))
+    shares = _outlines(values, shares, step, np.flatnonzero(shares > 0))
+    mixed = np.flatnonzero(shares > 0)
+    pixels, fronts, beyond = _grow(values, shares, step, mixed)
     number = np.empty(values.shape, np.int32)
     number_pixels(pixels, number)
     fades = _fades(pixels, shares.reshape(-1)[pixels], beyond, number)
@@ -60,7 +61,8 @@ def widen_fronts(colors: FloatImage, values: FloatImage, step: float, should_sto
         values = values.copy()
         values.reshape(-1)[pixels] = fronts
         shares.reshape(-1)[pixels] = 0
-        pixels, fronts, _ = _grow(values, shares, step, np.flatnonzero(shares))
+        mixed = mixed[shares.reshape(-1)[mixed] > 0]
+        pixels, fronts, _ = _grow(values, shares, step, mixed)
     return values
 
 
