@@ -19,7 +19,7 @@ from pathlib import Path
 from benchmarks.speed.measure import Cost, cost_of, in_turns, median_cost, median_ratio
 from benchmarks.speed.variants import bench_scenes
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.reference_warp import reference_warp

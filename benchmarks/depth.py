@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks.provenance import made_by
 from benchmarks.speed.variants import bench_scenes
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.edge_blur import measure_edge_blur
+from iibr_core.depth.edges.edge_blur import measure_edge_blur
+from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.depth.refine import refine
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS

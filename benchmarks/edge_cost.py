@@ -18,8 +18,8 @@ from types import ModuleType
 from typing import Any
 
 from benchmarks.speed.variants import BenchScene, bench_scenes
-from iibr_core.depth import refine as refining
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.edges import refine as refining
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.provenance import made_by
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.generation.cost_model import estimate_costs, measure_parallax
 from iibr_core.generation.light_field import transformer_for

@@ -13,7 +13,7 @@ from PIL import Image
 from benchmarks.speed.measure import Cost, cost_of
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.datasets import read_view
 from iibr_core.evaluation.trials import Trial, trial_input, trials_of
 from iibr_core.formats.light_fields.scene import MultiView

@@ -27,7 +27,7 @@ from benchmarks.speed.variants import BenchScene, Variant, bench_scenes, evaluat
 from benchmarks.tables.degradation import GRID, SIZE, drawn
 from benchmarks.tables.report import FOLDER, markdown, write_report
 from benchmarks.tables.trained_variants import STEPS, TRAINED_VARIANTS, TrainedVariant, train_missing
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.consistency import consistency
 from iibr_core.evaluation.datasets import find_scenes, read_view
 from iibr_core.evaluation.metrics import bounded_psnr
@@ -101,7 +101,7 @@ SWITCHES = (
     *(Switch(f"{k} candidates a ray (5)", replace(DEFAULT_VARIANT, slots=k)) for k in (1, 3, 6)),
     *(Switch(f"{k} hypotheses for the transformer (6)", replace(DEFAULT_VARIANT, hypotheses=k)) for k in (3, 9)),
     Switch("no refinement of the map", replace(DEFAULT_VARIANT, refined=0.0)),
-    Switch("refinement leaves rims", swaps={"depth.refine.settle_rims": lambda _, values, *__: values}),
+    Switch("refinement leaves rims", swaps={"depth.edges.refine.settle_rims": lambda _, values, *__: values}),
     Switch("mixed pixels stay whole", swaps={"rendering.view_synthesis.split_mixed_pixels": _do_not_split}),
     Switch("rims hide what is behind them", swaps={"rendering.view_synthesis.WHOLE": 0.0}),
     *(

@@ -27,7 +27,7 @@ from benchmarks.tables.lens_blurs import circle_radius, gather, scatter
 from benchmarks.tables.report import FOLDER, markdown, write_report
 from benchmarks.thin_lens import ThinLens
 from iibr_core.color import bytes_from_encoded, encoded_from_stored, linear_from_srgb, srgb_from_linear
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.metrics import bounded_psnr, flip, ssim
 from iibr_core.evaluation.tables import number
 from iibr_core.generation.light_field import generate

@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.refocus import read_views
 from benchmarks.tables.report import FOLDER, markdown, write_report
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.generation.outer_views import outer_views_of_grid
 from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored

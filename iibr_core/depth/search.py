@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
+from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.images import picture_file
 from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.depth.refine import refine
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.formats.images.oiio_reader import read_orientation, upright

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
 from iibr_core.evaluation.metrics import Mask, bounded_psnr, flip, ssim

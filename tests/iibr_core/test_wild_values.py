@@ -16,21 +16,9 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import (
-    blur_fit,
-    crumbs,
-    edge_blur,
-    pictorial_cues,
-    refine,
-    rim_noise,
-    rim_sides,
-    rims,
-    scaling,
-    search,
-    soft_outlines,
-    subject,
-)
+from iibr_core.depth import pictorial_cues, scaling, search, subject
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.edges import blur_fit, crumbs, edge_blur, refine, rim_noise, rim_sides, rims, soft_outlines
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
@@ -327,34 +315,36 @@ FINITE = {
     "depth.pictorial_cues.estimate_from_cues": lambda v, _: pictorial_cues.estimate_from_cues(
         Photo(image(v), 20.0, "wild")
     ),
-    "depth.edge_blur.extent": lambda v, _: edge_blur.extent(np.nan_to_num(depths(v))),
-    "depth.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(image(0.5), np.nan_to_num(depths(v))),
-    "depth.crumbs.fill_crumbs": lambda v, _: [
+    "depth.edges.edge_blur.extent": lambda v, _: edge_blur.extent(np.nan_to_num(depths(v))),
+    "depth.edges.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(
+        image(0.5), np.nan_to_num(depths(v))
+    ),
+    "depth.edges.crumbs.fill_crumbs": lambda v, _: [
         crumbs.fill_crumbs(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
         crumbs.fill_crumbs(image(v), np.where(np.eye(*SIZE), np.float32(9), depths(1.0)), 0.5, never),
     ],
-    "depth.blur_fit.fit_to_blur": lambda v, _: [
+    "depth.edges.blur_fit.fit_to_blur": lambda v, _: [
         blur_fit.fit_to_blur(image(v), depths(1.0), depths(0.5), soft_cells(), 0.1),
         blur_fit.fit_to_blur(image(0.5), np.nan_to_num(depths(v)), np.nan_to_num(depths(v)), soft_cells(), 0.1),
     ],
-    "depth.rims.settle_rims": lambda v, _: [
+    "depth.edges.rims.settle_rims": lambda v, _: [
         rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),
         rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
     ],
-    "depth.rim_sides.step_distance": lambda v, _: rim_sides.step_distance(depths(v), 0.5),
-    "depth.rim_noise.steady_rims": lambda v, _: [
+    "depth.edges.rim_sides.step_distance": lambda v, _: rim_sides.step_distance(depths(v), 0.5),
+    "depth.edges.rim_noise.steady_rims": lambda v, _: [
         rim_noise.steady_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
         rim_noise.steady_rims(image(v), mixed_between_surfaces(), 0.5, never),
     ],
-    "depth.soft_outlines.widen_fronts": lambda v, _: [
+    "depth.edges.soft_outlines.widen_fronts": lambda v, _: [
         soft_outlines.widen_fronts(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
         soft_outlines.widen_fronts(image(v), mixed_between_surfaces(), 0.5, never),
     ],
-    "depth.rim_sides.choose_sides": lambda v, _: [
+    "depth.edges.rim_sides.choose_sides": lambda v, _: [
         rim_sides.choose_sides(scene()[0].pixels, np.nan_to_num(known(v)), np.isnan(known(v)), 0.5, never),
         rim_sides.choose_sides(image(v), mixed_between_surfaces(), np.ones(SIZE, np.bool_), 0.5, never),
     ],
-    "depth.refine.refine": lambda v, _: [
+    "depth.edges.refine.refine": lambda v, _: [
         refine.refine(image(0.5), depths(v)),
         refine.refine(image(0.5), depths(1.0), strength=v),
     ],

@@ -60,8 +60,8 @@ def complete_fills(
 
 def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: ShouldStop) -> FloatImage:
     """Of the larger photo, px of it; what was made of it in the smaller one is made of it too."""
+    from iibr_core.depth.edges.refine import refine
     from iibr_core.depth.editing.canvas import apply_edits
-    from iibr_core.depth.refine import refine
     from iibr_core.formats.maps.disparity_file import read_disparity
     from iibr_core.formats.maps.resample import resample_surfaces
 

@@ -283,8 +283,8 @@ def _prepare(
 
 
 def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> LoadedPhoto:
+    from iibr_core.depth.edges.refine import refine
     from iibr_core.depth.editing.canvas import DepthCanvas
-    from iibr_core.depth.refine import refine
 
     values = loaded.found.values
     if strength > 0:

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from iibr_core.depth.edge_blur import measure_edge_blur
+from iibr_core.depth.edges.edge_blur import measure_edge_blur
+from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.depth.refine import refine
 from iibr_core.generation.light_field import generate
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background

@@ -12,8 +12,8 @@ from math import ceil, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.edge_profiles import gradient, height_at, is_inside, strongest_change, walk
-from iibr_core.depth.ridges import SHARES, structure_blur
+from iibr_core.depth.edges.edge_profiles import gradient, height_at, is_inside, strongest_change, walk
+from iibr_core.depth.edges.ridges import SHARES, structure_blur
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize

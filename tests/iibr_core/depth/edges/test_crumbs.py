@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.crumbs import MOST_PX, fill_crumbs
+from iibr_core.depth.edges.crumbs import MOST_PX, fill_crumbs
 from iibr_core.runtime.tiling import Cancelled, never
 
 WALL, NEAR, STEP = 1.0, 9.0, 0.5

@@ -10,7 +10,7 @@ from math import ceil, exp, floor, sqrt
 
 import numpy as np
 
-from iibr_core.depth.edge_profiles import height_at, is_inside, strongest_change, walk
+from iibr_core.depth.edges.edge_profiles import height_at, is_inside, strongest_change, walk
 from iibr_core.runtime.jit import kernel
 
 SAMPLES_A_PX = 2

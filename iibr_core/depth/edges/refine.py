@@ -11,11 +11,11 @@ from math import ceil, erfc, floor, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.blur_fit import fit_to_blur
-from iibr_core.depth.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
-from iibr_core.depth.edge_profiles import gradient, height_at, walk
-from iibr_core.depth.ridges import SHARES, structure_at
-from iibr_core.depth.rims import settle_rims
+from iibr_core.depth.edges.blur_fit import fit_to_blur
+from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
+from iibr_core.depth.edges.edge_profiles import gradient, height_at, walk
+from iibr_core.depth.edges.ridges import SHARES, structure_at
+from iibr_core.depth.edges.rims import settle_rims
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never

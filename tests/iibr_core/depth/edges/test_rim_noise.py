@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth import rim_noise
-from iibr_core.depth.rim_noise import ALIKE, LEAST_WEIGHT, NEARNESS, OUTLIER, REACH_PX, UNLIKE_WEIGHT, steady_rims
-from iibr_core.depth.rim_sides import step_distance
+from iibr_core.depth.edges import rim_noise
+from iibr_core.depth.edges.rim_noise import ALIKE, LEAST_WEIGHT, NEARNESS, OUTLIER, REACH_PX, UNLIKE_WEIGHT, steady_rims
+from iibr_core.depth.edges.rim_sides import step_distance
 from iibr_core.runtime.tiling import Cancelled, never
 
 SIZE, STEP = (60, 90), 0.5

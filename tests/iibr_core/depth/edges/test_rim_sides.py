@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth import rim_sides
-from iibr_core.depth.rim_sides import choose_sides
+from iibr_core.depth.edges import rim_sides
+from iibr_core.depth.edges.rim_sides import choose_sides
 from iibr_core.runtime.tiling import Cancelled, never
 from tests.iibr_core.scenes import smooth_texture
 

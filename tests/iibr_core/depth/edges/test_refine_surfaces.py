@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.training.degradation import blur, coarsen, quantise
 from tests.iibr_core.scenes import smooth_texture
 

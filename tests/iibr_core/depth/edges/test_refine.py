@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from iibr_core.depth.refine import refine
+from iibr_core.depth.edges.refine import refine
 from iibr_core.training.degradation import blur, coarsen
 from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import ImageSize, InputError, ViewOffset

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.crumbs import fill_crumbs
-from iibr_core.depth.rim_noise import steady_rims
-from iibr_core.depth.rim_sides import RIM_PX, choose_sides, step_distance
-from iibr_core.depth.soft_outlines import widen_fronts
+from iibr_core.depth.edges.crumbs import fill_crumbs
+from iibr_core.depth.edges.rim_noise import steady_rims
+from iibr_core.depth.edges.rim_sides import RIM_PX, choose_sides, step_distance
+from iibr_core.depth.edges.soft_outlines import widen_fronts
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iibr_core.depth.edge_blur import measure_edge_blur
+from iibr_core.depth.edges.edge_blur import measure_edge_blur
 from iibr_core.training.degradation import blur
 from tests.iibr_core.scenes import smooth_texture
 

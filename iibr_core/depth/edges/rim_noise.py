@@ -12,7 +12,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.rim_sides import RIM_PX, step_distance
+from iibr_core.depth.edges.rim_sides import RIM_PX, step_distance
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth import soft_outlines
-from iibr_core.depth.rim_sides import step_distance
-from iibr_core.depth.soft_outlines import (
+from iibr_core.depth.edges import soft_outlines
+from iibr_core.depth.edges.rim_sides import step_distance
+from iibr_core.depth.edges.soft_outlines import (
     FRONT_PX,
     GAP_PX,
     LEAST_LENGTH_PX,

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from iibr_core.depth.rim_sides import step_distance
+from iibr_core.depth.edges.rim_sides import step_distance
 from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel, nearest_pixel

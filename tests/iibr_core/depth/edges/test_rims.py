@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.rims import settle_rims
+from iibr_core.depth.edges.rims import settle_rims
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import Cancelled
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
