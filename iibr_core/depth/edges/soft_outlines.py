@@ -3,6 +3,8 @@
 There it would stay behind as a ghost, and tint all that is filled beside it. Single mixed pixels beside an edge are
 left to matting (`rendering/mixed_pixels.py`): a front grows only where the second pixel behind its edge is mixed, too,
 and along outlines that go on and fade. Edges of other things look like the front here and there, but do neither.
+The last of a front's light is too faint to be told from its back, but would stay behind as a line: one pixel more goes
+with the front.
 """
 
 from __future__ import annotations
@@ -54,15 +56,18 @@ def widen_fronts(colors: FloatImage, values: FloatImage, step: float, should_sto
     number_pixels(pixels, number)
     fades = _fades(pixels, shares.reshape(-1)[pixels], beyond, number)
     shares.reshape(-1)[pixels] = 0
-    pixels, fronts = pixels[fades], fronts[fades]
-    for _ in range(SOFT_PX):
-        if not len(pixels):
-            break
-        values = values.copy()
-        values.reshape(-1)[pixels] = fronts
-        shares.reshape(-1)[pixels] = 0
+    if not fades.any():
+        return values
+    values, rings = values.copy(), [pixels[fades]]
+    values.reshape(-1)[rings[0]] = fronts[fades]
+    for _ in range(SOFT_PX - 1):
+        shares.reshape(-1)[rings[-1]] = 0
         mixed = mixed[shares.reshape(-1)[mixed] > 0]
         pixels, fronts, _ = _grow(values, shares, step, mixed)
+        values.reshape(-1)[pixels] = fronts
+        rings.append(pixels)
+    pixels, fronts = _just_behind(values, step, np.concatenate(rings), number)
+    values.reshape(-1)[pixels] = fronts
     return values
 
 
@@ -231,6 +236,24 @@ def _grow(values, shares, step, pixels):
             grown[count], fronts[count], beyond[count] = pixels[i], front, total / places
             count += 1
     return grown[:count], fronts[:count], beyond[:count]
+
+
+@kernel
+def _just_behind(values, step, pixels, number):
+    """The pixels right behind these of a front (flat indices), and its disparity. number (H, W): negative; here and in
+    what comes back each pixel is found once.
+    """
+    height, width = values.shape
+    behind, fronts, count = np.empty(8 * len(pixels), np.int64), np.empty(8 * len(pixels), np.float32), 0
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        for v in range(max(y - 1, 0), min(y + 2, height)):
+            for u in range(max(x - 1, 0), min(x + 2, width)):
+                if number[v, u] < 0 and values[y, x] - values[v, u] > step:
+                    behind[count], fronts[count] = v * width + u, _front_beside(values, v, u, step)
+                    number[v, u] = count
+                    count += 1
+    return behind[:count], fronts[:count]
 
 
 @kernel
