@@ -12,6 +12,7 @@ from math import hypot, log2
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.background import SURFACE_PX
 from iibr_core.inpainting.leaving_surfaces import follow_surfaces
 from iibr_core.inpainting.rim_lines import find_lines, line_weight
 from iibr_core.runtime.jit import kernel, nearest_pixel
@@ -28,8 +29,6 @@ TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0
 """So much of the photo's texture is seen far beyond its frame, half of that at this distance: its place there is a
 guess, and close to the frame nobody misses it.
 """
-SURFACE_PX = 2.0
-"""Surfaces that part by less than this are one."""
 SLANT, PLACES = 2.0, 12
 """Lines are followed from so many places each way on the frame, from up to SLANT times as far as the frame is."""
 

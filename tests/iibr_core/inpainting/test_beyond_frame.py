@@ -5,11 +5,11 @@ import pytest
 
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
 from iibr_core.generation.update_loop import complete_ray_set
+from iibr_core.inpainting.background import SURFACE_PX
 from iibr_core.inpainting.beyond_frame import (
     LINES_PX,
     PLACES,
     SLANT,
-    SURFACE_PX,
     TEXTURE_PX,
     TEXTURE_SHARE,
     _level,
