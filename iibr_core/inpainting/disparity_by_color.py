@@ -8,6 +8,7 @@ from __future__ import annotations
 from math import exp
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.runtime import tiling
@@ -15,12 +16,20 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage
 
+
+def nearness(reach_px: int, spread_px: float) -> NDArray[np.float64]:
+    """(2 reach_px + 1, 2 reach_px + 1): weights of pixels by their distance from the one in the middle, 1 there, with a
+    standard deviation of spread_px.
+    """
+    steps = np.arange(-reach_px, reach_px + 1)
+    return np.asarray(np.exp(-0.5 * (steps[:, None] ** 2 + steps**2) / spread_px**2))
+
+
 REACH_PX = 4
 """Pixels that vote lie within so many, each way."""
 SPREAD_PX = 2.0
 """Standard deviation of their weights by distance."""
-_STEPS = np.arange(-REACH_PX, REACH_PX + 1)
-NEARNESS = np.exp(-0.5 * (_STEPS[:, None] ** 2 + _STEPS**2) / SPREAD_PX**2)
+NEARNESS = nearness(REACH_PX, SPREAD_PX)
 """Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1), the pixel itself in the middle."""
 ALIKE = 0.04
 """Standard deviation of their weights by colour (sRGB-encoded, all channels together)."""

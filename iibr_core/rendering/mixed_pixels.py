@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from iibr_core.inpainting.disparity_by_color import nearness
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
@@ -19,7 +20,7 @@ LEAST_SHARE = 0.02
 """Smaller shares of foreground are noise."""
 REACH_PX = 5
 """Colours of both surfaces are taken from so far around."""
-NEARNESS = np.exp(-0.5 * (np.add.outer(*2 * [np.arange(-REACH_PX, REACH_PX + 1) ** 2])) / 2.5**2)
+NEARNESS = nearness(REACH_PX, 2.5)
 """What a pixel there counts, (2 REACH_PX + 1)^2."""
 RIM_TRUST = 0.001
 """What pixels beside a depth edge count, which may be mixed themselves; they tell where there are no others."""

@@ -507,6 +507,7 @@ FINITE_BY_CONTRACT = {
     "rendering.free_view.disparity_space": "of a Camera",
     "rendering.free_view.render_free_view": "as `generation.free_views.FreeViews` calls it",
     "inpainting.diffusion.DiffusionInpainter": "of rendered views only; what a model paints is made finite",
+    "inpainting.disparity_by_color.nearness": "of constants only",
     "inpainting.nearest_known.flat_indices": "of masks only",
     "inpainting.nearest_known.nearest_known": "of masks only",
     "inpainting.nearest_known.rims_of_holes": "of indices only",

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.edges.rim_sides import RIM_PX, step_distance
+from iibr_core.inpainting.disparity_by_color import nearness
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
@@ -22,8 +23,7 @@ INSIDE_PX = 3
 """Between a step and the rows of pixels, as many as in rims, that tell how much a map wavers inside its surfaces."""
 REACH_PX, SPREAD_PX = 5, 2.5
 """Pixels within so many, each way, tell where a rim goes; standard deviation of their weights by distance."""
-_STEPS = np.arange(-REACH_PX, REACH_PX + 1)
-NEARNESS = np.exp(-0.5 * (_STEPS[:, None] ** 2 + _STEPS**2) / SPREAD_PX**2)
+NEARNESS = nearness(REACH_PX, SPREAD_PX)
 NEARNESS[REACH_PX, REACH_PX] = 0
 """Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1), 0 in the middle."""
 ALIKE, UNLIKE_WEIGHT = 0.1, 0.05

@@ -14,6 +14,7 @@ from math import exp, log
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.disparity_by_color import nearness
 from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
@@ -24,8 +25,7 @@ RIM_PX = 2
 """A rim: pixels with at most so many others between them and a step."""
 REACH_PX, SPREAD_PX = 7, 3.5
 """Pixels within so many, each way, tell both surfaces' colours; standard deviation of their weights by distance."""
-_STEPS = np.arange(-REACH_PX, REACH_PX + 1)
-NEARNESS = np.exp(-0.5 * (_STEPS[:, None] ** 2 + _STEPS**2) / SPREAD_PX**2).astype(np.float32)
+NEARNESS = nearness(REACH_PX, SPREAD_PX).astype(np.float32)
 NEARNESS[REACH_PX, REACH_PX] = 0
 """Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1); the pixel itself, in the middle, tells nothing."""
 TRUST = np.array([0.15, 0.35, 0.7, 1.0], np.float32)
@@ -70,8 +70,7 @@ def choose_sides(
     unknown: (H, W), where the map says nothing by itself. Where colours do not tell surfaces apart, or tell shade from
     light only, it stays as it is. Raises Cancelled once should_stop is true.
     """
-    reluctance: FloatImage | None = None
-    least_step: float | None = None
+    least_step, reluctance = None, None
     for _ in range(ROUNDS):
         distance = step_distance(values, least_edge)
         # The pixels that tell whether colours mislead come first.
@@ -92,8 +91,8 @@ def choose_sides(
         other, evidence = map(np.concatenate, zip(weighed, _in_parts(weigh, far, should_stop), strict=True))
         is_judged = np.abs(other - own) > least_step
         if reluctance is None:
-            reluctance = _reluctance(evidence[known & is_judged], away[known & is_judged])
-            assert reluctance is not None
+            contradicted = _contradicted(evidence[known & is_judged], away[known & is_judged])
+            reluctance = np.asarray(RELUCTANCE * np.log((1 - contradicted) / contradicted), np.float32)
         drive = np.where(is_judged, evidence + np.where(known, reluctance[away], 0), np.float32(np.inf))
         belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
         values = values.copy()
@@ -126,21 +125,20 @@ def _mean_color_step(colors: FloatImage, pixels: NDArray[np.int64]) -> float:
     return max(float(np.sqrt(np.nanmean(np.square(steps, dtype=np.float64).sum(axis=1)))), 1e-3)
 
 
-def _reluctance(evidence: FloatImage, away: NDArray[np.uint8]) -> FloatImage | None:
-    """(RIM_PX + 1): how much the map counts so far from a step, in log odds; None where colours mislead."""
+def _contradicted(evidence: FloatImage, away: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """(RIM_PX + 1): in what share of the pixels so far from a step, with clear colours, these contradict the map."""
     shares = np.empty(RIM_PX + 1)
     for k in range(RIM_PX + 1):
         clear = evidence[(away == k) & (np.abs(evidence) > CLEAR)]
         shares[k] = (np.count_nonzero(clear < 0) + 1) / (len(clear) + 20)
-    if shares[1] > MOST_MISLED * shares[0]:
-        return None
-    return np.asarray(RELUCTANCE * np.log((1 - shares) / shares), np.float32)
+    return shares
 
 
 def _least_judged(step: FloatImage, evidence: FloatImage, away: NDArray[np.uint8], least_edge: float) -> float | None:
     """Steps of more than this are judged by colours; None: these mislead."""
     for least_step in (0.0, TALL_EDGES * least_edge):
-        if _reluctance(evidence[step > least_step], away[step > least_step]) is not None:
+        shares = _contradicted(evidence[step > least_step], away[step > least_step])
+        if shares[1] <= MOST_MISLED * shares[0]:
             return least_step
     return None
 

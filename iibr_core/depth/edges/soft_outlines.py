@@ -61,10 +61,10 @@ def widen_fronts(colors: FloatImage, values: FloatImage, step: float, should_sto
     values, rings = values.copy(), [pixels[fades]]
     values.reshape(-1)[rings[0]] = fronts[fades]
     for _ in range(SOFT_PX - 1):
-        shares.reshape(-1)[rings[-1]] = 0
         mixed = mixed[shares.reshape(-1)[mixed] > 0]
         pixels, fronts, _ = _grow(values, shares, step, mixed)
         values.reshape(-1)[pixels] = fronts
+        shares.reshape(-1)[pixels] = 0
         rings.append(pixels)
     pixels, fronts = _just_behind(values, step, np.concatenate(rings), number)
     values.reshape(-1)[pixels] = fronts

@@ -93,11 +93,13 @@ def slow_sides(colors, values, unknown):
             other[y, x], drive[y, x] = weighed
         if reluctance is None:
             counted = rim & ~unknown
-            reluctance = rim_sides._reluctance(drive[counted], distance[counted])
-            if reluctance is None:
+            shares = rim_sides._contradicted(drive[counted], distance[counted])
+            if shares[1] > rim_sides.MOST_MISLED * shares[0]:
                 only_tall = True
                 counted &= np.abs(other - values) > rim_sides.TALL_EDGES * EDGE
-                reluctance = rim_sides._reluctance(drive[counted], distance[counted])
+                shares = rim_sides._contradicted(drive[counted], distance[counted])
+                assert shares[1] <= rim_sides.MOST_MISLED * shares[0]
+            reluctance = (rim_sides.RELUCTANCE * np.log((1 - shares) / shares)).astype(np.float32)
         drive[rim] += np.where(unknown[rim], 0, reluctance[distance[rim]])
         if only_tall:
             drive[np.abs(other - values) <= rim_sides.TALL_EDGES * EDGE] = np.inf
