@@ -227,7 +227,8 @@ class ViewUpdate:
 
     row, column: its index (v, u). colors: (H, W, 3), see StoredColors. disparity: (H, W) float32 of this view, or
     None where a light field read from disk has none. inpainted: (H, W) bool, True where the photo saw nothing, or
-    None where not known. is_final: whether it stays as it is; else it comes once more.
+    None where not known. is_final: whether it stays as it is; else it comes once more. share: of the work on all views,
+    what is done once this one is there, 0..1.
     """
 
     row: int
@@ -236,6 +237,7 @@ class ViewUpdate:
     disparity: FloatImage | None
     inpainted: NDArray[np.bool_] | None = None
     is_final: bool = True
+    share: float = 0.0
 
 
 def ignore_progress(done: float, total: float, doing: str) -> None:

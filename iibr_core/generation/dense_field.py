@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import hypot
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
+from iibr_core.generation.field_work import OUTER_WORK
 from iibr_core.generation.light_field import nearest_first
 from iibr_core.generation.memory_model import MOST_COMPLETING
 from iibr_core.generation.stored_views import encode_for_storage
@@ -127,17 +128,22 @@ def _generate_views(
             (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, should_stop, 1)
             return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
 
+        done, total = 0.0, len(completing) * OUTER_WORK + len(remaining) - len(completing)
         if dense.centre not in places:
-            yield update(completing[0], views.complete(completing[0]))
+            done += OUTER_WORK / total
+            yield replace(update(completing[0], views.complete(completing[0])), share=done)
         for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
             shown = np.zeros(view.disparity.shape, np.bool_)
-            yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), shown)
+            yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), shown, share=done)
         for offset in completing[dense.centre not in places :]:
-            yield update(offset, views.complete(offset))
+            done += OUTER_WORK / total
+            yield replace(update(offset, views.complete(offset)), share=done)
         remaining = [offset for offset in remaining if offset not in completing]
-        yield from synthesis.side_by_side(
+        for made in synthesis.side_by_side(
             lambda offset: update(offset, views.make(offset)), nearest_first(remaining, nearest_to)
-        )
+        ):
+            done += 1 / total
+            yield replace(made, share=done)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from iibr_core.generation.field_work import FieldWork
 from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views_of_grid
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.stored_views import Draft, StoredViews, encode_for_storage
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter, require_inpainter
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_inpainter, require_inpainter
 from iibr_core.rendering.ambiguous_rays import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
@@ -70,7 +72,10 @@ def generate(
         require_inpainter(inpaint)
         # A model is not loaded for nothing.
         load = partial(load_inpainter, inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, aids)
-        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, quality, load, draft_bytes)
+        outer = len(outer_views_of_grid(plan.grid)) if plan.has_disocclusion else 0
+        views = outer, plan.grid.rows * plan.grid.columns - 1 - outer
+        work = FieldWork(plan.costs, quality, views, inpaint not in INPAINTERS)
+        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, load, draft_bytes, work)
 
 
 def _generate_views(
@@ -79,33 +84,34 @@ def _generate_views(
     plan: ScenePlan,
     should_stop: ShouldStop,
     nearest_to: Callable[[], ViewOffset],
-    quality: Quality,
     load: Callable[[], Inpainter],
     draft_bytes: int | None,
+    work: FieldWork,
 ) -> Iterator[ViewUpdate]:
     grid = plan.grid
     colors = encode_for_storage(photo.pixels, photo.is_hdr, should_stop)
-    yield ViewUpdate(*grid.centre, colors, disparity.values, np.zeros(photo.size, np.bool_))
+    yield ViewUpdate(*grid.centre, colors, disparity.values, np.zeros(photo.size, np.bool_), share=work.add(0.0))
     if grid == (1, 1):
         return
-    transformer, inpainter = transformer_for(quality), load()
+    transformer, inpainter = transformer_for(work.quality), load()
     rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter)
-    with ViewSynthesis(should_stop, transformer, quality == "exact", inpainter=inpainter) as synthesis:
+    with ViewSynthesis(should_stop, transformer, work.quality == "exact", inpainter=inpainter) as synthesis:
         views = StoredViews(synthesis, rays, grid, photo.is_hdr, should_stop)
         inner = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
         # What is left to be done for views that are there, or in the ray set.
         unfinished: dict[ViewOffset, Callable[[], ViewUpdate]] = {}
-        images = len(rays)
+        images, outer_offsets = len(rays), set[ViewOffset]()
         for offset, view in outer_views:
             inner.remove(offset)
+            outer_offsets.add(offset)
             if transformer is not None:
                 # What joined the set is kept there.
                 before = view.colors if len(rays) == images else rays.in_view(rays.arrays[1][images])
                 unfinished[offset] = partial(views.make, offset, ShownBefore(before, images))
-            images = len(rays)
+            images, share = len(rays), work.add(work.outer)
             if transformer is None or draft_bytes is not None:
-                yield views.update(offset, view, is_final=transformer is None)
-        room = draft_bytes or 0 if quality == "balanced" else 0
+                yield replace(views.update(offset, view, is_final=transformer is None), share=share)
+        room = draft_bytes or 0 if work.quality == "balanced" else 0
 
         def start(offset: ViewOffset) -> Draft:
             if room > 0:
@@ -118,10 +124,13 @@ def _generate_views(
                 room -= draft.nbytes
                 v, u = draft.update.row, draft.update.column
                 unfinished[grid.offset(v, u)] = partial(views.finish, draft)
-            yield draft.update
-        yield from synthesis.side_by_side(
+            left = work.finish_inner if draft.undecided else 0.0
+            yield replace(draft.update, share=work.add(work.inner - left))
+        for update in synthesis.side_by_side(
             lambda offset: unfinished.pop(offset)(), nearest_first(list(unfinished), nearest_to)
-        )
+        ):
+            was_outer = grid.offset(update.row, update.column) in outer_offsets
+            yield replace(update, share=work.add(work.finish_outer if was_outer else work.finish_inner))
 
 
 def ray_set(

@@ -265,7 +265,7 @@ def _complete_plan(
         (
             *reasons,
             *_edge_reasons(statistics, inpaint, len(outer_views_of_grid(grid))),
-            *_quality_reasons(costs, quality, wanted is not None),
+            _quality_reason(costs, quality, wanted is not None),
             f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(peak_bytes + draft_bytes)} to make them,"
             f" {mebibytes(in_all)} in all.",
         ),
@@ -299,15 +299,12 @@ def _edge_reasons(statistics: ParallaxStatistics, inpaint: str, outer_views: int
     why = "nearest to true views, though smooth" if inpaint == DEFAULT_INPAINTER else "as asked"
     reasons = [f"{near_edges}holes behind them are inpainted by {name}: {why}."]
     if inpaint not in INPAINTERS:
-        reasons.append(
-            f"The model paints up to {outer_views} views, each in seconds on a GPU, in minutes without one; the times"
-            " told here leave it out."
-        )
+        reasons.append(f"The model paints up to {outer_views} views, each in seconds on a GPU, in minutes without one.")
     return reasons
 
 
-def _quality_reasons(costs: CostEstimates, quality: Quality, is_asked: bool) -> list[str]:
-    fast, balanced, exact = (each.seconds for each in costs)
+def _quality_reason(costs: CostEstimates, quality: Quality, is_asked: bool) -> str:
+    fast, balanced = costs.fast.seconds, costs.balanced.seconds
     why = ": no ray is ambiguous."
     if is_asked:
         why = ", as asked."
@@ -315,12 +312,4 @@ def _quality_reasons(costs: CostEstimates, quality: Quality, is_asked: bool) -> 
         why = ": the transformer decides the rays that are ambiguous."
     elif balanced > fast:
         why = f": asking the transformer would take {balanced / fast:.1f} times as long and hardly show."
-    return [
-        f"{quality.capitalize()} quality{why}",
-        f"Making all views takes about {_seconds(fast)} in fast, {_seconds(balanced)} in balanced and {_seconds(exact)}"
-        " in exact quality.",
-    ]
-
-
-def _seconds(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
+    return f"{quality.capitalize()} quality{why}"

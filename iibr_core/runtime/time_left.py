@@ -23,15 +23,18 @@ STALLED = 3.0
 
 
 class TimeLeft:
-    """Of one job. `update` it whenever the job advances, and in between to count down."""
+    """Of one job. `update` it whenever the job advances, and in between to count down. share: of the work that is done,
+    0..1; it only grows, also where there turns out to be more to do.
+    """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
         """clock: the time in seconds, from any origin."""
+        self.share = 0.0
         self._clock = clock
         self._samples: deque[tuple[float, float]] = deque()  # (time, work done)
         self._first: tuple[float, float] | None = None
         self._advanced: tuple[float, float] | None = None
-        self._step, self._steps = 0.0, 0
+        self._step, self._steps, self._done = 0.0, 0, 0.0
 
     def update(self, done: float, total: float) -> float | None:
         """Seconds left, None while they are unknown. done, total: work in any unit, with equal time for equal work.
@@ -39,6 +42,7 @@ class TimeLeft:
         done does not shrink; total may change.
         """
         now = self._clock()
+        self._grow(done, total)
         self._measure(now, done)
         if done >= total > 0:
             return 0.0
@@ -49,6 +53,18 @@ class TimeLeft:
         if waited > max(STALLED * step, LEAST_S):
             return None
         return max((total - done) / rate - min(waited, step), 0.0)
+
+    def restart(self) -> None:
+        """Forget the pace: work of another kind begins."""
+        self._samples.clear()
+        self._first, self._steps = None, 0
+
+    def _grow(self, done: float, total: float) -> None:
+        """What was done since the last time comes from what was left then."""
+        step, left = max(done - self._done, 0.0), max(total - done, 0.0)
+        self._done = max(done, self._done)
+        if total > 0:
+            self.share += (1.0 - self.share) * (step / (step + left) if step + left > 0 else 1.0)
 
     def _measure(self, now: float, done: float) -> None:
         if self._advanced is not None and done <= self._advanced[1]:

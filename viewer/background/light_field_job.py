@@ -4,6 +4,7 @@ focusing, wide apertures and viewpoints between the views work as with a photo; 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -18,6 +19,7 @@ from iibr_core.generation.memory_model import Budget, budget_of, require_field, 
 from iibr_core.runtime.machine import memory_bytes
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset, ViewUpdate, image_size
+from viewer.background.opening_work import MeasureViews, OpeningWork, ViewsWork
 from viewer.model.state.scene import Progress, Scene, Source
 
 if TYPE_CHECKING:
@@ -26,15 +28,17 @@ if TYPE_CHECKING:
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Where to look for the focus in a light field that says nothing about disparity."""
 FROM_VIEWS = "the views themselves"
-FINDING = "finding disparity"
 
 
 @dataclass(frozen=True, eq=False)
 class Showing:
-    """A light field with what is known of it so far. views: all of them, the centre first."""
+    """A light field with what is known of it so far. views: all of them, the centre first. measure: how far opening it
+    is with some of them.
+    """
 
     scene: Scene
     views: Iterator[ViewUpdate]
+    measure: MeasureViews
 
 
 def showings_of_light_field(
@@ -66,15 +70,20 @@ def showings_of_light_field(
     given = known if source.depth.file is None else _read_map(source, size)
     read: list[ViewUpdate] = [next(views)]
     scene = _scene_as_read(source, field, grid, read[0], disparity_range(field))
-    if (scene.has_view_disparity and given is None) or max(grid) == 1:
-        yield Showing(scene, chain(read, views))
+    is_whole = (scene.has_view_disparity and given is None) or max(grid) == 1
+    finds = given is None and read[0].disparity is None
+    work = OpeningWork(grid.rows * grid.columns, finds and not is_whole, takes_drafts, carries=not is_whole)
+    if is_whole:
+        yield Showing(scene, chain(read, views), work.measuring("reading"))
         return
     if takes_drafts:
-        yield Showing(scene, _keep(read, views))
+        yield Showing(scene, _keep(read, views), work.measuring("reading"))
     else:
-        report_progress(Progress(doing="reading"))
-        read += views
-    yield from _with_disparity(_Field(scene, grid, read, budget), given, should_stop, report_progress, takes_drafts)
+        for view in views:
+            read.append(view)
+            report_progress(work.advance("reading", view.share))
+    found = _Field(scene, grid, read, budget, work)
+    yield from _with_disparity(found, given, should_stop, report_progress, takes_drafts)
 
 
 def _filled_between(
@@ -88,7 +97,7 @@ def _filled_between(
     """The field with views made between its own, from all of them."""
     from iibr_core.formats.light_fields.views import grid_of
     from iibr_core.generation.dense_field import densify, require_steps
-    from iibr_core.generation.given_views import read_given_views
+    from iibr_core.generation.given_views import DenseFieldWork, read_given_views
     from iibr_core.inpainting.registry import load_inpainter
 
     if source.depth.file is not None:
@@ -100,8 +109,10 @@ def _filled_between(
     grid = grid_of(field)
     steps = require_steps(grid, source.filled_grid, field.name)
 
+    work, opening = DenseFieldWork(grid, source.filled_grid), ViewsWork(math.prod(source.filled_grid))
+
     def report(done: float, total: float, doing: str) -> None:
-        report_progress(Progress(doing=f"{doing}, {done / total:.0%}"))
+        report_progress(opening.advance(work.reading(done, total), doing=doing))
 
     given = read_given_views(field, budget, should_stop, report)
     low, high = min(view.disparity.min() for view in given), max(view.disparity.max() for view in given)
@@ -113,19 +124,19 @@ def _filled_between(
         depth_source="light field" if len(field.disparity) == len(field.views) else FROM_VIEWS,
         has_view_disparity=True,
     )
-    return Showing(
-        scene, densify(given, grid, source.filled_grid, should_stop, load_inpainter(source.inpaint), nearest_to)
-    )
+    made = densify(given, grid, source.filled_grid, should_stop, load_inpainter(source.inpaint), nearest_to)
+    return Showing(scene, made, lambda there, drafts, share: opening.advance(work.making(share), there, drafts))
 
 
 @dataclass(frozen=True, eq=False)
 class _Field:
-    """A light field as read. views: the centre first."""
+    """A light field as read. views: the centre first. work: of opening it."""
 
     scene: Scene
     grid: GridShape
     views: list[ViewUpdate]
     budget: Budget
+    work: OpeningWork
 
     def showing(
         self, values: FloatImage, origin: str, is_final: bool, should_stop: ShouldStop, range_px: tuple[float, float]
@@ -138,15 +149,16 @@ class _Field:
             has_view_disparity=True,
             subject_disparity_px=subject_disparity(values),
         )
-        return Showing(scene, self._views_with(values, is_final, should_stop))
+        views = self._views_with(values, is_final, should_stop)
+        return Showing(scene, views, self.work.measuring("carrying" if is_final else "drafting"))
 
     def _views_with(self, values: FloatImage, is_final: bool, should_stop: ShouldStop) -> Iterator[ViewUpdate]:
         from iibr_core.generation.carried_disparity import carry_disparity
 
         colors = {(view.row, view.column): view.colors for view in self.views}
         centre = encoded_from_stored(self.views[0].colors)
-        for row, column, disparity in carry_disparity(centre, values, self.grid, should_stop):
-            yield ViewUpdate(row, column, colors[row, column], disparity, is_final=is_final)
+        for made in carry_disparity(centre, values, self.grid, should_stop):
+            yield replace(made, colors=colors[made.row, made.column], inpainted=None, is_final=is_final)
 
 
 def _with_disparity(
@@ -169,18 +181,24 @@ def _with_disparity(
         return
     colors = [view.colors for view in field.views]
     offsets = [field.grid.offset(view.row, view.column) for view in field.views]
-    report_progress(Progress(doing=FINDING))
+    report_progress(field.work.advance("searching", 0.0))
     try:
         coarse = estimate_coarse(colors, offsets, 0, should_stop)
         require_matching(field.budget, field.scene.name, image_size(coarse.values), coarse.range_px, offsets)
     except InputError as error:
         # The views can be looked at without.
-        yield Showing(replace(field.scene, notes=(*field.scene.notes, f"{error}.")), iter(field.views))
+        scene = replace(field.scene, notes=(*field.scene.notes, f"{error}."))
+        yield Showing(scene, (replace(view, share=1.0) for view in field.views), field.work.measuring("carrying"))
         return
+    field.work.knows_search(coarse.times_dearer)
     if takes_drafts:
         yield field.showing(coarse.values, FROM_VIEWS, False, should_stop, _range_of(coarse.values))
-    report_progress(Progress(doing=FINDING))
-    values = estimate_disparity(colors, offsets, 0, coarse.range_px, should_stop)
+
+    def report(done: float, total: float, doing: str) -> None:
+        report_progress(field.work.advance("matching", done / total))
+
+    report(0.0, 1.0, "")
+    values = estimate_disparity(colors, offsets, 0, coarse.range_px, should_stop, report)
     yield field.showing(values, FROM_VIEWS, True, should_stop, _range_of(values))
 
 
@@ -213,11 +231,11 @@ def _read_map(source: Source, size: ImageSize) -> FloatImage:
 
 
 def _keep(read: list[ViewUpdate], views: Iterator[ViewUpdate]) -> Iterator[ViewUpdate]:
-    """All views, those still to come kept as well."""
-    yield read[0]
+    """All views, those still to come kept as well. They come again, with disparity."""
+    yield replace(read[0], is_final=False)
     for view in views:
         read.append(view)
-        yield view
+        yield replace(view, is_final=False)
 
 
 def _range_of(values: FloatImage) -> tuple[float, float]:

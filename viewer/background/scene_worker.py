@@ -6,7 +6,6 @@ The newest request wins: the job before it stops at its next row band, see `view
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -31,6 +30,7 @@ from viewer.background.loaded_photo import (
     make_plan,
     sketch_photo,
 )
+from viewer.background.opening_work import MeasureViews, ViewsWork
 from viewer.background.photo_folder import first_photo
 from viewer.background.read_ahead import WantedPhoto
 from viewer.model.layout import ScreenSize
@@ -216,7 +216,10 @@ def _results_of_photo(
         loaded.photo, disparity, plan, should_stop, nearest_to, source.quality, source.inpaint, draft_bytes,
         inpainting_aids(source, loaded, report_painting),
     )  # fmt: skip
-    yield from _count_views(request.generation, views, plan.grid.rows * plan.grid.columns)
+    work = ViewsWork(plan.grid.rows * plan.grid.columns)
+    yield from _count_views(
+        request.generation, views, lambda there, drafts, share: work.advance((share, 1.0), there, drafts)
+    )
 
 
 def _centre_view(loaded: LoadedPhoto, plan: ScenePlan) -> ViewUpdate:
@@ -237,14 +240,14 @@ def _results_of_light_field(
         scene, centre = showing.scene, next(showing.views)
         yield SceneReady(request.generation, scene, None, centre)
         rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), showing.views))
-        yield from _count_views(request.generation, rest, scene.grid.rows * scene.grid.columns)
+        yield from _count_views(request.generation, rest, showing.measure)
         if should_stop():
             return
 
 
-def _count_views(generation: int, views: Iterator[ViewUpdate], total: int) -> Iterator[ViewReady]:
-    start, is_final = time.perf_counter(), {}
+def _count_views(generation: int, views: Iterator[ViewUpdate], measure: MeasureViews) -> Iterator[ViewReady]:
+    is_final = {}
     for view in views:
         is_final[view.row, view.column] = view.is_final
-        seconds, drafts = time.perf_counter() - start, list(is_final.values()).count(False)
-        yield ViewReady(generation, view, Progress(len(is_final), total, seconds, drafts=drafts))
+        drafts = list(is_final.values()).count(False)
+        yield ViewReady(generation, view, measure(len(is_final), drafts, view.share))

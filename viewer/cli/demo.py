@@ -57,7 +57,7 @@ def _demo_pictures(source: Source, why: str) -> None:
     print(f"{why}. Rendering without one.")
     with HeadlessViewer() as viewer:
         with show_progress("reading") as show:
-            viewer.open(source, 1.0, lambda progress: show(progress.done, progress.total, progress.doing))
+            viewer.open(source, 1.0, lambda made: show(made.share, float(made.total > 0), made.doing))
         export_image(window, viewer.screen(SCREEN_SIZE) if viewer.has_panels else viewer.picture())
         export_image(views, contact_sheet(viewer))
     print(f"{window}: the viewer's window")

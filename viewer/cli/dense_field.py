@@ -10,7 +10,7 @@ from iibr_core.types import GridShape, image_size
 from viewer.cli.options import inputs_with_sidecar, require_existing
 from viewer.cli.scene_options import NOT_FOR_LIGHT_FIELDS
 from viewer.cli.terminal import print_notes, show_progress
-from viewer.cli.view_writing import write_views
+from viewer.cli.view_writing import MAKING, write_views
 
 if TYPE_CHECKING:
     from viewer.model.state.scene import Source
@@ -31,21 +31,25 @@ def write_dense_field(
 
     from iibr_core.formats.light_fields.views import grid_of
     from iibr_core.generation.dense_field import densify, require_steps
-    from iibr_core.generation.given_views import read_given_views
+    from iibr_core.generation.given_views import DenseFieldWork, read_given_views
     from iibr_core.generation.memory_model import budget_of
     from iibr_core.inpainting.registry import load_inpainter
 
     field = open_light_field(Path(source.path))
     require_steps(grid_of(field), grid, source.path)
     inpainter = load_inpainter(source.inpaint)
+    work = DenseFieldWork(grid_of(field), grid)
     with show_progress("reading") as show:
-        given = read_given_views(field, budget_of(source.depth.memory_bytes), report_progress=show)
-    size = image_size(given[0].colors)
-    with (
-        new_writer(out, grid, field.focal_px or float(size.width), field.name, with_disparity) as writer,
-        show_progress("making views") as show,
-        closing(densify(given, grid_of(field), grid, inpainter=inpainter)) as views,
-    ):
-        said = write_views(views, writer, grid, size, show)
+
+        def report(done: float, total: float, doing: str) -> None:
+            show(*work.reading(done, total), doing)
+
+        given = read_given_views(field, budget_of(source.depth.memory_bytes), report_progress=report)
+        size = image_size(given[0].colors)
+        with (
+            new_writer(out, grid, field.focal_px or float(size.width), field.name, with_disparity) as writer,
+            closing(densify(given, grid_of(field), grid, inpainter=inpainter)) as views,
+        ):
+            said = write_views(views, writer, grid, size, lambda share: show(*work.making(share), MAKING))
     print(f"{said}: {out}")
     print_notes(field.notes)

@@ -29,7 +29,7 @@ from viewer.cli.options import (
 )
 from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.terminal import print_depth, print_notes, show_progress
-from viewer.cli.view_writing import write_views
+from viewer.cli.view_writing import MAKING, write_views
 
 if TYPE_CHECKING:
     from viewer.model.state.scene import Source
@@ -115,20 +115,16 @@ def _write_light_field(
 
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
-    photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
-    plan = make_plan(source, loaded, depth_strength, keeps_views=False)
-    disparity_read = plan.field_disparity(loaded.disparity)
-    with (
-        new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
-        show_progress("making views") as show,
-        closing(
-            generated(
-                photo_read, disparity_read, plan, inpaint=source.inpaint, aids=inpainting_aids(source, loaded, show)
-            )
-        ) as made,
-    ):
-        views = add_gloss(made, gloss, scene_of_photo(source, loaded, plan))
-        said = write_views(views, writer, grid, loaded.photo.size, show)
+        photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
+        plan = make_plan(source, loaded, depth_strength, keeps_views=False)
+        disparity_read = plan.field_disparity(loaded.disparity)
+        aids = inpainting_aids(source, loaded, lambda done, total, doing: show(0, 0, f"{doing}, {done / total:.0%}"))
+        with (
+            new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
+            closing(generated(photo_read, disparity_read, plan, inpaint=source.inpaint, aids=aids)) as made,
+        ):
+            views = add_gloss(made, gloss, scene_of_photo(source, loaded, plan))
+            said = write_views(views, writer, grid, loaded.photo.size, lambda share: show(share, 1.0, MAKING))
     print(f"{said}: {out}")
     print_notes(loaded.photo.notes + loaded.disparity.notes + plan.notes)
     print_depth(loaded.origin)

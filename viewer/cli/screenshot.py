@@ -176,7 +176,7 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
             viewer.open_scene(
                 shot.source,
                 shot.depth_strength,
-                lambda made: show(made.done, made.total, made.doing),
+                lambda made: show(made.share, float(made.total > 0), made.doing),
                 shot.edits,
                 on_ready=shot.lens.require_within,
             )
@@ -189,14 +189,20 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
                     )
                 size = viewer.own_size
                 require_full(viewer.scene, viewer.state.optics)
-            if ui or viewer.needs_views(size):
-                viewer.make_views(lambda made: show(made.done, made.total, made.doing))
+            views = viewer.scene.grid.rows * viewer.scene.grid.columns if ui or viewer.needs_views(size) else 0
+            total = views + (0.0 if ui else viewer.picture_work(size))
+            if views:
+                viewer.make_views(lambda made: show(made.share * views, total, made.doing))
             scene = viewer.scene
             saved = shot_of(viewer.state, size or scene.size, shot.form)
             if ui:
                 pixels = viewer.screen(shot.size or SCREEN_SIZE)
             else:
-                pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space, show)
+
+                def report(done: float, all_of_it: float, doing: str) -> None:
+                    show(views + (total - views) * (done / all_of_it if all_of_it else 0.0), total, doing)
+
+                pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space, report)
     if ui:
         export_image(output, pixels)
     else:

@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from iibr_core.depth.choice import DepthOrigin
+from iibr_core.runtime.time_left import TimeLeft, about_left
 
 
 class Commands(TyperGroup):
@@ -56,23 +57,35 @@ def print_depth(origin: DepthOrigin | None) -> None:
 
 @contextmanager
 def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., None]]:
-    """A bar on stderr while the block runs; call what is yielded with (done, total, what is being done). counts: shows
-    the numbers beside the time left.
+    """A bar on stderr while the block runs; call what is yielded with (done, total, what is being done): work, see
+    `TimeLeft`; a total of 0 is not known yet. counts: shows the numbers too.
     """
     from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
     console = Console(stderr=True)
     if not console.is_terminal:
         # A bar leaves empty lines there, and an error is to be the only line.
         yield lambda *_: None
         return
-    more = (MofNCompleteColumn(),) if counts else ()
-    with Progress(*Progress.get_default_columns(), *more, console=console, transient=True) as bar:
-        task = bar.add_task(doing, total=None)
+    time_left = TimeLeft()
+    told = TextColumn("{task.fields[told]}")
+    with Progress(
+        "{task.description}", BarColumn(), TaskProgressColumn(), told, console=console, transient=True
+    ) as bar:
+        task = bar.add_task(doing, total=None, told="")
 
-        def show(done: int, total: int, now: str = "") -> None:
+        def show(done: float, total: float, now: str = "") -> None:
+            left_s = time_left.update(done, total)
+            told = [f"{done:.0f} of {total:.0f}"] if counts and total else []
+            told += [about_left(left_s)] if left_s else []
             said = now or ("making views" if total else doing)
-            bar.update(task, completed=done, total=total or None, description=said)
+            bar.update(
+                task,
+                completed=time_left.share,
+                total=1.0 if total else None,
+                description=said,
+                told=", ".join(told),
+            )
 
         yield show

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,8 +11,8 @@ import typer
 
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.extras import require_extra
-from iibr_core.types import ReportProgress, ignore_progress
 from viewer.cli.options import Force
+from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
     from iibr_core.training.trainer import Batch
@@ -80,7 +78,7 @@ def train_weights(
         return training_batch(step, seed)
 
     try:
-        with _show_bar() as show:
+        with show_progress("training", counts=True) as show:
             about = {"command": published}
             trainer.train(model, batches, config, out, resume=resume, metadata=about, report_progress=show)
     except KeyboardInterrupt:
@@ -97,19 +95,3 @@ def train_weights(
 def _report_end(message: str, code: int) -> int:
     print(f"iibr: {message}", file=sys.stderr)
     return code
-
-
-@contextmanager
-def _show_bar() -> Iterator[ReportProgress]:
-    """A bar on stderr while the block runs; what is yielded moves it and shows what is being done."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[loss]}"), TimeRemainingColumn())
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield ignore_progress
-        return
-    with Progress("training", *columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=None, loss="")
-        yield lambda done, total, doing: bar.update(task, completed=done, total=total, loss=doing)

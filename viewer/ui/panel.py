@@ -7,6 +7,7 @@ from collections.abc import Callable
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from iibr_core.runtime.time_left import about_left
 from iibr_core.types import DEFAULT_QUALITY
 from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork, ToggleSection
 from viewer.model.commands import BY_NAME
@@ -84,15 +85,15 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
 
 
 def progress_text(progress: Progress) -> str:
-    """The progress in one short line: "23 of 81 views, 3 s left", "sharpening edges, 2 s left" once all are there and
-    some are drafts, "81 of 81 views, 5 s" at the end; empty where nothing was asked for.
+    """The progress in one short line: "23 of 81 views, about 3 s left", "sharpening edges" once all are there and some
+    are drafts, "81 of 81 views, 5 s" at the end; empty where nothing was asked for.
     """
-    if not progress.total:
-        return progress.doing
     is_sharpening = progress.drafts and progress.done == progress.total
-    words = "sharpening edges" if is_sharpening else f"{progress.done} of {view_count_text(progress.total)}"
-    left_s = seconds_left(progress)
-    return f"{words}, {time_text(left_s)} left" if left_s >= 1 else f"{words}, {time_text(progress.seconds)}"
+    counted = "sharpening edges" if is_sharpening else f"{progress.done} of {view_count_text(progress.total)}"
+    words = progress.doing or (counted if progress.total else "")
+    if progress.is_complete:
+        return f"{words}, {time_text(progress.seconds)}"
+    return f"{words}, {about_left(progress.left_s)}" if progress.left_s is not None else words
 
 
 def report_text(report: DrawReport, has_all_views: bool) -> str:
@@ -103,11 +104,6 @@ def report_text(report: DrawReport, has_all_views: bool) -> str:
     if report.samples >= report.samples_converged:
         return f"{words}, final" if has_all_views else words
     return words if report.error is None else f"{words}, error {report.error:.1%}".replace("%", " %")
-
-
-def seconds_left(progress: Progress) -> float:
-    """How long the rest will take if it goes on as before; 0 while nothing is known."""
-    return progress.seconds * (1.0 / progress.share - 1.0) if progress.share > 0 else 0.0
 
 
 def time_text(seconds: float) -> str:

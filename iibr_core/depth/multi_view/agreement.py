@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.color import encoded_from_stored
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
-from iibr_core.types import FloatImage, StoredColors, ViewOffset
+from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress
 
 AGREE_PX = 1.0
 """Two maps that place a point within so many pixels, seen from each other's view, agree."""
@@ -25,6 +25,7 @@ def reconcile(
     maps: Sequence[FloatImage],
     offsets: Sequence[ViewOffset],
     should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
 ) -> list[FloatImage]:
     """The maps, (H, W) each, with what the others do not bear out filled by what looks like it around; a map that
     nothing bears out stays as it is. views: (H, W, 3) each. Raises Cancelled once should_stop is true.
@@ -37,6 +38,7 @@ def reconcile(
             photo = np.nan_to_num(encoded_from_stored(colors), posinf=1.0)
             values = fill_disparity_by_color(photo, known, should_stop)
         reconciled.append(values)
+        report_progress(len(reconciled), len(maps), "finding disparity")
     return reconciled
 
 

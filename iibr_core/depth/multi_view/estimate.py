@@ -4,6 +4,7 @@ whole.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,8 +19,17 @@ from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.types import FloatImage, InputError, StoredColors, ViewOffset, image_size
+from iibr_core.types import (
+    FloatImage,
+    InputError,
+    ReportProgress,
+    StoredColors,
+    ViewOffset,
+    ignore_progress,
+    image_size,
+)
 
+FINDING = "finding disparity"
 SMALL_SIDE_PX = 160
 """The longer side of the first, small map."""
 STEP_PX = 0.5
@@ -33,6 +43,8 @@ RARE = 0.002
 MARGIN_STEPS = 4
 """Steps of the small sweep that are added to the range at both ends."""
 MOST_STEPS = 512
+AFTER_STEPS = 12
+"""What follows a sweep takes as long as so many of its steps."""
 LEAST_SIDE_PX = 8
 FEW_VIEWS = 4
 """So few match by chance in many places: their maps are checked against each other."""
@@ -43,11 +55,12 @@ AGREE_STEPS = 2.0
 @dataclass(frozen=True, eq=False)
 class CoarseDisparity:
     """values: (H, W) at the size of the views, from a small map. range_px: least and greatest that the whole map may
-    have, px per view step.
+    have, px per view step. times_dearer: the whole map takes about so many times as long as the small one took.
     """
 
     values: FloatImage
     range_px: tuple[float, float]
+    times_dearer: float
 
 
 def estimate_coarse(
@@ -75,7 +88,9 @@ def estimate_coarse(
     low, high = np.quantile(values[is_sure] if is_sure.any() else values, [RARE, 1 - RARE])
     margin = MARGIN_STEPS * step
     whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
-    return CoarseDisparity(whole, (float(low - margin) * shrink, float(high + margin) * shrink))
+    range_px = float(low - margin) * shrink, float(high + margin) * shrink
+    steps = sweep_steps(range_px, small.reach) + AFTER_STEPS
+    return CoarseDisparity(whole, range_px, steps * views[reference].size / 3 / (small.luma.size * len(disparities)))
 
 
 def estimate_disparity(
@@ -84,16 +99,22 @@ def estimate_disparity(
     reference: int,
     range_px: tuple[float, float],
     should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
 ) -> FloatImage:
     """The disparity (H, W) of the reference view, px per view step, within a range (px per view step).
 
     As `estimate_coarse` otherwise, which finds the range. A range of more than MOST_STEPS steps is swept more coarsely.
     """
     matched = _matching_views(views, offsets, reference, 1, should_stop)
-    low, high = range_px
-    steps = int(np.clip(np.ceil((high - low) * matched.reach / STEP_PX), 2, MOST_STEPS))
-    disparities = np.linspace(low, high, steps + 1, dtype=np.float32)
-    values, _ = choose_disparity(sweep(matched, disparities, should_stop), matched.luma, disparities, should_stop)
+    disparities = np.linspace(*range_px, sweep_steps(range_px, matched.reach) + 1, dtype=np.float32)
+    swept = itertools.count(1)
+
+    def report_step() -> None:
+        report_progress(next(swept), len(disparities) + AFTER_STEPS, FINDING)
+
+    values, _ = choose_disparity(
+        sweep(matched, disparities, should_stop, report_step), matched.luma, disparities, should_stop
+    )
     values = _median(values, should_stop)
     if len(matched.textures) <= FEW_VIEWS:
         values = _fill_unseen(views[reference], values, _agrees(matched, values, disparities, should_stop), should_stop)
@@ -110,6 +131,11 @@ def refine_disparity(
 ) -> FloatImage:
     """The same from disparity (H, W) that is off by less than a pixel already: nothing is swept."""
     return _refine(_matching_views(views, offsets, reference, 1, should_stop), values, range_px, should_stop)
+
+
+def sweep_steps(range_px: tuple[float, float], reach: float) -> int:
+    """How many steps of disparity are tried within a range, px per view step. reach: as `sweep_bytes` has it."""
+    return int(np.clip(np.ceil((range_px[1] - range_px[0]) * reach / STEP_PX), 2, MOST_STEPS))
 
 
 def sweep_bytes(size: tuple[int, int], range_px: tuple[float, float], reach: float) -> int:

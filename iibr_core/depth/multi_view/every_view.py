@@ -14,7 +14,7 @@ import numpy as np
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.agreement import reconcile
-from iibr_core.depth.multi_view.estimate import estimate_disparity, refine_disparity
+from iibr_core.depth.multi_view.estimate import AFTER_STEPS, FINDING, estimate_disparity, refine_disparity, sweep_steps
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -22,6 +22,8 @@ from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset
 
 CARRIED_FROM = 4
 """So many maps at most, the nearest first, are carried to a view."""
+STEP_WORK, RECONCILE_WORK = 0.04, 0.01
+"""What a step of a sweep takes, and holding one map against another, where carrying maps to a view takes 1."""
 
 
 def estimate_all(
@@ -38,15 +40,31 @@ def estimate_all(
     Cancelled once should_stop is true.
     """
     maps: dict[int, FloatImage] = {}
-    for index in matched_views(offsets):
-        report_progress(len(maps), len(views), "finding disparity")
-        maps[index] = estimate_disparity(views, offsets, index, range_px, should_stop)
+    matching = {index: _matching_work(offsets, index, range_px) for index in matched_views(offsets)}
+    between = set(range(len(views))) - set(matching)
+    done, reconciling = 0.0, RECONCILE_WORK * len(views) ** 2
+    total = sum(matching.values()) + len(between) + reconciling
+
+    def stage(before: float, work: float) -> ReportProgress:
+        return lambda part, whole, doing: report_progress(before + work * part / whole, total, doing)
+
+    for index, work in matching.items():
+        maps[index] = estimate_disparity(views, offsets, index, range_px, should_stop, stage(done, work))
+        done += work
     matched = dict(maps)
-    for index in sorted(set(range(len(views))) - set(matched)):
-        report_progress(len(maps), len(views), "finding disparity")
+    for index in sorted(between):
         values = _carry(matched, views, offsets, index, should_stop)
         maps[index] = refine_disparity(views, offsets, index, values, range_px, should_stop)
-    return reconcile(views, [maps[index] for index in range(len(views))], offsets, should_stop)
+        done += 1
+        report_progress(done, total, FINDING)
+    ordered = [maps[index] for index in range(len(views))]
+    return reconcile(views, ordered, offsets, should_stop, stage(done, reconciling))
+
+
+def _matching_work(offsets: Sequence[ViewOffset], index: int, range_px: tuple[float, float]) -> float:
+    """What matching a view takes."""
+    reach = max(max(abs(at.t - offsets[index].t), abs(at.s - offsets[index].s)) for at in offsets)
+    return STEP_WORK * (sweep_steps(range_px, reach) + AFTER_STEPS)
 
 
 def matched_views(offsets: Sequence[ViewOffset]) -> list[int]:

@@ -7,6 +7,8 @@ views, differences far below the noise of one of them decide.
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
 
@@ -93,12 +95,18 @@ def matching_views(
     return MatchingViews(np.stack(textures), relative, lumas[0])
 
 
-def sweep(views: MatchingViews, disparities: NDArray[np.float32], should_stop: ShouldStop = never) -> NDArray[np.uint8]:
+def sweep(
+    views: MatchingViews,
+    disparities: NDArray[np.float32],
+    should_stop: ShouldStop = never,
+    report_step: Callable[[], None] = lambda: None,
+) -> NDArray[np.uint8]:
     """(H, W, D): how badly the views match each pixel of the reference at each of D disparities; 255: not at all.
 
-    A pixel that some views do not see matches in one half of them: left, right, upper or lower. Raises Cancelled once
-    should_stop is true.
+    A pixel that some views do not see matches in one half of them: left, right, upper or lower. report_step: called
+    after each disparity, by one thread at a time. Raises Cancelled once should_stop is true.
     """
+    reporting = threading.Lock()
     height, width = views.luma.shape
     costs = np.empty((height, width, len(disparities)), np.uint8)
     window = GuidedFilter(views.luma, WINDOW_RADIUS_PX, WINDOW_SMOOTHNESS)
@@ -110,6 +118,8 @@ def sweep(views: MatchingViews, disparities: NDArray[np.float32], should_stop: S
         for part in parts:
             own.apply(part)
         _store_costs(parts, np.float32(MOST_COST**2), costs[:, :, index])
+        with reporting:
+            report_step()
 
     in_pieces(sweep_one, range(len(disparities)), should_stop, tiling.THREADS)
     return costs

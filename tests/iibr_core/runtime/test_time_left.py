@@ -114,6 +114,16 @@ def test_unknown_work_gives_no_prediction():
         clock.now += 1.0
 
 
+def test_the_share_only_grows_and_ends_at_one_where_the_work_turns_out_to_be_more():
+    time_left, shares = TimeLeft(Clock()), []
+    for done, total in [(0, 0), (0, 10), (2, 10), (4, 10), (5, 100), (50, 100), (50, 60), (60, 60)]:
+        time_left.update(done, total)
+        shares.append(time_left.share)
+    assert shares[:4] == pytest.approx([0.0, 0.0, 0.2, 0.4])
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
 def test_a_long_job_keeps_few_samples():
     clock = Clock()
     time_left = TimeLeft(clock)

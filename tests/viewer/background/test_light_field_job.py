@@ -14,10 +14,15 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError
-from viewer.background.light_field_job import FINDING, FROM_VIEWS
+from viewer.background.light_field_job import FROM_VIEWS
+from viewer.background.opening_work import WORDS
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
-from viewer.model.state.optics import CENTRE
-from viewer.model.state.scene import Source
+from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
+from viewer.model.lens.limits import focus_limits
+from viewer.model.reducers.root import reduce
+from viewer.model.state.app_state import AppState
+from viewer.model.state.optics import CENTRE, SetAperture, SetFocus
+from viewer.model.state.scene import Progress, Scene, Source
 
 WALL_PX, SQUARE_PX = -0.5, 1.25
 
@@ -64,6 +69,50 @@ def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
     assert len(views) == 6
 
 
+@pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
+def test_one_bar_grows_from_reading_to_the_last_view(tmp_path: Path, filled_grid: GridShape | None) -> None:
+    """Through all showings, as the window's state has it; complete once, with the last view."""
+    source = Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid)
+    state, heard = reduce(AppState(), OpenPath(source)), list[Progress]()
+    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE, heard.append)
+    shown = [state.progress]
+    for result in results:
+        while heard:
+            state = reduce(state, ProgressMade(1, heard.pop(0)))
+            shown.append(state.progress)
+        if isinstance(result, SceneReady):
+            state = reduce(state, SceneOpened(1, result.scene))
+        else:
+            state = reduce(state, ProgressMade(1, result.progress, (result.view.row, result.view.column)))
+        shown.append(state.progress)
+    shares = [progress.share for progress in shown]
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert [progress.is_complete for progress in shown[-2:]] == [False, True]
+    assert not any(progress.is_complete for progress in shown[:-1])
+
+
+def test_focus_that_is_set_while_it_loads_stays(tmp_path: Path) -> None:
+    source = Source(str(write_two_planes(tmp_path / "field")))
+    state = reduce(AppState(), OpenPath(source))
+    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)
+    state = reduce(state, SceneOpened(1, first_scene(results)))
+    state = reduce(reduce(state, SetAperture(2.0)), SetFocus(3.5))
+    for result in results:
+        if isinstance(result, SceneReady):
+            state = reduce(state, SceneOpened(1, result.scene))
+            state = reduce(state, SetAperture(state.optics.aperture_diameter + 0.1))  # which checks all limits
+    assert state.optics.focus_disparity == 3.5
+    assert focus_limits(state.scene)[1] >= 3.5
+
+
+def first_scene(results: Iterator[SceneReady | ViewReady]) -> Scene:
+    """What is opened first."""
+    ready = next(results)
+    assert isinstance(ready, SceneReady)
+    return ready.scene
+
+
 def showings(results: Iterator[SceneReady | ViewReady]) -> Iterator[tuple[SceneReady, list[ViewReady]]]:
     """Each scene with the views that follow it."""
     ready: SceneReady | None = None
@@ -106,7 +155,9 @@ def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
     """Asked to stop once it has begun."""
     said: list[str] = []
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
-    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda progress: said.append(progress.doing))
+    results = results_of(
+        request, lambda: WORDS["searching"] in said, lambda: CENTRE, lambda progress: said.append(progress.doing)
+    )
     with pytest.raises(Cancelled):
         list(results)
 
@@ -121,7 +172,7 @@ def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
     assert (ready.centre.row, ready.centre.column) == (4, 4)
     assert {(view.view.row, view.view.column) for view in views} == set(np.ndindex(9, 9))
     assert {view.view.is_final for view in views} == {True}
-    assert any(doing.startswith("finding disparity, ") for doing in said)
+    assert {"reading", "finding disparity"} <= set(said)
     between = next(view.view for view in views if (view.view.row, view.view.column) == (3, 5))
     assert between.disparity is not None
     assert between.disparity[48, 48] == pytest.approx(SQUARE_PX / 2, abs=0.05)
@@ -131,7 +182,7 @@ def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: 
     said: list[str] = []
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
     results = results_of(
-        request, lambda: any(FINDING in doing for doing in said), lambda: CENTRE, lambda now: said.append(now.doing)
+        request, lambda: WORDS["searching"] in said, lambda: CENTRE, lambda now: said.append(now.doing)
     )
     with pytest.raises(Cancelled):
         list(results)

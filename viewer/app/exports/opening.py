@@ -31,7 +31,10 @@ def open_drawn(
     on_ready: is told the scene before any view is made; what it raises ends the opening. Raises InputError.
     """
     viewer.open(
-        source, depth_strength, lambda made: report_progress(made.done, made.total, made.doing), on_ready=on_ready
+        source,
+        depth_strength,
+        lambda made: report_progress(made.share, float(made.total > 0), made.doing),
+        on_ready=on_ready,
     )
     viewer.do(*lens)
     return ExportSource(
@@ -52,7 +55,7 @@ def open_undrawn(
     """
     request = SceneRequest(0, source, depth_strength, takes_drafts=not needs_disparity)
     results = results_of(
-        request, never, lambda: CENTRE, lambda made: report_progress(made.done, made.total, made.doing)
+        request, never, lambda: CENTRE, lambda made: report_progress(made.share, float(made.total > 0), made.doing)
     )
     ready = next(results)
     assert isinstance(ready, SceneReady)

@@ -63,7 +63,6 @@ class ExportSource:
         zero: the disparity (as given) that stays still, where it is to be another than the plan's; for photos only.
         Raises Cancelled once the export should stop.
         """
-        total = self.scene.grid.rows * self.scene.grid.columns
         if self.loaded is None:
             made = self._views_of_folder()
         else:
@@ -84,7 +83,10 @@ class ExportSource:
             )
         scene = self.scene if zero is None else replace(self.scene, infinity_px=self._infinity_px(zero))
         made = add_gloss(made, self.optics.gloss, scene, self.should_stop)
-        yield from self.watched(made, total, "making views")
+        for view in made:
+            raise_if_stopped(self.should_stop)
+            self.report_progress(view.share, 1.0, "making views")
+            yield view
         raise_if_stopped(self.should_stop)
 
     def _infinity_px(self, zero: float) -> float:
@@ -113,7 +115,7 @@ class ExportSource:
         return self.centre if is_known and self.centre is not None and self.centre.disparity is not None else None
 
     def _tell(self, progress: Progress) -> None:
-        self.report_progress(progress.done, progress.total, progress.doing)
+        self.report_progress(progress.share, 1.0, progress.doing)
 
     def plan(self, zero: float | None = None) -> ScenePlan:
         """Of a photo's views; see `views`."""

@@ -54,17 +54,22 @@ def stop_work(state: AppState) -> AppState:
     if not progress.total or progress.is_complete:
         return state
     doing = f"stopped at {progress.done} of {progress.total} views"
-    if progress.drafts:
+    if progress.doing:
+        doing = f"stopped {progress.doing}"
+    elif progress.drafts:
         doing += f", edges not sharpened in {progress.drafts}"
     return replace(state, stopped=state.generation, progress=Progress(doing=doing))
 
 
 def _open_scene(state: AppState, scene: Scene) -> AppState:
     old = state.scene
+    if old is not None and old.source is scene.source and scene.plan is None and state.has_chosen_focus:
+        # More is known of its disparity now; focus stays where the user put it.
+        scene = replace(scene, disparity_range_px=_widened(scene.disparity_range_px, state.optics.focus_disparity))
     opened = replace(
         state,
         scene=scene,
-        progress=Progress(doing=f"reading {scene.name}" if scene.is_sketch else "making views"),
+        progress=_progress_of(state, scene),
         views_there=frozenset({scene.grid.centre}),
         left_field=None,
         shown_generation=state.generation,
@@ -103,6 +108,18 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         has_chosen_focus=False,
         has_chosen_aperture=False,
     )
+
+
+def _widened(range_px: tuple[float, float], disparity: float) -> tuple[float, float]:
+    low, high = range_px
+    return min(low, disparity), max(high, disparity)
+
+
+def _progress_of(state: AppState, scene: Scene) -> Progress:
+    """What is shown until more is heard: of a light field, which is shown more than once, how far its job was."""
+    if scene.plan is None and 0 < state.progress.share and not state.progress.is_complete:
+        return state.progress
+    return Progress(doing=f"reading {scene.name}" if scene.is_sketch else "making views")
 
 
 def remember_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:

@@ -105,9 +105,10 @@ class Scene:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the worker is: views done of total, in seconds; doing says what in words when no views are counted.
+    """How far the worker is: views done of total, in seconds; doing says what in words where that is not making views.
 
-    drafts: of those done, so many will come again, with sharper edges.
+    drafts: of those done, so many will come again, with sharper edges. share: of all the work, what is done, 0..1.
+    left_s: seconds that it still takes, about; None where that is not known.
     """
 
     done: int = 0
@@ -115,11 +116,8 @@ class Progress:
     seconds: float = 0.0
     doing: str = ""
     drafts: int = 0
-
-    @property
-    def share(self) -> float:
-        """How much of the work is done, 0..1. A draft is about half of a view's."""
-        return (self.done - 0.5 * self.drafts) / self.total if self.total else 0.0
+    share: float = 0.0
+    left_s: float | None = None
 
     @property
     def is_complete(self) -> bool:
