@@ -1,12 +1,14 @@
 """Files and folders that are written: where they may go, and that they come there whole or not at all.
 
 Nothing is ever written onto, into or over what is read; over other things only where that was allowed. Links are
-followed. What is not finished lies beside its place under a short hidden name, locked while its process lives; whoever
-writes there next removes what nobody holds any more, and puts back what had been moved aside.
+followed. A place that was free when it was asked for is taken only while it still is. What is not finished lies beside
+its place under a short hidden name, locked while its process lives; whoever writes there next removes what nobody holds
+any more, and puts back what had been moved aside.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -29,9 +31,15 @@ MOST_NAME_BYTES = 255
 MOST_PATH_BYTES = 4000
 """Of the 4096 that Linux takes: a temporary name needs some."""
 MOST_LINKS = 40
+TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
+"""What a folder's place says where something is there."""
 FOLDER_LEVELS = 3
 """How deep the pictures of data sets lie below the folder that is named: scene, subfolder, picture."""
 NEW, OLD = "new", "old"
+_NEW_PLACES: set[Path] = set()
+"""Where nothing was and nothing may be replaced, for as long as this process has not written there: what another one
+puts there meanwhile stays.
+"""
 
 
 class AlreadyThereError(InputError):
@@ -58,6 +66,7 @@ def require_file_place(path: Path, inputs: Iterable[Path] = (), may_replace: boo
             raise InputError(f"{path}: is read here ({read}), and no input is overwritten; choose another name")
     if status is not None and not may_replace:
         raise AlreadyThereError(f"{path}: is there already; give --force to replace it, or choose another name")
+    _note_place(real, may_replace)
 
 
 def require_folder_place(
@@ -69,16 +78,9 @@ def require_folder_place(
     inputs: files and folders that are read. is_whole: whether all of it is replaced, not files in it.
     """
     real = _real_place(folder)
-    _require_no_dangling_link(folder, real)
     remove_leftovers(real.parent if is_whole else real)
+    _require_possible_folder(folder, real, is_whole)
     status = status_of(real)
-    if status is not None and not stat.S_ISDIR(status.st_mode):
-        raise InputError(f"{folder}: is a file, not a folder; choose another name")
-    above = real.parent if is_whole else real
-    there = next(place for place in (above, *above.parents) if os.path.lexists(place))
-    if not is_folder(there):
-        raise InputError(f"{folder}: {there} is a file, not a folder; choose another place")
-    _require_writable(folder, there)
     for read in inputs:
         _require_outside(folder, real, read)
         if status is not None and any(_is_within(place.parent, status) for place in _places_of(read)):
@@ -87,6 +89,21 @@ def require_folder_place(
         raise InputError(f"{folder}: a disk is mounted there; name a folder in it")
     if status is not None and not may_replace and entries_of(real):
         raise AlreadyThereError(f"{folder}: is there already; give --force to replace it, or choose another folder")
+    if is_whole:
+        _note_place(real, may_replace)
+
+
+def _require_possible_folder(folder: Path, real: Path, is_whole: bool) -> None:
+    """Raise InputError where no folder is and none can be made, or may not be written to."""
+    _require_no_dangling_link(folder, real)
+    status = status_of(real)
+    if status is not None and not stat.S_ISDIR(status.st_mode):
+        raise InputError(f"{folder}: is a file, not a folder; choose another name")
+    above = real.parent if is_whole else real
+    there = next(place for place in (above, *above.parents) if os.path.lexists(place))
+    if not is_folder(there):
+        raise InputError(f"{folder}: {there} is a file, not a folder; choose another place")
+    _require_writable(folder, there)
 
 
 def require_own_folder(folder: Path, own_files: str) -> None:
@@ -110,8 +127,11 @@ def require_files_in(
     """
     inputs = tuple(inputs)
     require_folder_place(folder, inputs, may_replace)
-    for name in names if is_folder(folder) else ():
-        require_file_place(folder / name, inputs, may_replace=True)
+    for name in names:
+        if is_folder(folder):
+            require_file_place(folder / name, inputs, may_replace)
+        else:
+            _note_place(_real_place(folder / name), may_replace)
 
 
 def make_folder(folder: Path) -> None:
@@ -138,7 +158,9 @@ def atomic_write(path: Path) -> Iterator[Path]:
     try:
         temporary, lock = _make_temporary(real.parent, lambda new: new.touch(exist_ok=False), suffix)
         yield temporary
-        temporary.replace(real)
+        _put_file(temporary, real)
+    except FileExistsError as error:
+        raise AlreadyThereError(_taken(path)) from error
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
     finally:
@@ -158,6 +180,7 @@ class UnfinishedFolder:
         """Raises InputError where it cannot be made."""
         self.folder = folder
         self._real = _real_place(folder)
+        _require_possible_folder(folder, self._real, is_whole=True)
         self._made_parents = [parent for parent in self._real.parents if not os.path.lexists(parent)]
         self._around: Path | None = None
         self._lock: int | None = None
@@ -176,15 +199,23 @@ class UnfinishedFolder:
             ) from error
 
     def put_in_place(self) -> None:
-        """Replace what is there by it. Raises InputError where that cannot be; then what was there stays."""
+        """Replace what is there by it. Raises InputError where that cannot be, AlreadyThereError where the place was
+        free and must not be replaced; then what was there stays.
+        """
         assert self._around is not None
         try:
-            if os.path.lexists(self._real):
+            if self._real in _NEW_PLACES:
+                with suppress(FileNotFoundError):
+                    self._real.rmdir()
+            elif os.path.lexists(self._real):
                 # Under its own name, and it is known where it belongs, should this process be killed now.
                 (self._around / OLD).mkdir()
                 self._real.rename(self._around / OLD / self._real.name)
             self.path.rename(self._real)
+            _NEW_PLACES.discard(self._real)
         except OSError as error:
+            if self._real in _NEW_PLACES and error.errno in TAKEN:
+                raise AlreadyThereError(_taken(self.folder)) from error
             raise InputError(
                 f"{self.folder}: cannot be replaced ({error.strerror or error}); choose another place"
             ) from error
@@ -216,6 +247,33 @@ def remove_leftovers(folder: Path) -> None:
             else:
                 path.unlink()
         _unlock(lock)
+
+
+def _note_place(real: Path, may_replace: bool) -> None:
+    """Remember whether what is written there must not replace anything."""
+    if may_replace:
+        _NEW_PLACES.discard(real)
+    else:
+        _NEW_PLACES.add(real)
+
+
+def _put_file(temporary: Path, real: Path) -> None:
+    """Rename a file to its place. Raises FileExistsError where that is taken and must not be replaced."""
+    if real in _NEW_PLACES:
+        try:
+            os.link(temporary, real)
+        except FileExistsError:
+            raise
+        except OSError:  # a file system without hard links
+            real.open("xb").close()
+            temporary.replace(real)
+        _NEW_PLACES.discard(real)
+    else:
+        temporary.replace(real)
+
+
+def _taken(path: Path) -> str:
+    return f"{path}: another program has written it meanwhile, and it is kept; choose another name"
 
 
 def _remove_around(around: Path) -> None:

@@ -111,6 +111,7 @@ def train(
     out: Path,
     *,
     resume: bool = False,
+    may_replace: bool = True,
     metadata: Mapping[str, str] | None = None,
     report_progress: ReportProgress = ignore_progress,
 ) -> None:
@@ -119,12 +120,13 @@ def train(
     model(features, mask) gives weights (N, K): >= 0, 0 where there is no candidate, rows with sum 1. batches(step)
     must depend on nothing but the step, which counts from 1. report_progress hears of each step, with its total loss.
     Beside `out` lie a log (`log_path`) and the newest checkpoint (`checkpoint_path`); resume goes on from there.
+    may_replace: whether files that are there already are replaced, else AlreadyThereError is raised.
     The same start gives the same weights, to the bit on one CPU, interrupted or not. Seeds torch's global generator.
 
     Raises InputError for a bad path, device or checkpoint, TrainingDiverged (the checkpoint stays the last good one),
     KeyboardInterrupt once what has been trained is saved, for resume.
     """
-    require_run_files(out)
+    require_run_files(out, may_replace or resume)
     device = choose_device(config.device)
     model.to(device).train()
     run = TrainingRun(model, config, checkpoint_path(out))

@@ -8,6 +8,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from iibr_core.depth.sidecar import map_to_read
+from iibr_core.formats.files import is_file
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, require_picture_format
 from iibr_core.formats.outputs import require_file_place
 from iibr_core.types import ImageSize, InputError
@@ -21,20 +23,26 @@ MAX_PIXELS = 100_000_000
 
 
 def inputs_of(source: Source) -> tuple[Path, ...]:
-    """What is read to open it, as far as it is named: nothing may be written there. See `require_file_place`."""
-    model = None if source.depth.model is None else os.path.expanduser(source.depth.model)
-    is_model_path = model is not None and os.path.lexists(model)  # else it is a name
-    return tuple(Path(path) for path in (source.path, source.depth.file, model if is_model_path else None) if path)
+    """What is read to open it, the map beside it and folders of models included: nothing may be written there. See
+    `require_file_place`.
+    """
+    models = (source.depth.model or "", source.inpaint.partition(":")[2])
+    folders = [path for path in map(os.path.expanduser, models) if path and os.path.lexists(path)]  # else: names
+    found = (source.path, map_to_read(Path(source.path), source.depth), *folders)
+    return tuple(Path(path) for path in found if path)
 
 
 def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     """What is read for what is open, for what is being opened, and to compare with."""
+    from viewer.app.session_store import sidecar_of
+
     sources = [about.source for about in (state, state.scene) if about is not None and about.source is not None]
     origin = state.scene.depth_origin if state.scene is not None else None
-    truth, gloss = state.inspection.truth, state.optics.gloss
-    beside = (origin and origin.file, truth and truth.path, gloss and gloss.environment)
+    truth, gloss, poses = state.inspection.truth, state.optics.gloss, state.poses
+    beside = (origin and origin.file, truth and truth.path, gloss and gloss.environment, poses and poses.file)
     found = [path for source in sources for path in inputs_of(source)]
-    return (*found, *(Path(os.path.expanduser(path)) for path in beside if path))
+    settings = [path for path in (sidecar_of(Path(source.path)) for source in sources if source.path) if is_file(path)]
+    return (*found, *settings, *(Path(os.path.expanduser(path)) for path in beside if path))
 
 
 def require_picture_place(

@@ -61,9 +61,11 @@ def batch(
     if gloss is not None:
         from viewer.background.gloss import read_environment
 
-        read_environment(gloss)
+        read_environment(gloss.gloss)
     name = next(name for name, kind in EXPORTS.items() if kind is to)
-    settings = BatchSettings(name, source, photo.depth_strength, told.options(), focus, aperture, gloss)
+    settings = BatchSettings(
+        name, source, photo.depth_strength, told.options(), focus, aperture, gloss.gloss if gloss else None
+    )
     photos = photos_in(folders)
     if not photos:
         raise InputError(f"{' and '.join(map(str, folders))}: no photos there")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from iibr_core.formats.outputs import make_folder, require_files_in
 from iibr_core.types import InputError
-from viewer.cli.options import SCREEN_SIZE, inputs_with_sidecar
+from viewer.app.save_places import inputs_of
+from viewer.cli.options import SCREEN_SIZE
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def _demo_pictures(source: Source, why: str) -> None:
     from viewer.app.image_export import export_image
 
     window, views = DEMO_FOLDER / "demo.png", DEMO_FOLDER / "demo-views.png"
-    require_files_in(DEMO_FOLDER, (window.name, views.name), inputs_with_sidecar(source), may_replace=True)
+    require_files_in(DEMO_FOLDER, (window.name, views.name), inputs_of(source), may_replace=True)
     make_folder(DEMO_FOLDER)
     print(f"{why}. Rendering without one.")
     with HeadlessViewer() as viewer:

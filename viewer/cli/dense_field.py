@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iibr_core.types import GridShape, image_size
-from viewer.cli.options import inputs_with_sidecar, require_existing
 from viewer.cli.scene_options import NOT_FOR_LIGHT_FIELDS
 from viewer.cli.terminal import print_notes, show_progress
 from viewer.cli.view_writing import MAKING, write_views
 
 if TYPE_CHECKING:
+    from iibr_core.formats.light_fields.registry import WriterFactory
     from viewer.model.state.scene import Source
 
 NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
@@ -20,15 +20,10 @@ NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity"
 
 
 def write_dense_field(
-    source: Source, grid: GridShape, out: Path, layout: str, with_disparity: bool, force: bool
+    source: Source, grid: GridShape, out: Path, new_writer: WriterFactory, with_disparity: bool
 ) -> None:
-    """Raises InputError, also where the views find no places on the grid."""
-    from iibr_core.formats.light_fields.registry import open_light_field, writer_for
-
-    require_existing(source)
-    new_writer = writer_for(layout)
-    new_writer.require_place(out, inputs_with_sidecar(source), force)
-
+    """To a place that the writer admits. Raises InputError, also where the views find no places on the grid."""
+    from iibr_core.formats.light_fields.registry import open_light_field
     from iibr_core.formats.light_fields.views import grid_of
     from iibr_core.generation.dense_field import densify, require_steps
     from iibr_core.generation.given_views import DenseFieldWork, read_given_views

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
-from viewer.cli.options import Force, Memory, require_memory
+from viewer.cli.options import Force, Memory, inputs_of_command, require_memory
 from viewer.cli.terminal import print_notes, show_progress
 
 
 def depth(
+    context: typer.Context,
     field: Annotated[Path, typer.Argument(metavar="PATH", help="A light field, or a stereo photo.")],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="PFM, EXR, NPY or 16-bit PNG to write.")],
     memory: Memory = None,
@@ -29,7 +30,7 @@ def depth(
     from iibr_core.formats.outputs import require_file_place
     from iibr_core.generation.memory_model import budget_of, require_field, require_matching
 
-    require_file_place(out, [field], force)
+    require_file_place(out, inputs_of_command(context), force)
     scene = open_light_field(field)
     grid, (size, views) = grid_of(scene), read_views(scene)
     budget = budget_of(memory)

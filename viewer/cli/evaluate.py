@@ -11,10 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.files import is_file, status_of
+from iibr_core.formats.files import is_file
 from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError, Quality
-from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, quality_from_text, require_model
+from viewer.cli.options import (
+    DepthModel,
+    Force,
+    MaxPixels,
+    Refine,
+    inputs_of_command,
+    quality_from_text,
+    require_model,
+)
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
@@ -22,6 +30,7 @@ if TYPE_CHECKING:
 
 
 def evaluate(
+    context: typer.Context,
     datasets: Annotated[
         list[Path],
         typer.Argument(
@@ -72,8 +81,9 @@ def evaluate(
         require_extra("train", "torch")
     from iibr_core.evaluation.report_folder import require_report_folder
 
-    others = [Path(os.path.expanduser(path)) for path in (disparity, depth_model, lpips) if path is not None]
-    require_report_folder(out, [path for path in (*datasets, *others) if status_of(path) is not None], force)
+    named = (os.path.expanduser(name) for name in (disparity, depth_model) if name is not None)
+    found = tuple(Path(name) for name in named if os.path.lexists(name))  # else: words, and names of models
+    require_report_folder(out, inputs_of_command(context) + found, force)
 
     from iibr_core.evaluation.datasets import find_scenes
     from iibr_core.evaluation.protocol import QUALITIES, Options

@@ -22,7 +22,7 @@ from viewer.cli.options import (
     Grid,
     Literal,
     ScenePath,
-    inputs_with_sidecar,
+    inputs_of_command,
     require_existing,
     require_memory,
     require_model,
@@ -76,7 +76,7 @@ def export(
     require_memory(scene.memory, keeps_views=to.is_drawn)
     require_existing(source)
     require_ending(to, output)
-    inputs = inputs_with_sidecar(source, keys)
+    inputs = inputs_of_command(context, source)
     if keys is not None:
         from viewer.app.exports.animation import read_keys
 
@@ -101,7 +101,8 @@ def export(
     if to.is_drawn:
         _export_drawn(source, scene.depth_strength, lens, require_place, write)
     else:
-        _export_undrawn(source, scene.depth_strength, lens.gloss, not to.layout, require_place, write)
+        gloss = lens.gloss.gloss if lens.gloss else None
+        _export_undrawn(source, scene.depth_strength, gloss, not to.layout, require_place, write)
 
 
 def _export_drawn(

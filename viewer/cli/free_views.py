@@ -13,7 +13,7 @@ import typer
 
 from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place, require_own_folder
 from iibr_core.types import Camera, FloatImage, InputError
-from viewer.cli.options import given_options, inputs_with_sidecar, require_existing, require_model
+from viewer.cli.options import given_options, require_model
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.model.free_camera import Poses
 
@@ -52,20 +52,21 @@ def poses_of(path: Path, photo_pose: int | None) -> Poses:
     cameras = read_poses(path)
     if photo_pose is not None and photo_pose > len(cameras):
         raise InputError(f"--photo-pose {photo_pose}: {path} holds {len(cameras)}")
-    return Poses(cameras, central_camera(cameras) if photo_pose is None else photo_pose - 1)
+    return Poses(cameras, central_camera(cameras) if photo_pose is None else photo_pose - 1, str(path.absolute()))
 
 
-def write_free_views(
-    source: Source, poses: Path, photo_pose: int | None, is_literal: bool, out: Path, force: bool
-) -> None:
-    """A picture for each pose, view_0001.png and so on, in a folder. photo_pose: the number of the photo's, from 1.
-    is_literal: disparity counts in px per unit of length.
+def require_views_folder(out: Path, inputs: Sequence[Path], may_replace: bool) -> None:
+    """Raise InputError where the views may not be written. inputs: what is read."""
+    require_own_folder(out, OWN_FILES)
+    require_folder_place(out, inputs, may_replace, is_whole=True)
+
+
+def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_literal: bool, out: Path) -> None:
+    """A picture for each pose, view_0001.png and so on, in a folder: one that `require_views_folder` admits.
+    photo_pose: the number of the photo's, from 1. is_literal: disparity counts in px per unit of length.
 
     Raises InputError.
     """
-    require_existing(source)
-    require_own_folder(out, OWN_FILES)
-    require_folder_place(out, (*inputs_with_sidecar(source), poses), force, is_whole=True)
     require_model(source.depth)
     known = poses_of(poses, photo_pose)
     with show_progress("reading") as show:

@@ -8,11 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.formats.light_fields.registry import is_light_field
+from iibr_core.formats.light_fields.registry import is_light_field, writer_for
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field import NOT_FOR_DENSE_FIELDS, write_dense_field
-from viewer.cli.free_views import require_heeded_with_poses, require_poses_for, write_free_views
+from viewer.cli.free_views import (
+    require_heeded_with_poses,
+    require_poses_for,
+    require_views_folder,
+    write_free_views,
+)
 from viewer.cli.lens_options import GlossFile
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
@@ -22,7 +27,7 @@ from viewer.cli.options import (
     PosesFile,
     ScenePath,
     grid_from_text,
-    inputs_with_sidecar,
+    inputs_of_command,
     require_existing,
     require_memory,
     require_model,
@@ -32,6 +37,7 @@ from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.cli.view_writing import MAKING, write_views
 
 if TYPE_CHECKING:
+    from iibr_core.formats.light_fields.registry import WriterFactory
     from viewer.model.state.scene import Source
 
 
@@ -78,33 +84,37 @@ def generate(
         if grid is not None:
             raise InputError("--grid makes a light field, --poses pictures of any cameras: give one of them")
         require_heeded_with_poses(context)
-        write_free_views(scene.source(path, None), poses, photo_pose, bool(literal), out, force)
+        source = scene.source(path, None)
+        require_existing(source)
+        require_views_folder(out, inputs_of_command(context, source), force)
+        write_free_views(source, poses, photo_pose, bool(literal), out)
         return
     if grid is None:
         raise InputError("give --grid, for a light field, or --poses, for pictures of any cameras")
-    if is_light_field(path):
+    is_dense = is_light_field(path)
+    if is_dense:
         require_heeded(context, path, NOT_FOR_DENSE_FIELDS)
-        write_dense_field(scene.source(path, grid), grid, out, format, with_disparity, force)
-        return
     source = scene.source(path, grid, is_literal=scene.disparity is not None if literal is None else literal)
-    _write_light_field(source, grid, out, format, scene.depth_strength, gloss, with_disparity, force)
+    require_existing(source)
+    new_writer = writer_for(format)
+    new_writer.require_place(out, inputs_of_command(context, source), force)
+    if is_dense:
+        write_dense_field(source, grid, out, new_writer, with_disparity)
+    else:
+        _write_light_field(
+            source, grid, out, new_writer, scene.depth_strength, gloss.gloss if gloss else None, with_disparity
+        )
 
 
 def _write_light_field(
     source: Source,
     grid: GridShape,
     out: Path,
-    layout: str,
+    new_writer: WriterFactory,
     depth_strength: float,
     gloss: Gloss | None,
     with_disparity: bool,
-    force: bool,
 ) -> None:
-    from iibr_core.formats.light_fields.registry import writer_for
-
-    require_existing(source)
-    new_writer = writer_for(layout)
-    new_writer.require_place(out, inputs_with_sidecar(source), force)
     require_model(source.depth)
 
     from iibr_core.color import photo_in_srgb

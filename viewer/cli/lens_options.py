@@ -32,18 +32,31 @@ Aperture = Annotated[
 ]
 
 
-def gloss_from_text(text: str) -> Gloss:
+@dataclass(frozen=True)
+class GlossOption:
+    """A gloss, and the file that describes it."""
+
+    file: Path
+    gloss: Gloss
+
+    @property
+    def reads(self) -> tuple[Path, ...]:
+        """What is read for it: the file, and the environment that it names."""
+        return (self.file, Path(self.gloss.environment)) if self.gloss.environment else (self.file,)
+
+
+def gloss_from_text(text: str) -> GlossOption:
     """The gloss that a file describes. Raises BadParameter."""
     from viewer.model.gloss_file import read_gloss
 
     try:
-        return read_gloss(Path(text))
+        return GlossOption(Path(text), read_gloss(Path(text)))
     except InputError as error:
         raise typer.BadParameter(str(error)) from None
 
 
 GlossFile = Annotated[
-    Gloss | None,
+    GlossOption | None,
     typer.Option(
         "--gloss",
         parser=gloss_from_text,
@@ -70,7 +83,7 @@ class LensOptions:
         actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
         actions += [] if self.focus is None else [SetFocus(self.focus)]
         actions += [] if self.aperture is None else [SetAperture(self.aperture)]
-        return actions + ([] if self.gloss is None else [SetGloss(self.gloss)])
+        return actions + ([] if self.gloss is None else [SetGloss(self.gloss.gloss)])
 
     def require_within(self, scene: Scene) -> None:
         """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.

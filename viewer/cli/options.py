@@ -24,6 +24,8 @@ MOST = 2**62
 """Of bytes and pixels: what adds a few to it still fits into 64 bits."""
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
+OUTPUT_OPTIONS = ("out", "output")
+"""Parameters that name what is written. All other paths are read."""
 SCREEN_SIZE = ScreenSize(1280, 800)
 """Of the window in pictures, unless another is asked for."""
 
@@ -130,13 +132,21 @@ def require_model(choice: DepthChoice) -> None:
         model_to_use(choice)
 
 
-def inputs_with_sidecar(source: Source, *more: Path | None) -> tuple[Path, ...]:
-    """What a command reads, and nothing may be written onto: the source, the map that lies beside it, and more."""
-    from iibr_core.depth.sidecar import map_to_read
+def inputs_of_command(context: typer.Context, source: Source | None = None) -> tuple[Path, ...]:
+    """What a command reads, and nothing may be written onto: every path that it was given but the one that it writes
+    to, what those files name (`reads` of an option's value says it), and what is read to open a source.
+    """
     from viewer.app.save_places import inputs_of
 
-    map_path = map_to_read(Path(source.path), source.depth)
-    return (*inputs_of(source), *(path for path in (map_path, *more) if path is not None))
+    given = [value for name, value in context.params.items() if name not in OUTPUT_OPTIONS]
+    named = [path for value in given for path in _paths_in(value)]
+    return (*named, *(() if source is None else inputs_of(source)))
+
+
+def _paths_in(value: object) -> tuple[Path, ...]:
+    if isinstance(value, list | tuple):
+        return tuple(path for each in value for path in _paths_in(each))
+    return (value,) if isinstance(value, Path) else getattr(value, "reads", ())
 
 
 def require_utf8(*names: object) -> None:

@@ -22,7 +22,7 @@ from viewer.cli.options import (
     Grid,
     ScenePath,
     given_options,
-    inputs_with_sidecar,
+    inputs_of_command,
     require_existing,
     require_memory,
     require_model,
@@ -135,7 +135,7 @@ def screenshot(
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
     form = PictureFormat(bits, picture_quality, profile, gps)
-    require_picture_place(output, shot.size, inputs_with_sidecar(shot.source, like), force, form)
+    require_picture_place(output, shot.size, inputs_of_command(context, shot.source), force, form)
     require_picture_memory(shot.size, shot.source.depth.memory_bytes, is_float(output, form))
     require_model(shot.source.depth)
     shot = replace(shot, lens=lens, is_full=full, form=form)

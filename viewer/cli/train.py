@@ -41,11 +41,18 @@ def train(
     from iibr_core.training.run_files import require_run_files
 
     require_run_files(out, may_replace=force or resume)
-    raise typer.Exit(train_weights(steps, out, seed, learning_rate, device, resume, checkpoint_every))
+    raise typer.Exit(train_weights(steps, out, seed, learning_rate, device, resume, checkpoint_every, force))
 
 
 def train_weights(
-    steps: int, out: Path, seed: int, learning_rate: float, device: str, resume: bool, checkpoint_every: int
+    steps: int,
+    out: Path,
+    seed: int,
+    learning_rate: float,
+    device: str,
+    resume: bool,
+    checkpoint_every: int,
+    may_replace: bool,
 ) -> int:
     """Train and write `out`; prints how it ended and returns the exit code. See `iibr_core.training.trainer.train`.
 
@@ -80,7 +87,16 @@ def train_weights(
     try:
         with show_progress("training", counts=True) as show:
             about = {"command": published}
-            trainer.train(model, batches, config, out, resume=resume, metadata=about, report_progress=show)
+            trainer.train(
+                model,
+                batches,
+                config,
+                out,
+                resume=resume,
+                may_replace=may_replace,
+                metadata=about,
+                report_progress=show,
+            )
     except KeyboardInterrupt:
         if not is_file(trainer.checkpoint_path(out)):
             return _report_end("interrupted before the first step was done", EXIT_INTERRUPTED)

@@ -15,10 +15,11 @@ FORWARD_LIMITS = -0.4, 0.6
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Cameras from a file. given: index of the one that took the photo."""
+    """Cameras from a file. given: index of the one that took the photo. file: where they stand, "" for nowhere."""
 
     cameras: tuple[Camera, ...]
     given: int
+    file: str = ""
 
 
 @dataclass(frozen=True)

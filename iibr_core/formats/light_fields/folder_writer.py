@@ -49,16 +49,21 @@ class FolderWriter(ABC):
     @classmethod
     def require_place(cls, folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
         """Raise InputError as `require_folder_place` does, and where the folder holds anything but a light field."""
-        if is_folder(folder):
-            remove_leftovers(folder)
-            foreign = next((file.name for file in entries_of(folder) if not cls.own_file.fullmatch(file.name)), None)
-            if foreign is not None:
-                raise InputError(f"{folder}: holds other files ({foreign}); choose an empty or new folder with --out")
+        cls._require_own(folder)
         require_folder_place(folder, inputs, may_replace, is_whole=True)
+
+    @classmethod
+    def _require_own(cls, folder: Path) -> None:
+        if not is_folder(folder):
+            return
+        remove_leftovers(folder)
+        foreign = next((file.name for file in entries_of(folder) if not cls.own_file.fullmatch(file.name)), None)
+        if foreign is not None:
+            raise InputError(f"{folder}: holds other files ({foreign}); choose an empty or new folder with --out")
 
     def __enter__(self) -> Self:
         """Make the temporary folder."""
-        self.require_place(self.folder, may_replace=True)
+        self._require_own(self.folder)
         self._unfinished = UnfinishedFolder(self.folder)
         self._pool = ThreadPoolExecutor(WRITING_THREADS, thread_name_prefix="view-writer")
         return self

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -26,6 +28,7 @@ from iibr_core.formats.outputs import (
 from iibr_core.types import InputError
 
 NOBODY = 65534
+THEIRS = 'case "$1" in *.txt) echo theirs > "$1";; *) mkdir "$1" && echo theirs > "$1/a.txt";; esac'
 
 
 def names(folder: Path) -> list[str]:
@@ -401,3 +404,49 @@ def test_folders_without_permission_are_refused_in_one_line(public_folder: Path)
     lines = done.stdout.splitlines()
     assert len(lines) == 12
     assert all(line.startswith(str(public_folder)) for line in lines)
+
+
+def test_a_place_that_was_free_is_not_taken_from_another_program(tmp_path: Path) -> None:
+    """Somebody else writes there between the question and the answer; asked again, it may be replaced."""
+    for place in (tmp_path / "a.txt", tmp_path / "folder"):
+        put = write if place.suffix else write_folder
+        require = require_file_place if place.suffix else partial(require_folder_place, is_whole=True)
+        require(place)
+        subprocess.run(["sh", "-c", THEIRS, "sh", place], check=True)
+        with pytest.raises(AlreadyThereError, match="another program") as caught:
+            put(place, "mine")
+        assert "\n" not in str(caught.value)
+        found = place if place.suffix else place / "a.txt"
+        assert found.read_text() == "theirs\n"
+        require(place, may_replace=True)
+        put(place, "mine")
+        assert found.read_text() == "mine"
+        put(place, "mine again")
+    assert names(tmp_path) == ["a.txt", "folder"]
+
+
+def test_each_new_file_of_a_folder_is_not_taken_either(tmp_path: Path) -> None:
+    require_files_in(tmp_path / "report", ["a.txt", "b.txt"])
+    make_folder(tmp_path / "report")
+    write(tmp_path / "report" / "a.txt", "mine")
+    (tmp_path / "report" / "b.txt").write_text("theirs")
+    with pytest.raises(AlreadyThereError, match="another program"):
+        write(tmp_path / "report" / "b.txt", "mine")
+    assert [(tmp_path / "report" / name).read_text() for name in ("a.txt", "b.txt")] == ["mine", "theirs"]
+
+
+def test_a_new_file_needs_no_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a memory card."""
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", refuse)
+    for text in ("one", "two"):
+        require_file_place(tmp_path / "a.txt", may_replace=text == "two")
+        write(tmp_path / "a.txt", text)
+        assert (tmp_path / "a.txt").read_text() == text
+    require_file_place(tmp_path / "b.txt")
+    (tmp_path / "b.txt").write_text("theirs")
+    with pytest.raises(AlreadyThereError, match="another program"):
+        write(tmp_path / "b.txt", "mine")

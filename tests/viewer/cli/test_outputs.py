@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import re
+from concurrent.futures import ThreadPoolExecutor
+from inspect import signature
 from pathlib import Path
+from typing import get_args
 
+import numpy as np
 import pytest
+import typer
 
+from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.types import GridShape
 from tests.viewer.cli.test_cli import run, run_apart
+from tests.viewer.conftest import write_scene
+from viewer.cli.lens_options import GlossOption
+from viewer.cli.main import app
+from viewer.cli.options import OUTPUT_OPTIONS, inputs_of_command
 
 INPUTS = (
     "{dir}/field/input_Cam000.png",
@@ -30,6 +42,13 @@ def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "map.png").write_bytes(view.read_bytes())
     (folder / "scene_depth.png").write_bytes(view.read_bytes())
     (folder / "model").mkdir()
+    (folder / "env.png").write_bytes(view.read_bytes())
+    (folder / "gloss.toml").write_text('environment = "env.png"')
+    (folder / "gloss.png").write_text("roughness = 0.3")
+    (folder / "keys.gif").write_text("0 0\n1 0\n")
+    frame = {"transform_matrix": np.eye(4).tolist(), "w": 32, "h": 24, "fl_x": 50.0}
+    (folder / "cameras").mkdir()
+    (folder / "cameras" / "transforms.json").write_text(json.dumps({"frames": [frame]}))
     return folder
 
 
@@ -45,6 +64,15 @@ def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         *(("generate", read, "--grid", "1", "--out", "{dir}/field") for read in INPUTS if "hard" not in read),
         ("generate", "{photo}", "--disparity", "{dir}/field/gt_disp_lowres.pfm", "--grid", "1", "--out", "{dir}/field"),
         ("generate", "{dir}/link.png", "--grid", "1", "--out", "{dir}/linked-field"),
+        ("screenshot", "{photo}", "--gloss", "{dir}/gloss.toml", "-o", "{dir}/env.png"),
+        ("screenshot", "{photo}", "--gloss", "{dir}/gloss.png", "-o", "{dir}/gloss.png"),
+        ("screenshot", "{photo}", "--inpaint", "diffusion:{dir}/model", "-o", "{dir}/model/new.png"),
+        ("export", "{photo}", "--to", "anaglyph", "--gloss", "{dir}/gloss.toml", "-o", "{dir}/env.png"),
+        ("export", "{photo}", "--to", "gif", "--path", "{dir}/keys.gif", "-o", "{dir}/keys.gif"),
+        ("generate", "{photo}", "--grid", "1", "--gloss", "{dir}/field/gloss.toml", "--out", "{dir}/field"),
+        ("generate", "{photo}", "--poses", "{dir}/cameras/transforms.json", "--out", "{dir}/cameras"),
+        ("depth", "{dir}/field", "-o", "{dir}/field/gt_disp_lowres.pfm"),
+        ("evaluate", "{dir}/field", "--lpips", "{dir}/model", "--out", "{dir}/model"),
         ("evaluate", "{dir}/field", "--out", "{dir}/field"),
         ("evaluate", "{dir}/linked-field", "--out", "{dir}/field/report"),
         ("evaluate", "{dir}/field", "--out", "{dir}"),
@@ -58,12 +86,14 @@ def test_no_command_writes_onto_what_it_reads(
     folder: Path,
     words: tuple[str, ...],
 ) -> None:
+    if "field/gloss.toml" in str(words):
+        (folder / "field" / "gloss.toml").write_text("roughness = 0.3")
     before = {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
     capsys.readouterr()
     assert run(monkeypatch, *(word.format(dir=folder, photo=photo_path) for word in words), "--force") == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("iibr: ")
-    assert re.search("is read|are read", line)
+    assert re.search("is read|are read|holds other files", line)
     assert {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")} == before
 
 
@@ -160,3 +190,48 @@ def test_notes_come_after_the_result_or_not_at_all(
     assert "raise --memory" in line
     assert run(monkeypatch, "generate", photo_path, *words, "--out", tmp_path / "f") == 0
     assert all(line.startswith("note: ") for line in capsys.readouterr().err.splitlines())
+
+
+EVALUATED = ("evaluate", "disparity")
+NAMED_OTHERWISE = {"depth_model", "inpaint"}
+"""Options whose text may name a folder: `inputs_of` finds it. `evaluate` asks for its `--disparity` itself."""
+
+
+def test_every_option_that_names_a_file_is_an_input(tmp_path: Path) -> None:
+    """Whatever the command: only what it writes is none. Other types than Path say what they read."""
+    found = set()
+    for command in app.registered_commands:
+        assert command.callback is not None
+        for name, parameter in signature(command.callback, eval_str=True).parameters.items():
+            kinds = [kind for kind in get_args(parameter.annotation) if not isinstance(kind, type)]
+            metavars = [getattr(kind, "metavar", None) or "" for kind in kinds]
+            if not re.search(r"\b(FILE|FOLDER|DIR|PATH|DATASET)\b|Path", f"{metavars} {parameter.annotation}"):
+                continue
+            if name not in {*OUTPUT_OPTIONS, *NAMED_OTHERWISE} and (command.callback.__name__, name) != EVALUATED:
+                assert re.search("Path|GlossOption", str(get_args(parameter.annotation)[0])), name
+                found.add(name)
+    assert found >= {"path", "disparity", "gloss", "like", "keys", "poses", "ground_truth", "lpips", "datasets"}
+    gloss = GlossOption(tmp_path / "g.toml", Gloss(environment=str(tmp_path / "e.png")))
+    given = {"path": tmp_path, "datasets": [tmp_path / "a"], "gloss": gloss, "grid": GridShape(3, 3), "out": tmp_path}
+    context = typer.Context(typer.main.get_command(app))
+    context.params = given
+    assert inputs_of_command(context) == (tmp_path, tmp_path / "a", *gloss.reads)
+    assert gloss.reads == (tmp_path / "g.toml", tmp_path / "e.png")
+
+
+def test_of_two_commands_at_once_onto_one_new_place_the_second_says_so(tmp_path: Path) -> None:
+    """Each of a file, a folder, and files in a folder; the place was free when both began."""
+    write_scene(tmp_path)
+    photo = tmp_path / "scene.png"
+    for words, place in (
+        (("screenshot", photo, "--grid", 1, "-o"), tmp_path / "new.png"),
+        (("generate", photo, "--grid", 2, "--out"), tmp_path / "new"),
+        (("export", photo, "--to", "nerfstudio", "--grid", 2, "-o"), tmp_path / "poses"),
+        (("export", photo, "--to", "disparity", "-o"), tmp_path / "new.pfm"),
+    ):
+        with ThreadPoolExecutor(2) as pool:
+            ended = list(pool.map(lambda _: run_apart("viewer", *words, place), range(2)))  # noqa: B023
+        assert sorted(end.returncode for end in ended) == [0, 2], [end.stderr for end in ended]
+        (line,) = next(end.stderr for end in ended if end.returncode).splitlines()
+        assert re.search("another program|is there already", line), line
+        assert not list(tmp_path.glob(".iibr*"))
