@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 
 EXIT_UNEXPECTED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 INTERRUPT_AGAIN_S = 0.02
+MOST_TRIED_THREADS = 64
+"""As many as OpenBLAS starts at most."""
+NUMBA_THREADS = "NUMBA_NUM_THREADS"
+MOST_NUMBA_THREADS = 1024
+TOO_FEW_THREADS = "can't start new thread"
+"""What Python says."""
 TRACEBACK_VARIABLE = "IIBR_TRACEBACK"
 """With this in the environment, errors that are told here come with their traceback."""
 
@@ -43,11 +49,16 @@ def _run() -> int:
     if os.name == "posix":
         _mend_standard_streams()
     _settle_home()
+    _ignore_warnings()
+    if not 1 <= _whole_number(os.environ.get(NUMBA_THREADS) or "1") <= MOST_NUMBA_THREADS:
+        said = f"{NUMBA_THREADS}={os.environ[NUMBA_THREADS]}: is no number of threads"
+        return _tell(f"{said}; give 1 to {MOST_NUMBA_THREADS}, or leave it out", EXIT_BAD_INPUT)
     try:
         os.getcwd()
     except OSError as error:
         return _tell(f"the working folder is gone ({error.strerror}); go to another one", EXIT_BAD_INPUT)
     try:
+        _require_threads()
         return _run_command()
     except Exception as error:
         return _tell_error(error)
@@ -121,6 +132,8 @@ def _tell_error(error: Exception) -> int:
     if isinstance(error, OSError):
         file = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "a file"
         return _tell(f"{file}: {error.strerror or said} ({TRACEBACK_VARIABLE}=1 shows where)", EXIT_BAD_INPUT)
+    if TOO_FEW_THREADS in said:
+        return _tell("no more threads may be started here; raise the limit of processes (ulimit -u)", EXIT_BAD_INPUT)
     kind = type(error).__name__
     return _tell(f"unexpected {kind}: {said} (please report it; {TRACEBACK_VARIABLE}=1 shows more)", EXIT_UNEXPECTED)
 
@@ -164,6 +177,36 @@ def _text_stream(raw: io.FileIO, like: Any) -> io.TextIOWrapper:
     encoding = like.encoding if like else "utf-8"
     by_lines = like is None or like.line_buffering or like.write_through
     return io.TextIOWrapper(io.BufferedWriter(raw), encoding, "backslashreplace", line_buffering=by_lines)
+
+
+def _require_threads() -> None:
+    """Raise RuntimeError where a thread for each core cannot be started: libraries interrupt or abort the process, and
+    print several lines.
+    """
+    from _thread import allocate_lock, start_new_thread
+
+    ends = allocate_lock()
+
+    def wait() -> None:
+        with ends:
+            pass
+
+    with ends:
+        for _ in range(min(os.cpu_count() or 1, MOST_TRIED_THREADS)):
+            start_new_thread(wait, ())
+
+
+def _whole_number(text: str) -> int:
+    """0 where it is none."""
+    return int(text) if text.strip().isdecimal() and len(text) < 10 else 0
+
+
+def _ignore_warnings() -> None:
+    """What libraries warn of says nothing to people; Python's own option -W brings it back."""
+    if not sys.warnoptions:
+        import warnings
+
+        warnings.simplefilter("ignore")
 
 
 def _settle_home() -> None:

@@ -12,13 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import is_file
+from iibr_core.formats.files import is_file, read_text
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.types import FloatImage, InputError
 
 PICTURE, ABOUT = "lens.png", "lens.json"
+MOST_BYTES = 1 << 20
+"""Of what is said about it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +50,11 @@ def read_lens_picture(scene: MultiView, max_pixels: int) -> LensPicture | None:
 
 def _numbers(path: Path) -> tuple[float, float]:
     try:
-        told = json.loads(path.read_text("utf-8"))
+        told = json.loads(read_text(path, MOST_BYTES))
         focus, radius = float(told["focus_disparity"]), float(told["radius_views"])
-    except (OSError, ValueError, OverflowError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, OverflowError, KeyError, TypeError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: cannot be read ({error}); give focus_disparity and radius_views") from error
     if not (math.isfinite(focus) and math.isfinite(radius) and 0 < radius <= 100):
         raise InputError(f"{path}: focus_disparity {focus}, radius_views {radius}: give finite ones, the radius > 0")

@@ -25,6 +25,12 @@ HARMLESS_BYTES = 256 * 2**20
 
 NOTHING_THERE = (errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ENAMETOOLONG)
 MOST_REASON_CHARACTERS = 200
+SPECIAL_FILES = (
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
 
 
 def reason_of(failure: Exception | str) -> str:
@@ -85,8 +91,11 @@ def require_file(path: Path) -> None:
     status = status_of(path)
     if status is not None and stat.S_ISDIR(status.st_mode):
         raise InputError(f"{path}: is a folder, not a file")
-    if status is None or not stat.S_ISREG(status.st_mode):
+    if status is None:
         raise InputError(f"{path}: no such file")
+    if not stat.S_ISREG(status.st_mode):
+        kind = next((name for is_kind, name in SPECIAL_FILES if is_kind(status.st_mode)), "no ordinary file")
+        raise InputError(f"{path}: is {kind}, not an ordinary file; copy what it holds into one")
     if status.st_size == 0:
         raise InputError(f"{path}: the file is empty (0 bytes)")
     if not os.access(path, os.R_OK):
@@ -101,10 +110,27 @@ def open_binary(path: Path) -> Iterator[BinaryIO]:
     """
     require_file(path)
     try:
-        with path.open("rb") as file:
+        with open(path, "rb", opener=_open_at_once) as file:
             yield file
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); is it still there?") from error
+
+
+def read_text(path: Path, most_bytes: int) -> str:
+    """What a text file holds; a byte order mark goes, what is no UTF-8 becomes the sign for that.
+
+    Raises InputError as `open_binary` does, and for a file of more bytes.
+    """
+    with open_binary(path) as file:
+        data = file.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise InputError(f"{path}: is larger than {most_bytes:,} bytes, as no such text is; get the right file")
+    return data.decode("utf-8-sig", "replace")
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """A descriptor; a pipe that took the file's place meanwhile is not waited for."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def refuse_bomb(path: Path, decoded_bytes: int) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import is_file, is_folder, open_binary, reason_of
+from iibr_core.formats.files import is_file, is_folder, read_text, reason_of
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.types import Camera, ImageSize, InputError
@@ -26,6 +26,8 @@ LLFF_FROM_CAMERA = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
 """Rows: LLFF's axes (down, right, backwards) by a camera's x right, y down, z forward; its own inverse."""
 OPENGL_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
 """The same of OpenGL's: right, up, backwards."""
+FRAME_NAMES = ("transform_matrix", "file_path", "w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x")
+"""Of transforms.json, what counts here; a frame may name a thousand other things."""
 COLMAP_FILES = ("cameras.txt", "images.txt")
 
 Doubles = NDArray[np.float64]
@@ -85,21 +87,25 @@ def _llff_camera(row: Doubles, source: str) -> Camera:
 
 def _read_transforms(path: Path) -> tuple[Camera, ...]:
     """nerfstudio's, or NeRF's first ones with camera_angle_x; what a frame says goes before what the file says."""
-    with open_binary(path) as file:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{path}: is larger than {MOST_BYTES // 2**20} MiB, as no list of poses is")
-        text = file.read()
+    text = read_text(path, MOST_BYTES)
     try:
         whole = json.loads(text)
         frames = whole["frames"]
         _require_count(path, len(frames))
-        return tuple(_frame_camera({**whole, **frame}, path, number) for number, frame in enumerate(frames, 1))
+        of_all = _known_names(whole)
+        return tuple(
+            _frame_camera(of_all | _known_names(frame), path, number) for number, frame in enumerate(frames, 1)
+        )
     except (ValueError, TypeError, KeyError, IndexError, ArithmeticError, RecursionError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(
             f"{path}: is no transforms.json with poses ({reason_of(error)}); get the file again"
         ) from error
+
+
+def _known_names(said: dict[str, Any]) -> dict[str, Any]:
+    return {name: said[name] for name in FRAME_NAMES if name in said}
 
 
 def _frame_camera(frame: dict[str, Any], path: Path, number: int) -> Camera:
@@ -126,7 +132,10 @@ def _frame_size(frame: dict[str, Any], path: Path, source: str) -> ImageSize:
     if "w" in frame and "h" in frame:
         return _size(float(frame["h"]), float(frame["w"]), source)
     picture = path.parent / str(frame["file_path"])
-    return read_size(picture if picture.suffix else picture.with_suffix(".png"))
+    try:
+        return read_size(picture if picture.suffix else picture.with_suffix(".png"))
+    except InputError as error:
+        raise InputError(f"{source} says no size, and its picture none: {error}") from error
 
 
 def _read_colmap(model: Path) -> tuple[Camera, ...]:
@@ -134,8 +143,9 @@ def _read_colmap(model: Path) -> tuple[Camera, ...]:
     intrinsics, poses = (_lines(model / name) for name in COLMAP_FILES)
     try:
         kinds = {words[0]: words for words in (line.split() for line in intrinsics if line)}
-        pictures = sorted((line.split(maxsplit=9) for line in poses[::2] if line), key=lambda words: words[9])
-        _require_count(model, len(pictures))
+        named = [line for line in poses[::2] if line]
+        _require_count(model, len(named))
+        pictures = sorted((line.split(maxsplit=9) for line in named), key=lambda words: words[9])
         return tuple(_colmap_camera(kinds[words[8]], words, model) for words in pictures)
     except (ValueError, KeyError, IndexError, ArithmeticError) as error:
         if isinstance(error, InputError):
@@ -145,9 +155,7 @@ def _read_colmap(model: Path) -> tuple[Camera, ...]:
 
 def _lines(path: Path) -> list[str]:
     """Without comments; a picture's second line may be empty."""
-    with open_binary(path) as file:
-        text = file.read(MOST_BYTES).decode("utf-8", "replace")
-    return [line.strip() for line in text.splitlines() if not line.startswith("#")]
+    return [line.strip() for line in read_text(path, MOST_BYTES).splitlines() if not line.startswith("#")]
 
 
 def _colmap_camera(kind: list[str], picture: list[str], model: Path) -> Camera:

@@ -199,3 +199,29 @@ def test_panels_ask_for_names_that_they_can_show(tmp_path: Path) -> None:
     write_image(path, np.zeros((8, 8, 3), np.uint8))
     for words in (("view",), ("screenshot", "--ui", "-o", "o.png")):
         assert "is not UTF-8" in the_error(run(*words, os.fsencode(path), cwd=tmp_path))
+
+
+@pytest.mark.parametrize("words", [("plan", "nothing.png"), ("--help",), ("models",)])
+@pytest.mark.parametrize("threads", ["0", "abc", "-1", "1e3", "99999999999999999999"])
+def test_a_number_of_threads_that_is_none_is_named(threads: str, words: tuple[str, ...]) -> None:
+    assert f"NUMBA_NUM_THREADS={threads}" in the_error(run(*words, env=environment(NUMBA_NUM_THREADS=threads)))
+
+
+def test_what_libraries_warn_of_is_not_told(tmp_path: Path) -> None:
+    photo = write_scene(tmp_path)
+    done = run("plan", photo, env=environment(NUMBA_DISABLE_JIT="nonsense", NUMBA_NUM_THREADS=""))
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+AS_NOBODY = (
+    *("setpriv", "--reuid=65534", "--clear-groups"),
+    *("--inh-caps=+dac_read_search,+dac_override", "--ambient-caps=+dac_read_search,+dac_override"),
+)
+"""Limits of processes bind everybody but root."""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits the processes of a program it starts")
+@pytest.mark.parametrize("number", [1, 2])
+def test_where_no_thread_may_be_started_it_says_so(number: int, tmp_path: Path) -> None:
+    limited = (*(AS_NOBODY if os.geteuid() == 0 else ()), "prlimit", f"--nproc={number}")
+    assert "no more threads" in the_error(run("plan", write_scene(tmp_path), start=(*limited, *START)))

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from iibr_core.formats.files import read_text, status_of
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
@@ -25,6 +26,8 @@ from viewer.model.state.preferences import SECTIONS, Preferences, Section, Theme
 PREFERENCES_FILE = "preferences.json"
 RECENT_FILE = "recent.json"
 LARGEST_COORDINATE = 100_000
+MOST_BYTES = 1_000_000
+"""Of one of these files."""
 LEFT_OUT_TOLD = 4
 
 
@@ -73,10 +76,8 @@ def _write(path: Path, value: Any) -> None:
 def _read(path: Path) -> Any:
     """What the file holds; None where there is none. Raises InputError where it is damaged."""
     try:
-        return json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, RecursionError) as error:
+        return None if status_of(path) is None else json.loads(read_text(path, MOST_BYTES))
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: damaged ({' '.join(str(error).split())[:80]})") from error
 
 

@@ -47,10 +47,12 @@ class GlossOption:
 
 def gloss_from_text(text: str) -> GlossOption:
     """The gloss that a file describes. Raises BadParameter."""
-    from viewer.model.gloss_file import read_gloss
+    from viewer.model.gloss_file import read_gloss, require_environment
 
     try:
-        return GlossOption(Path(text), read_gloss(Path(text)))
+        gloss = read_gloss(Path(text))
+        require_environment(Path(text), gloss)
+        return GlossOption(Path(text), gloss)
     except InputError as error:
         raise typer.BadParameter(str(error)) from None
 
@@ -61,7 +63,7 @@ GlossFile = Annotated[
         "--gloss",
         parser=gloss_from_text,
         metavar="FILE",
-        help="Make a surface glossy: a TOML file with roughness, reflectance, [surface] and [light].",
+        help="Make a surface glossy: a TOML file with roughness, reflectance, \\[surface] and \\[light].",
         show_default=False,
     ),
 ]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgspec
 
-from iibr_core.formats.files import require_file
+from iibr_core.formats.files import read_text
 from iibr_core.rendering.gloss.settings import Gloss, require_sound
 from iibr_core.types import InputError
 
@@ -23,20 +23,30 @@ def read_gloss(path: Path) -> Gloss:
 
     Raises InputError, naming file and field, where it cannot be read or makes no sense.
     """
-    require_file(path)
+    text = read_text(path, MOST_BYTES)
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ValueError("it is too large")
-        whole = tomllib.loads(path.read_text("utf-8"))
+        whole = tomllib.loads(text)
         unknown = _unknown_names(whole, msgspec.to_builtins(Gloss()))
         if unknown:
             raise ValueError(f"it knows no {unknown[0]}")
         gloss = msgspec.convert(whole, Gloss)
         require_sound(gloss)
-    except (OSError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).removeprefix("gloss: ").split())[:120]
         raise InputError(f"{path}: is no gloss ({reason}); see `iibr generate --help`") from error
     return replace(gloss, environment=str(path.parent / gloss.environment) if gloss.environment else "")
+
+
+def require_environment(path: Path, gloss: Gloss) -> None:
+    """Raise InputError, naming the file that a gloss was read from too, where the environment is no picture."""
+    if not gloss.environment:
+        return
+    from iibr_core.formats.images.header import read_photo_header
+
+    try:
+        read_photo_header(Path(gloss.environment))
+    except InputError as error:
+        raise InputError(f"{path}: its environment cannot be read: {error}") from error
 
 
 def _unknown_names(given: dict[str, object], known: dict[str, object], within: str = "") -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import is_file
+from iibr_core.formats.files import is_file, read_text
 from iibr_core.types import ImageSize, InputError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
@@ -87,12 +87,12 @@ def _json_object(folder: Path, name: str) -> dict[str, Any]:
     if not is_file(path):
         raise InputError(f"{folder}: holds no {name}; get the whole model folder")
     try:
-        if path.stat().st_size > MAX_CONFIG_BYTES:
-            raise ValueError(f"larger than {MAX_CONFIG_BYTES:,} bytes")
-        told = json.loads(path.read_text("utf-8"))
+        told = json.loads(read_text(path, MAX_CONFIG_BYTES))
         if not isinstance(told, dict):
             raise ValueError("no object")
-    except (OSError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: damaged ({' '.join(str(error).split())[:80]})") from error
     return told
 

@@ -128,8 +128,14 @@ def common_size(views: Sequence[KnownView]) -> ImageSize:
     first = views[0].picture
     for picture, size in sizes.items():
         if size != sizes[first]:
-            raise InputError(f"{picture.path}: is {size}, but {first.path.name} is {sizes[first]}")
+            shown, other = f"{picture.path}{_numbered(picture)}", f"{first.path.name}{_numbered(first)}"
+            raise InputError(f"{shown}: is {size}, but {other} is {sizes[first]}")
     return sizes[first]
+
+
+def _numbered(picture: PictureSource) -> str:
+    """Behind the name of a picture's file, for people."""
+    return f", picture {picture.number}" if picture.number > 0 else ""
 
 
 def on_grid(scene: MultiView, numbers: Sequence[GridIndex]) -> MultiView:

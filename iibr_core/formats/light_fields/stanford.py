@@ -140,7 +140,7 @@ def _range_px(folder: Path, focal_px: float, step_m: float) -> tuple[float, floa
     if not is_file(path) or path.stat().st_size == 0 or step_m == 0:
         return None
     with open_binary(path) as file:
-        lines = file.read(MOST_CONFIG_BYTES).decode("utf-8", "replace").splitlines()
+        lines = file.read(MOST_CONFIG_BYTES).decode("utf-8-sig", "replace").splitlines()
     said = next((words[1:] for line in lines if (words := line.split()) and words[0] == FOCUS_DISTANCE), None)
     if said is None:
         return None

@@ -172,3 +172,31 @@ def test_damaged_colmap_text(tmp_path, name, old, new, said):
     path.write_text("" if new is None else path.read_text().replace(old, new))
     with pytest.raises(InputError, match=said):
         read_poses(tmp_path)
+
+
+def test_names_that_mean_nothing_here_cost_nothing(tmp_path):
+    """400,000 of them beside 10,000 frames: copied for each frame they would take hours."""
+    frame = {"transform_matrix": np.eye(4).tolist()}
+    others = {f"name {number}": number for number in range(400_000)}
+    whole = others | {"w": 48, "h": 40, "fl_x": 50.0, "frames": [frame] * 10_000}
+    (tmp_path / "transforms.json").write_text(json.dumps(whole))
+    assert len(read_poses(tmp_path)) == 10_000
+
+
+def test_a_byte_order_mark_is_no_part_of_the_poses(tmp_path):
+    for kind, names in (("nerfstudio", ["transforms.json"]), ("colmap", ["cameras.txt", "images.txt"])):
+        folder = tmp_path / kind
+        folder.mkdir()
+        write_field(folder, kind)
+        for path in (path for name in names for path in folder.rglob(name)):
+            path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+        assert len(read_poses(folder)) == 6
+
+
+@pytest.mark.parametrize("name", ["gone.png", "/dev/zero", "."])
+def test_a_frames_picture_is_named_with_the_file_that_names_it(tmp_path, name):
+    frame = {"transform_matrix": np.eye(4).tolist(), "fl_x": 50.0, "file_path": name}
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": [frame]}))
+    with pytest.raises(InputError, match=r"transforms\.json, pose 1 says no size") as refused:
+        read_poses(tmp_path)
+    assert "\n" not in str(refused.value)

@@ -217,7 +217,7 @@ def test_cut_stereo_photos_are_refused_in_a_line_or_read_as_photos(tmp_path: Pat
 
 def test_pictures_of_two_sizes_are_no_pair(tmp_path: Path) -> None:
     write_mpo(tmp_path / "a.mpo", smooth(), smooth(40, 60))
-    with pytest.raises(InputError, match=r"is 60x40, but a\.mpo is 64x48"):
+    with pytest.raises(InputError, match=r"a\.mpo, picture 1: is 60x40, but a\.mpo is 64x48"):
         read_views(open_light_field(tmp_path / "a.mpo"))
 
 

@@ -50,6 +50,15 @@ def test_help_has_an_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
         assert len(line.split()) > 2, f"no help: {line}"
 
 
+@pytest.mark.parametrize("command", ["generate", "screenshot", "export", "batch"])
+def test_help_keeps_the_brackets_of_tables(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert run(monkeypatch, command, "--help") == 0
+    assert "[surface] and [light]" in " ".join(capsys.readouterr().out.replace("│", " ").split())
+
+
 @pytest.mark.parametrize("words", [[], ["-h"], ["plan", "-h"]])
 def test_help_comes_without_asking_and_by_its_short_name(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]

@@ -8,7 +8,7 @@ import pytest
 
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
 from iibr_core.types import InputError
-from viewer.model.gloss_file import read_gloss
+from viewer.model.gloss_file import read_gloss, require_environment
 
 WHOLE = """
 roughness = 0
@@ -67,9 +67,26 @@ def test_what_makes_no_sense_is_named_in_one_line(tmp_path: Path, text: str, nam
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"a" * 2_000_000])
-def test_files_that_are_no_text_or_too_large(tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize(("content", "says"), [(b"\xff\xfe\x00", "is no gloss"), (b"a" * 2_000_000, "is larger than")])
+def test_files_that_are_no_text_or_too_large(tmp_path: Path, content: bytes, says: str) -> None:
     path = tmp_path / "gloss.toml"
     path.write_bytes(content)
-    with pytest.raises(InputError, match="no gloss"):
+    with pytest.raises(InputError, match=says):
         read_gloss(path)
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "gloss.toml"
+    path.write_bytes(b"\xef\xbb\xbfroughness = 0.25")
+    assert read_gloss(path).roughness == 0.25
+
+
+@pytest.mark.parametrize("name", ["gone.exr", "gloss.toml", "folder"])
+def test_an_environment_that_is_no_picture_is_named_with_the_file_that_names_it(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "gloss.toml"
+    path.write_text(f'environment = "{name}"')
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputError, match=rf"gloss\.toml: its environment .*{name}") as refused:
+        require_environment(path, read_gloss(path))
+    assert "\n" not in str(refused.value)
+    require_environment(path, Gloss())

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.formats.animations import require_video_size, write_animation
-from iibr_core.formats.files import open_binary
+from iibr_core.formats.files import read_text
 from iibr_core.types import ImageSize, InputError, ViewOffset
 from viewer.app.exports.framing import draw_framed
 from viewer.app.exports.source import ExportSource
@@ -56,10 +56,8 @@ def read_keys(path: Path) -> list[tuple[float, ...]]:
     """A path of the user's own: a text with a line a key, "s t focus aperture", the last two as they are where they are
     left out; # begins a comment. Raises InputError.
     """
-    with open_binary(path) as file:
-        text = file.read(MOST_PATH_BYTES).decode("utf-8", "replace")
     keys: list[tuple[float, ...]] = []
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(read_text(path, MOST_PATH_BYTES).splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").split()
         if not words:
             continue
