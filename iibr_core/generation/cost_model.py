@@ -15,9 +15,10 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.generation.memory_model import DRAFT_BYTES, UNDECIDED_BYTES, Making, making_bytes
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
-from iibr_core.rendering.ambiguity import AMBIGUOUS_PX, EVERY_COST
-from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
+from iibr_core.rendering.ambiguity import AMBIGUOUS_PX
+from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 
 CORES = THREADS
@@ -34,17 +35,6 @@ REMADE = 0.6
 SOFT_GROWTH = 1.1
 """The power of the parallax by which rays near soft edges become ambiguous."""
 MOST_PARALLAX_PX = 1e6
-
-RAY_BYTES, STATISTICS_BYTES = 21, 12
-"""Of one pixel of one source image: colours, disparity, coverage, flag (`RaySet`); its statistics."""
-WORKING_BYTES = 42
-"""Of one pixel of a view in the making: float colours, with and without specks, disparity, flags."""
-CANDIDATE_BYTES, AMBIGUOUS_BYTES = 30, 750
-"""Of one pixel of the band of rows in the making: its candidates and weights; hypotheses and features if ambiguous."""
-DRAFT_BYTES, UNDECIDED_BYTES = 11, 68
-"""Of one pixel of a draft: the view as it is stored; of one that the transformer is still to be asked for, more."""
-NUMBER_BYTES, HOLE_BYTES = 5, 160
-"""Of one pixel of a view while its holes are filled; of one in a hole, more: what surrounds it in all directions."""
 
 
 class Workload(NamedTuple):
@@ -205,16 +195,11 @@ def _inpainted_views(statistics: ParallaxStatistics, grid: GridShape) -> int:
 
 
 def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> int:
-    """Memory for the ray set (the photo, its fringe, inpainted views) and the views in flight, one a thread."""
-    pixels = statistics.step.size
-    band = min(pixels, MOST_BAND_PIXELS // (EVERY_COST if quality == "exact" else 1))
+    """Memory while views are made, see `making_bytes`."""
     asked = {"fast": 0.0, "balanced": statistics.ambiguous_share(1.0), "exact": 1.0}[quality]
-    ray = RAY_BYTES + (STATISTICS_BYTES if quality != "fast" else 0)
-    in_flight = pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + asked * AMBIGUOUS_BYTES)
-    filling = pixels * (NUMBER_BYTES + statistics.hole_share * HOLE_BYTES) if statistics.has_disocclusion else 0.0
-    return round(
-        math.prod(statistics.canvas) * ray * (2 + _inpainted_views(statistics, grid)) + CORES * in_flight + filling
-    )
+    images = 2 + _inpainted_views(statistics, grid)
+    holes = statistics.hole_share if statistics.has_disocclusion else 0.0
+    return making_bytes(Making(statistics.step.size, math.prod(statistics.canvas), images, holes, asked, quality))
 
 
 def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:

@@ -1,7 +1,7 @@
 """What a process takes in all, so that `--memory` is a bound: refused or made smaller before anything is allocated.
 
-The constants were measured (`python -m benchmarks.memory bounds`) on fresh processes; they hold with nothing compiled
-in advance too.
+The whole is counted: the process before it does anything, which was measured, and the arrays that it holds at the
+same time, so many bytes for each of their pixels. `python -m benchmarks.memory predicted` compares it with processes.
 """
 
 from __future__ import annotations
@@ -10,14 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from iibr_core.generation.cost_model import (
-    AMBIGUOUS_BYTES,
-    CANDIDATE_BYTES,
-    CORES,
-    RAY_BYTES,
-    STATISTICS_BYTES,
-    WORKING_BYTES,
-)
+from iibr_core.rendering.ambiguity import EVERY_COST
 from iibr_core.runtime.machine import (
     MAPPED_BYTES,
     MOST_USUAL_SHARE,
@@ -25,14 +18,28 @@ from iibr_core.runtime.machine import (
     own_limit_bytes,
     usual_budget_bytes,
 )
-from iibr_core.runtime.tiling import MOST_BAND_PIXELS
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
+from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
 
 MIB = 2**20
-VIEWER_BYTES, WRITER_BYTES = 390 * MIB, 290 * MIB
-"""Of a process that does nothing yet: Python, compiled kernels and their compiler; OpenGL, where views are shown."""
-READING_BYTES, KEPT_BYTES = 90, 100
-"""Of one pixel of the photo: while it is read and its depth looked for; while views are made, beside them."""
+VIEWER_BYTES, WRITER_BYTES = 360 * MIB, 260 * MIB
+"""Of a process that does nothing yet: Python and compiled kernels; OpenGL, where views are shown."""
+READING_BYTES, PHOTO_BYTES = 90, 28
+"""Of one pixel of the photo while it is read and its depth looked for; then: its colours as floats, its disparity as
+found, as refined and as the views take it, the view in the middle as it is stored.
+"""
+RAY_BYTES, STATISTICS_BYTES, DETAIL_BYTES = 21, 12, 5
+"""Of one pixel of one source image: colours, disparity, coverage, flag (`RaySet`); its statistics, where the
+transformer is asked. Of one of the photo's: what tells its details.
+"""
+WORKING_BYTES, CANDIDATE_BYTES, AMBIGUOUS_BYTES = 42, 85, 750
+"""Of one pixel of a view in the making: float colours, with and without specks, disparity, flags. Of the band of rows
+in the making: five candidates and their weights; hypotheses and features of rays that the transformer is asked for.
+"""
+HOLE_BYTES = 160
+"""Of one pixel of a hole while it is filled: what surrounds it in sixteen directions."""
+DRAFT_BYTES, UNDECIDED_BYTES = 11, 68
+"""Of one pixel of a draft: the view as it is stored; of one that the transformer is still to be asked for, more."""
 MAP_BYTES, DEPTH_MAP_BYTES = 6, 26
 """Of one pixel of a disparity map at its own size; more where it is depth."""
 STORED_BYTES, STORED_HDR_BYTES = 7, 10
@@ -43,13 +50,41 @@ PICTURE_BYTES, FLOAT_PICTURE_BYTES = 9, 64
 """Of one pixel of a picture on its way to a file: 8 bits a channel, or linear light."""
 OWN_SIZE_BYTES, TILE_BYTES = 45, 350 * MIB
 """Of one pixel of a photo that is drawn at its own size; and of a tile of it, whatever its size."""
-USUAL_RAY_IMAGES, USUAL_HOLE_BYTES, USUAL_AMBIGUOUS_SHARE = 10, 20, 0.2
-"""What scenes take while their views are made, before anything is known of them."""
 MOST_COMPLETING = 10
 """Views that complete the rays of several photos: three rows of three at most, and the centre."""
 USUAL_GRID = GridShape(5, 5)
 """A photo is made no smaller than that so many of its views fit; more are not worth its details."""
 LEAST_PIXELS = 10_000
+
+
+class Making(NamedTuple):
+    """What views are made of: the photo's pixels, those of the photo continued beyond its frame (`canvas_pixels`), the
+    source images of that size, the share of a view that is hole, and of its rays that are ambiguous.
+    """
+
+    pixels: float
+    canvas_pixels: float
+    images: int
+    hole_share: float
+    ambiguous_share: float
+    quality: Quality
+
+    @classmethod
+    def usual(cls, pixels: float) -> Making:
+        """What scenes take before anything is known of them but their size."""
+        return cls(pixels, pixels, 10, 0.12, 0.2, "balanced")
+
+
+def making_bytes(making: Making) -> int:
+    """The most that is held while views are made, beside the photo and views that are done: the ray set; and then a
+    view for each core, or the one whose holes are filled.
+    """
+    pixels, asks = making.pixels, making.quality != "fast"
+    band = min(pixels, MOST_BAND_PIXELS // (EVERY_COST if making.quality == "exact" else 1))
+    in_flight = THREADS * (pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + making.ambiguous_share * AMBIGUOUS_BYTES))
+    filling = pixels * (WORKING_BYTES + making.hole_share * HOLE_BYTES)
+    rays = making.images * (RAY_BYTES + (STATISTICS_BYTES if asks else 0)) + DETAIL_BYTES
+    return round(making.canvas_pixels * rays + max(in_flight, filling))
 
 
 class Budget(NamedTuple):
@@ -77,7 +112,7 @@ def budget_of(wanted_bytes: int | None) -> Budget:
 
 def require_process(budget: Budget, keeps_views: bool) -> None:
     """Raise InputError where not even the smallest photo fits."""
-    needed = process_bytes(keeps_views) + LEAST_PIXELS * (READING_BYTES + KEPT_BYTES)
+    needed = process_bytes(keeps_views) + LEAST_PIXELS * READING_BYTES
     allowed = own_limit_bytes()
     what = "showing the smallest photo" if keeps_views else "writing the views of the smallest photo"
     if MOST_USUAL_SHARE * allowed < needed:
@@ -102,7 +137,7 @@ def whole_bytes(pixels: int, field_bytes: int, making_bytes: int, keeps_views: b
 
     field_bytes: of all views, which count where they are kept. making_bytes: beside them while they are made.
     """
-    making = pixels * KEPT_BYTES + (field_bytes if keeps_views else 0) + making_bytes
+    making = pixels * PHOTO_BYTES + (field_bytes if keeps_views else 0) + making_bytes
     return process_bytes(keeps_views) + max(pixels * READING_BYTES, making)
 
 
@@ -111,16 +146,14 @@ def pixels_within(budget: Budget, grid: GridShape | None, keeps_views: bool = Tr
     fewer, fit.
     """
     views = min(math.prod(grid or USUAL_GRID), math.prod(USUAL_GRID))
-    each, fixed = _usual_making() if views > 1 else (0, 0)
-    each += KEPT_BYTES + (views * STORED_BYTES if keeps_views else 0)
-    return max((budget.bytes - process_bytes(keeps_views) - fixed) // each, LEAST_PIXELS)
-
-
-def _usual_making() -> tuple[int, int]:
-    """What views take while they are made: for each pixel of the photo, and of it whatever its size."""
-    rays = USUAL_RAY_IMAGES * (RAY_BYTES + STATISTICS_BYTES)
-    band = MOST_BAND_PIXELS * (CANDIDATE_BYTES + USUAL_AMBIGUOUS_SHARE * AMBIGUOUS_BYTES)
-    return rays + CORES * WORKING_BYTES + USUAL_HOLE_BYTES, round(CORES * band)
+    each = PHOTO_BYTES + (views * STORED_BYTES if keeps_views else 0)
+    if views == 1:
+        return max((budget.bytes - process_bytes(keeps_views)) // max(each, READING_BYTES), LEAST_PIXELS)
+    # Of photos larger than a band, all but the bands' share grows with their pixels.
+    least, more = (making_bytes(Making.usual(count * MOST_BAND_PIXELS)) for count in (1, 2))
+    growing = (more - least) / MOST_BAND_PIXELS
+    room = budget.bytes - process_bytes(keeps_views) - (2 * least - more)
+    return max(int(room / (each + growing)), LEAST_PIXELS)
 
 
 def largest_side(budget: Budget, needed_beside: int, each_view: int) -> int:
@@ -155,9 +188,8 @@ def require_map(budget: Budget, name: str, size: ImageSize, bytes_beside: int, k
 def require_views(budget: Budget, name: str, size: ImageSize, grid: GridShape) -> None:
     """Raise InputError where so many views of this (height, width) cannot be shown, before the first is made."""
     pixels, views = math.prod(size), math.prod(grid)
-    beside, each = VIEWER_BYTES + pixels * KEPT_BYTES, view_bytes(pixels, is_hdr=False)
-    made_of, fixed = _usual_making()
-    side = largest_side(budget, beside + pixels * made_of + fixed, each)
+    beside, each = VIEWER_BYTES + pixels * PHOTO_BYTES, view_bytes(pixels, is_hdr=False)
+    side = largest_side(budget, beside + making_bytes(Making.usual(pixels)), each)
     advice = f"at most --grid {side}, or " if side > 1 else ""
     what = f"{grid.columns} x {grid.rows} views of {name} ({size})"
     budget.require(beside + views * each, what, f"{advice}raise --memory or lower --max-pixels")
@@ -174,7 +206,7 @@ def require_field(budget: Budget, name: str, size: ImageSize, grid: GridShape) -
 def require_dense_field(budget: Budget, name: str, size: ImageSize, sparse: GridShape) -> None:
     """Raise InputError where views cannot be made between those of a sparse grid, each of this (height, width)."""
     rays = 2 * RAY_BYTES * (math.prod(sparse) + MOST_COMPLETING)
-    each = STORED_HDR_BYTES * math.prod(sparse) + rays + CORES * (KEPT_BYTES + WORKING_BYTES)
+    each = STORED_HDR_BYTES * math.prod(sparse) + rays + THREADS * (READING_BYTES + WORKING_BYTES)
     what = f"making views between {sparse.columns} x {sparse.rows} of {name} ({size})"
     budget.require(WRITER_BYTES + math.prod(size) * each, what, "raise --memory, or take fewer or smaller views")
 
@@ -205,7 +237,7 @@ def require_own_size(budget: Budget, size: ImageSize, view: ImageSize, field_byt
     """Raise InputError where a picture at the photo's own (height, width) takes more than there is. view: the size of
     the light field's views; field_bytes: of those that stay there meanwhile.
     """
-    fills = math.prod(view) * (KEPT_BYTES + USUAL_RAY_IMAGES * RAY_BYTES)
+    fills = math.prod(view) * PHOTO_BYTES + making_bytes(Making.usual(math.prod(view)))
     needed = VIEWER_BYTES + field_bytes + fills + TILE_BYTES + math.prod(size) * OWN_SIZE_BYTES
     budget.require(needed, f"a picture at the photo's own size, {size},", "raise --memory, or save a smaller picture")
 
@@ -214,7 +246,8 @@ def require_free_views(budget: Budget, canvas: ImageSize, largest: ImageSize) ->
     """Raise InputError where views of cameras cannot be made. canvas: (height, width) of the photo as far as they look
     beyond its frame; largest: of their pictures.
     """
-    needed = WRITER_BYTES + math.prod(canvas) * (KEPT_BYTES + USUAL_RAY_IMAGES * RAY_BYTES)
+    usual = Making.usual(math.prod(canvas))._replace(quality="fast")
+    needed = WRITER_BYTES + math.prod(canvas) * PHOTO_BYTES + making_bytes(usual)
     needed += math.prod(largest) * FLOAT_PICTURE_BYTES
     budget.require(needed, f"views of {largest} from a canvas of {canvas}", "raise --memory or lower --max-pixels")
 

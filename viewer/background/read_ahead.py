@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
-from iibr_core.generation.memory_model import KEPT_BYTES, READING_BYTES, budget_of, whole_bytes
+from iibr_core.generation.memory_model import PHOTO_BYTES, READING_BYTES, budget_of, whole_bytes
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop
 from viewer.background.jobs import Job, JobThread
 from viewer.background.loaded_photo import LoadedPhoto, load_photo, make_plan
@@ -40,7 +39,6 @@ def read_whole_photo(wanted: WantedPhoto, should_stop: ShouldStop) -> PhotoAhead
     """All of a photo. Raises InputError, and Cancelled once should_stop is true."""
     loaded = load_photo(wanted.source, should_stop)
     plan = make_plan(wanted.source, loaded, wanted.depth_strength)
-    give_back_memory()
     return PhotoAhead(loaded, plan)
 
 
@@ -51,7 +49,7 @@ def photos_within_budget(scene: Scene) -> int:
         return 0
     room = budget_of(scene.source.depth.memory_bytes).bytes
     room -= whole_bytes(pixels, plan.field_bytes, plan.peak_bytes + plan.draft_bytes, keeps_views=True)
-    return max(math.floor((room - pixels * READING_BYTES) / (pixels * KEPT_BYTES)), 0)
+    return max(math.floor((room - pixels * READING_BYTES) / (pixels * PHOTO_BYTES)), 0)
 
 
 class ReadAhead(Generic[Read]):

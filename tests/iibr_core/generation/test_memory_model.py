@@ -12,8 +12,10 @@ from iibr_core.generation.memory_model import (
     VIEWER_BYTES,
     WRITER_BYTES,
     Budget,
+    Making,
     budget_of,
     largest_side,
+    making_bytes,
     pixels_within,
     require_decoding,
     require_map,
@@ -62,9 +64,8 @@ def test_so_many_pixels_fit_indeed():
     """With the views that a photo is made no smaller for, and what usual scenes take while they are made."""
     budget = Budget(GIB, "")
     pixels = pixels_within(budget, None)
-    making, fixed = memory_model._usual_making()
     field = 25 * view_bytes(pixels, is_hdr=False)
-    assert whole_bytes(pixels, field, pixels * making + fixed, keeps_views=True) == pytest.approx(GIB, rel=1e-3)
+    assert whole_bytes(pixels, field, making_bytes(Making.usual(pixels)), True) == pytest.approx(GIB, rel=1e-3)
 
 
 def test_views_that_are_kept_count_and_those_that_are_written_do_not():
