@@ -160,12 +160,12 @@ def _watch(worker, scene_view, generation: int, views: int) -> None:  # type: ig
 
 
 def _apply(policy: str) -> None:
-    from viewer.background import scene_worker
+    from viewer.background import jobs, scene_worker
 
     if policy == SHIPPED:
         limit_arenas()
     else:
-        scene_worker.give_back_memory = lambda: None
+        scene_worker.give_back_memory = jobs.give_back_memory = lambda: None
 
 
 def speed(photo: str, disparity: str, rounds: str = "7") -> None:

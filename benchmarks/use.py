@@ -1,71 +1,81 @@
-"""The real window used for long, on a private X server: open, drag, focus, brush, save, switch, over and over.
+"""The real window used for long, on a private X server: seeded random actions, one after the other.
 
-python -m benchmarks.use [--steps 2000]
+python -m benchmarks.use [--steps 1000] [--seed 0]
 
-Says how memory, threads and open files stand after the first 50 steps and at the end, and how long frames took but
-while something was opened, of wall time and of processor time of the window's own thread: other programs make frames
-wait, and only the second tells what this one costs.
+Says what memory the process fills after so many actions and once it rests, how threads and open files stand, and how
+long frames took but while something was opened, of wall time and of processor time of the window's own thread: other
+programs make frames wait, and only the second tells what this one costs.
 """
 
 from __future__ import annotations
 
 import argparse
 import random
-import statistics
 import tempfile
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import psutil
 
 from iibr_core.formats.images.photo import write_image
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import GridShape, ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
-from viewer.model.actions import Action, DismissNotices, DoTask, EndGesture, OpenPath, Undo
+from viewer.model.actions import Action, DismissNotices, DoTask, EndGesture, OpenPath, Redo, ShowPrompt, Undo
+from viewer.model.free_camera import LeaveCamera, MoveCamera
 from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Paint
+from viewer.model.state.exporting import ExportOptions, ExportTask
 from viewer.model.state.folder import ShowFilmstrip, StepPhoto
-from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture
+from viewer.model.state.inspection import OVERLAYS, Compare, KeepState, SetOverlay, ShowEpis, ShowGrid
+from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture, SetGloss
 from viewer.model.state.scene import Source
 from viewer.model.state.tasks import SaveTask
+from viewer.model.zoom import SetZoom, Zoom
 
-PHOTOS, SIZE = 6, (360, 540)
-GRID = GridShape(5, 5)
-WARM_UP = 50
+SIZES = (600, 900), (700, 600), (480, 720), (640, 960), (512, 512), (560, 840)
+"""Of the photos in the folder: (height, width)."""
+GRIDS = 5, 7, 9
 FRAMES_A_STEP = 3
 SLOW_FRAME_S = 0.25
+COUNTED_AFTER = 1, 10, 100, 250, 500, 1000, 2000
+MIB = 2**20
 
 
 def make_photos(folder: Path) -> None:
     """Photos with a near shape before a wall, and their maps beside them."""
-    height, width = SIZE
-    for i in range(PHOTOS):
+    for i, (height, width) in enumerate(SIZES):
         rng = np.random.default_rng(i)
-        pixels = rng.integers(40, 220, (height // 6, width // 6, 3)).repeat(6, 0).repeat(6, 1).astype(np.uint8)
-        disparity = np.full(SIZE, -1.0, np.float32)
+        coarse = rng.integers(40, 220, (-(-height // 6), -(-width // 6), 3))
+        disparity = np.full((height, width), -1.0, np.float32)
         disparity[height // 4 : 3 * height // 4, width // 3 : 2 * width // 3] = 2.0
-        write_image(folder / f"photo{i}.png", pixels)
+        write_image(folder / f"photo{i}.png", coarse.repeat(6, 0).repeat(6, 1)[:height, :width].astype(np.uint8))
         np.save(folder / f"photo{i}_disparity.npy", disparity)
 
 
 class User:
-    """Does one thing a step, as a person would. frames: seconds (wall, processor) of those while nothing was opened."""
+    """Does one thing a step. frames: seconds (wall, processor) of those while nothing was opened."""
 
-    def __init__(self, app: App, out: Path) -> None:
+    def __init__(self, app: App, out: Path, seed: int = 0) -> None:
         self.app, self.out = app, out
         self.frames: list[tuple[float, float, str]] = []
-        self._random = random.Random(0)
+        self._random = random.Random(seed)
         self._doing = ""
 
-    def step(self, number: int) -> None:
-        """Do the thing whose turn it is."""
-        things: tuple[Callable[[], None], ...] = (self.drag, self.focus, self.drag, self.brush, self.save, self.switch)
-        thing = things[number % len(things)]
+    def step(self) -> None:
+        """Do something."""
+        often = self.drag, self.focus, self.brush, self.undo
+        seldom = (
+            self.zoom, self.overlay, self.inspect, self.compare, self.gloss, self.turn_camera, self.save, self.export,
+            self.switch, self.change_grid,
+        )  # fmt: skip
+        thing: Callable[[], None] = self._random.choice((*often, *often, *seldom))
         self._doing = thing.__name__
         thing()
 
@@ -79,12 +89,42 @@ class User:
         self.do(FocusOn((0.0, 0.0), self._random.uniform(-2, 2)), SetAperture(self._random.uniform(0, 4)), EndGesture())
 
     def brush(self) -> None:
-        """A stroke, seen, waited for, and taken back."""
+        """A stroke."""
+        x, y = (self._random.uniform(0.1, 0.8) for _ in "xy")
         for k in range(FRAMES_A_STEP):
-            self.do(Paint((0.4 + 0.02 * k, 0.5)))
+            self.do(Paint((x + 0.03 * k, y)))
         self.do(EndGesture())
-        self.until(lambda: self.app.state.progress.total > 0)
-        self.do(Undo(), EndGesture())
+
+    def undo(self) -> None:
+        """Take some edits back, or do the last again."""
+        self.do(*self._random.choice(([Undo()], 3 * [Undo()], [Redo()])), EndGesture())
+
+    def zoom(self) -> None:
+        """Look closer, or at the whole."""
+        at = self._random.uniform(0.2, 0.8), self._random.uniform(0.2, 0.8)
+        self.do(SetZoom(self._random.choice((None, Zoom(self._random.uniform(1, 3), at)))))
+
+    def overlay(self) -> None:
+        """Lay something over the picture, or take it away."""
+        self.do(SetOverlay(self._random.choice((None, *OVERLAYS))))
+
+    def inspect(self) -> None:
+        """Show or hide EPIs and the sheet of views."""
+        state = self.app.state.inspection
+        self.do(self._random.choice((ShowEpis(not state.shows_epis), ShowGrid(not state.shows_grid))))
+
+    def compare(self) -> None:
+        """With the photo, the best quality, a state that was kept; or no longer."""
+        self.do(KeepState(), Compare(self._random.choice((None, "photo", "quality", "kept", "difference"))))
+
+    def gloss(self) -> None:
+        """Make what is near glossy, or nothing."""
+        self.do(SetGloss(self._random.choice((None, Gloss(roughness=self._random.uniform(0.1, 0.6))))))
+
+    def turn_camera(self) -> None:
+        """Leave the plane of views, and come back some frames later."""
+        self.do(MoveCamera(right=self._random.uniform(-0.3, 0.3), forward=self._random.uniform(0, 0.3)))
+        self.do(LeaveCamera())
 
     def save(self) -> None:
         """Save a picture and wait for it."""
@@ -92,16 +132,44 @@ class User:
         self.until(lambda: self.app.state.saving is None and not self.app.state.tasks)
         self.do(DismissNotices())
 
+    def export(self) -> None:
+        """Export something small; what is asked for too early is refused."""
+        kind, ending, options = self._random.choice(
+            (
+                ("gif", ".gif", ExportOptions(size=ScreenSize(120, 80), frames=6)),
+                ("rgbd", ".png", ExportOptions()),
+                ("anaglyph", ".png", ExportOptions(size=ScreenSize(240, 160))),
+            )
+        )
+        self.do(DoTask(ExportTask(kind, str(self.out / f"{kind}{ending}"), options, may_replace=True)))
+        self.do(ShowPrompt(None))
+
     def switch(self) -> None:
-        """The next photo; after the last one the first."""
-        place = self.app.state.source.path if self.app.state.source else ""
-        self.do(ResetOptics(), StepPhoto(1 if not place.endswith(f"photo{PHOTOS - 1}.png") else 1 - PHOTOS))
+        """Another photo of the folder."""
+        source = self.app.state.source
+        name = Path(source.path).stem if source else "photo0"
+        last = name == f"photo{len(SIZES) - 1}"
+        self.do(ResetOptics(), StepPhoto(1 - len(SIZES) if last else 1))
         self.until(self.is_open)
+
+    def change_grid(self) -> None:
+        """More views, or fewer."""
+        source = self.app.state.source
+        if source is not None:
+            side = self._random.choice(GRIDS)
+            self.do(OpenPath(replace(source, grid=GridShape(side, side))))
+            self.until(self.is_open)
 
     def is_open(self) -> bool:
         """Whether what was asked for is open."""
         state = self.app.state
         return state.scene is not None and state.scene.source is state.source
+
+    def is_resting(self) -> bool:
+        """Whether nothing is going on any more."""
+        state = self.app.state
+        is_busy = state.exporting is not None or state.saving is not None or bool(state.tasks)
+        return self.is_open() and state.progress.is_complete and self.app.wait_s > 0 and not is_busy
 
     def do(self, *actions: Action) -> None:
         """Ask for this, and show a frame."""
@@ -119,48 +187,61 @@ class User:
         waits = self.app.wait_s > 0
         start, used, was_open = time.perf_counter(), time.thread_time(), self.is_open()
         self.app.step()
-        if was_open and self.is_open() and not waits and self._doing != "switch":
+        if was_open and self.is_open() and not waits and self._doing not in ("switch", "change_grid"):
             self.frames.append((time.perf_counter() - start, time.thread_time() - used, self._doing))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=2000)
-    steps = parser.parse_args().steps
+    parser.add_argument("--steps", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
     limit_arenas()  # as the program does
     with tempfile.TemporaryDirectory() as name, private_display():
         folder, out = Path(name) / "photos", Path(name)
         folder.mkdir()
         make_photos(folder)
         threads_before = threading.active_count()
-        app = App(initial_state(OpenPath(Source(str(folder), grid=GRID))))
-        user, process, memory, handles, threads = User(app, out), psutil.Process(), [], [], []
+        app = App(initial_state(OpenPath(Source(str(folder)))))
+        user = User(app, out, arguments.seed)
         try:
             user.until(lambda: user.is_open() and app.state.folder is not None)
             user.do(ShowFilmstrip(True))
             user.frames.clear()
-            for number in range(steps):
-                user.step(number)
-                memory.append(process.memory_info().rss / 2**20)
-                handles.append(process.num_fds())
-                threads.append(process.num_threads())
+            take_steps(user, arguments.steps)
         finally:
             app.close()
         left = threading.active_count() - threads_before
-    print(f"{steps} steps: {len(user.frames)} frames while nothing was opened")
+    print_frames(user.frames)
+    print(f"threads of Python left when the window is closed: {left}")
+
+
+def take_steps(user: User, steps: int) -> None:
+    """Say what the process takes after some of them, and at the end."""
+    process = psutil.Process()
+    print("| after | memory, MiB | open files | threads |\n| --- | --- | --- | --- |")
+
+    def tell(when: str) -> None:
+        rss = process.memory_info().rss / MIB
+        print(f"| {when} | {rss:.0f} | {process.num_fds()} | {process.num_threads()} |", flush=True)
+
+    for number in range(1, steps + 1):
+        user.step()
+        if number in COUNTED_AFTER:
+            tell(f"{number} actions")
+    tell(f"{steps} actions")
+    user.until(user.is_resting)
+    tell("rest")
+
+
+def print_frames(frames: list[tuple[float, float, str]]) -> None:
+    """How long they took, and what the longest one did."""
     for what, index in (("wall time", 0), ("processor time", 1)):
-        took = sorted(frame[index] for frame in user.frames)
+        took = sorted(frame[index] for frame in frames)
         slow = sum(seconds > SLOW_FRAME_S for seconds in took)
         median, longest = took[len(took) // 2] * 1e3, took[-1] * 1e3
         print(f"frames, {what}: median {median:.0f} ms, longest {longest:.0f} ms, {slow} over 250")
-    slowest = max(user.frames, key=lambda frame: frame[1])
-    print(f"the longest by processor time was while it did: {slowest[2]}")
-    early, late = memory[WARM_UP : WARM_UP + 50], memory[-50:]
-    if early:
-        before, after = statistics.median(early), statistics.median(late)
-        print(f"memory: {before:.0f} MiB after {WARM_UP} steps, {after:.0f} at the end")
-        print(f"open files: {handles[WARM_UP]} and {handles[-1]}; threads: {threads[WARM_UP]} and {threads[-1]}")
-    print(f"threads of Python left when the window is closed: {left}")
+    print(f"the longest by processor time was while it did: {max(frames, key=lambda frame: frame[1])[2]}")
 
 
 if __name__ == "__main__":

@@ -110,6 +110,7 @@ class FreeLook:
         self._worker.cancel()
         self._scene_view.stand_in(None)
         self._asked, self.shown, self._may_interrupt = None, None, True
+        self._ready = {}  # a job that is still being cancelled keeps what it makes in the old one
         return [CameraProgress(None)]
 
     def _take(self) -> list[Action]:
@@ -128,12 +129,14 @@ class FreeLook:
 
     def _draw(self, job: Job[FreeRequest, FreeResult]) -> Iterator[FreeResult]:
         """In the drawing thread. What a photo's views are made of is kept: the next picture is then drawn at once."""
+        kept = self._ready
         with suppress(Cancelled):
             has_draft = math.prod(job.request.loaded.photo.size) > DRAFT_PIXELS
             for is_draft in (True, False) if has_draft else (False,):
-                ready = self._ready.get(is_draft)
+                ready = kept.get(is_draft)
                 if ready is None or not ready.is_for(job.request):
-                    ready = self._ready[is_draft] = _make_ready(job, is_draft)
+                    kept.pop(is_draft, None)  # two would be large
+                    ready = kept[is_draft] = _make_ready(job, is_draft)
                 yield FreeView(job.request, _view(job, ready), is_draft)
             yield CameraProgress(None)
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed, ProgressReport
-from viewer.background.loaded_photo import prepare_brush
+from viewer.background.loaded_photo import prepare_brush, without_history
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, WantedPhoto, photos_within_budget, read_whole_photo
 from viewer.background.scene_worker import (
     PhotosFound,
@@ -137,7 +137,10 @@ class SceneLoader:
         if result.generation < self._scene_view.generation:
             return []  # the small picture of another photo is shown by now
         if isinstance(result, SceneReady):
+            before = self._scene_view.loaded
             self._scene_view.open(result)
+            if before is None or result.loaded is None or result.loaded.photo is not before.photo:
+                self._preview.forget()
             self._inspection_view.open()
             self._set_title(f"{result.scene.name} - iibr")
             self._load_brush(result)
@@ -188,7 +191,8 @@ class SceneLoader:
         if scene is None or scene.plan is None or loaded is None:
             return
         if loaded.depth_settings == DepthSettings(scene.source.depth.refine):
-            self.ahead.keep(WantedPhoto(scene.source, state.depth_strength), PhotoAhead(loaded, scene.plan))
+            left = PhotoAhead(without_history(loaded), scene.plan)
+            self.ahead.keep(WantedPhoto(scene.source, state.depth_strength), left)
 
     def _read_sketches(self, state: AppState) -> None:
         """Of what is asked for and what is likely to be next. While the open photo's views are made they can wait."""

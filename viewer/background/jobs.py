@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.types import InputError
 from viewer.model.state.scene import Progress
 
@@ -158,6 +159,8 @@ class JobThread(Generic[Request, Result]):
                     break
         except Exception as error:  # the one place where a job's error can still be shown to the user
             job.post(self._failure(job.request, message_of(error)))
+        finally:
+            give_back_memory()
         return True
 
 

@@ -170,6 +170,13 @@ def apply_depth_settings(
     return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
 
 
+def without_history(loaded: LoadedPhoto) -> LoadedPhoto:
+    """The same with a new canvas: one that was painted on keeps maps to go back to."""
+    from iibr_core.depth.editing.canvas import DepthCanvas
+
+    return replace(loaded, canvas=DepthCanvas(loaded.photo.pixels, loaded.refined.values))
+
+
 def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
     """The size of a stored picture as it is upright."""
     is_turned = (size.height < size.width) != (upright.height < upright.width) and size.height != size.width

@@ -30,6 +30,10 @@ class DepthPreview:
         self._shown: DepthEdits | None = None
         self._still: tuple[DepthEdits, float] | None = None
 
+    def forget(self) -> None:
+        """Free the canvas: another photo is open."""
+        self._loaded = self._canvas = self._still = None
+
     def update(self, state: AppState) -> None:
         """Show the edits this state wants, if the screen shows others. Raises InputError where they make no sense."""
         loaded, scene = self._scene_view.loaded, state.scene

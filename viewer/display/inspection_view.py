@@ -278,7 +278,7 @@ class InspectionView:
         if kind == "kept":
             return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}
         renderer, drawn = self._scene_view.renderer, self._scene_view.picture_drawn
-        if not renderer.is_converged:
+        if not (renderer.is_converged and self._scene_view.shows_all_views()):
             before = self._drawn.get("difference")
             return {"difference": before[1] if before else None}
         return {"difference": self._once("difference", (record, drawn), lambda: self._show_difference(kept))}
