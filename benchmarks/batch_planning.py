@@ -19,7 +19,7 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.types import ignore_progress
 from viewer.app.batch.archive import ArchivePhoto, photos_in
 from viewer.app.batch.ledger import MANIFEST, Ledger
-from viewer.app.batch.run import run_batch
+from viewer.app.batch.run import run_batch, workers_here
 from viewer.app.batch.task import BatchSettings, key_of, target_name
 from viewer.model.state.scene import Source
 
@@ -46,7 +46,8 @@ def pretend_finished(out: Path, photos: list[ArchivePhoto]) -> None:
             name = target_name(SETTINGS, photo)
             (out / name).parent.mkdir(exist_ok=True)
             (out / name).touch()
-            line = {"name": name, "output": name, "photo": photo.path, "key": key_of(SETTINGS, photo), "seconds": 1.0}
+            line = {"name": name, "output": name, "photo": photo.path, "kind": SETTINGS.kind, "seconds": 1.0}
+            line |= {"settings": SETTINGS.digest, "key": key_of(SETTINGS, photo)}
             manifest.write(json.dumps(line) + "\n")
 
 
@@ -69,7 +70,7 @@ def main() -> None:
         pretend_finished(out, photos)
         started = time.perf_counter()
         with Ledger(out) as ledger:
-            count = run_batch(ledger, SETTINGS, photos, 1, ignore_progress)
+            count = run_batch(ledger, SETTINGS, photos, workers_here(1), ignore_progress)
         assert count.there_before == given.photos, count
         print(f"all there before:     {time.perf_counter() - started:.1f} s, {most_megabytes():.0f} MB")
 

@@ -134,6 +134,45 @@ def require_files_in(
             _note_place(_real_place(folder / name), may_replace)
 
 
+def require_no_link(path: Path, folder: Path) -> None:
+    """Raise InputError where `path`, or a folder on the way to it below `folder`, is a link: what it leads to is not
+    what was named.
+    """
+    for place in (path, *path.parents):
+        if place == folder:
+            return
+        if os.path.islink(place):
+            raise InputError(f"{place}: is a link, and nothing is written through it; remove it")
+
+
+def open_to_append(path: Path) -> int:
+    """A descriptor to read an ordinary file and to add to it; it is made where there is none.
+
+    Raises InputError for anything else, for links, and for a file with several names: what it leads to is not what was
+    named.
+    """
+    status = None
+    with suppress(OSError):
+        status = os.lstat(path)
+    _require_single_file(path, status)
+    flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    try:
+        descriptor = os.open(path, flags, 0o666)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+    try:
+        _require_single_file(path, os.fstat(descriptor))
+    except InputError:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def _require_single_file(path: Path, status: os.stat_result | None) -> None:
+    if status is not None and (not stat.S_ISREG(status.st_mode) or status.st_nlink > 1):
+        raise InputError(f"{path}: is a link or no ordinary file, and nothing is written there; remove it")
+
+
 def make_folder(folder: Path) -> None:
     """Make a folder, and those above it, where there is none; links are followed. Raises InputError."""
     try:

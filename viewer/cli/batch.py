@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,7 +19,49 @@ from viewer.cli.scene_options import PhotoOptions
 from viewer.cli.terminal import show_progress
 from viewer.model.export_kinds import EXPORTS
 
+if TYPE_CHECKING:
+    from viewer.app.batch.workers import WorkerSource
+
 MOST_WORKERS = 1024
+
+
+@dataclass(frozen=True)
+class WorkerOptions:
+    """Who does the work."""
+
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=MOST_WORKERS, help="Processes here.", show_default="one a core")
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Of a Dask scheduler, whose workers do it instead. [bold]Whoever can reach a scheduler can run code as"
+            " you[/bold], on its workers and here: outside a network that you trust, use TLS (tls://HOST:PORT).",
+        ),
+    ] = None
+    tls_ca: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Certificate of who signed the scheduler's, PEM.")
+    ] = None
+    tls_cert: Annotated[Path | None, typer.Option(metavar="FILE", help="Your certificate, PEM.")] = None
+    tls_key: Annotated[Path | None, typer.Option(metavar="FILE", help="Its private key, PEM.")] = None
+
+    def source(self) -> WorkerSource:
+        """Raises InputError where the options contradict each other."""
+        tls = [path for path in (self.tls_ca, self.tls_cert, self.tls_key) if path is not None]
+        if tls and (len(tls) < 3 or self.scheduler is None):
+            raise InputError("--tls-ca, --tls-cert, --tls-key: give all three, with --scheduler")
+        if self.scheduler is None:
+            from viewer.app.batch.run import workers_here
+
+            return workers_here(self.workers)
+        if self.workers is not None:
+            raise InputError("--workers starts processes here, --scheduler uses those elsewhere: leave one out")
+        require_extra("batch", "distributed")
+        from viewer.app.batch.scheduler import TlsFiles, remote_workers
+        from viewer.app.batch.workers import WorkerSource
+
+        return WorkerSource(partial(remote_workers, self.scheduler, TlsFiles(*tls) if tls else None), None)
 
 
 @with_option_records
@@ -26,16 +70,11 @@ def batch(
     folders: Annotated[list[Path], typer.Argument(help="Folders of photos, and of folders.", show_default=False)],
     to: To,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of all exports.")],
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=MOST_WORKERS, help="Processes here.", show_default="one a core")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Of a Dask scheduler, whose workers do it instead.")
-    ] = None,
     focus: Focus = None,
     aperture: Aperture = None,
     gloss: GlossFile = None,
     *,
+    workers: WorkerOptions,
     told: KindOptions,
     photo: PhotoOptions,
     literal: Literal = False,
@@ -46,10 +85,8 @@ def batch(
 
     Example: iibr batch photos --to depth -o depths
     """
-    require_extra("batch", "distributed")
     require_kind(context, to)
-    if workers is not None and scheduler is not None:
-        raise InputError("--workers starts processes here, --scheduler uses those elsewhere: leave one out")
+    worker_source = workers.source()
     source = photo.source("", grid, is_literal=literal)
     require_memory(photo.memory, keeps_views=to.is_drawn)
     from viewer.app.batch.archive import photos_in
@@ -70,8 +107,8 @@ def batch(
     if not photos:
         raise InputError(f"{' and '.join(map(str, folders))}: no photos there")
     require_batch_place(output, folders, force)
-    with Ledger(output) as ledger, show_progress("looking", counts=True) as show:
-        done = run_batch(ledger, settings, photos, scheduler or workers, show)
+    with Ledger(output, force) as ledger, show_progress("looking", counts=True) as show:
+        done = run_batch(ledger, settings, photos, worker_source, show)
     print(f"{output}: {done.written} written, {done.there_before} there before, {done.failed} failed")
     if done.failed:
         raise InputError(f"{output / FAILURES}: tells what failed, and why")

@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
+from pathlib import Path
 
+from iibr_core.formats.outputs import remove_leftovers
 from iibr_core.runtime.machine import (
     LEAST_USUAL_BYTES,
     MOST_USUAL_SHARE,
@@ -17,7 +20,9 @@ from iibr_core.runtime.machine import (
 from iibr_core.types import InputError, ReportProgress
 from viewer.app.batch.archive import ArchivePhoto
 from viewer.app.batch.ledger import Ledger
+from viewer.app.batch.processes import local_workers
 from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask, key_of, target_name
+from viewer.app.batch.workers import WorkerSource, outcomes_of
 
 
 @dataclass
@@ -40,6 +45,8 @@ class _Batch:
         self, ledger: Ledger, settings: BatchSettings, photos: Sequence[ArchivePhoto], report_progress: ReportProgress
     ) -> None:
         self.count = BatchCount(len(photos))
+        self.folders: set[Path] = set()
+        """Where workers write."""
         self._ledger, self._settings, self._photos, self._report_progress = ledger, settings, photos, report_progress
 
     def tasks(self, share_bytes: int | None) -> Iterator[PhotoTask]:
@@ -49,8 +56,9 @@ class _Batch:
             try:
                 key = key_of(self._settings, photo)
                 if not self._ledger.has(name, key):
-                    target = os.path.abspath(self._ledger.folder / name)
-                    yield PhotoTask(os.path.abspath(photo.path), target, key, self._settings, share_bytes)
+                    place = self._ledger.place_of(name)
+                    self.folders.add(place.target.parent)
+                    yield PhotoTask(os.path.abspath(photo.path), place, key, self._settings, share_bytes)
                     continue
                 self.count.there_before += 1
             except InputError as error:
@@ -78,30 +86,34 @@ def run_batch(
     ledger: Ledger,
     settings: BatchSettings,
     photos: Sequence[ArchivePhoto],
-    workers: int | str | None,
+    source: WorkerSource,
     report_progress: ReportProgress,
 ) -> BatchCount:
-    """Export what is not there yet. workers: so many processes here, as many as fit, or a scheduler's address.
+    """Export what is not there yet. No workers are started where there is nothing to do.
 
-    None are started where there is nothing to do. Raises InputError where there are none, or they are lost.
+    Raises InputError where exports of other settings are in the way, there are no workers, or they are lost.
     """
+    ledger.require_same_settings(settings, [target_name(settings, photo) for photo in photos])
     batch = _Batch(ledger, settings, photos, report_progress)
-    count = workers if isinstance(workers, int) else _usual_workers()
-    share_bytes = None if isinstance(workers, str) else _share_bytes(count)
-    tasks = batch.tasks(share_bytes)
+    tasks = batch.tasks(source.memory_bytes)
     first = next(tasks, None)
     if first is None:
         return batch.count
-    from viewer.app.batch.cluster import local_workers, outcomes_of, remote_workers, warm_workers
-
     report_progress(0, 0, "starting workers")
-    threads = max(core_count() // count, 1)
-    with remote_workers(workers) if isinstance(workers, str) else local_workers(count, threads) as client:
-        report_progress(0, 0, "warming up")
-        warm_workers(client, settings, share_bytes)
-        for task, outcome in outcomes_of(client, chain((first,), tasks)):
-            batch.take(task, outcome)
+    try:
+        with source.open() as workers:
+            for task, outcome in outcomes_of(workers, chain((first,), tasks)):
+                batch.take(task, outcome)
+    finally:
+        for folder in batch.folders:
+            remove_leftovers(folder)
     return batch.count
+
+
+def workers_here(count: int | None = None) -> WorkerSource:
+    """So many processes of this machine, or as many as fit, each with its part of the cores and the memory."""
+    count = count or _usual_workers()
+    return WorkerSource(partial(local_workers, count, max(core_count() // count, 1)), _share_bytes(count))
 
 
 def _usual_workers() -> int:

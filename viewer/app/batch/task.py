@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from iibr_core.depth.sidecar import map_to_read
 from iibr_core.formats.files import open_binary
@@ -17,6 +19,7 @@ from viewer.model.export_kinds import EXPORTS, ExportKind
 from viewer.model.state.exporting import USUAL_OPTIONS, ExportOptions
 from viewer.model.state.scene import Source
 
+CLAIM_PREFIX = ".iibr-batch-"
 MOST_READ_BYTES = 1 << 20
 """At a time."""
 
@@ -41,27 +44,62 @@ class BatchSettings:
         return EXPORTS[self.kind]
 
     @cached_property
-    def digest(self) -> bytes:
-        """Of all that says what is made of a photo: the settings, what is reflected in it, and this program's version.
+    def digest(self) -> str:
+        """Of all that says what is made of a photo, what is reflected in it included; not of the memory it may take.
 
         Raises InputError where that cannot be read.
         """
         reflected = self.gloss.environment if self.gloss is not None else ""
         content = _digest_of(Path(reflected)) if reflected else b""
-        return hashlib.sha256(f"{version('iibr')} {self!r}".encode() + content).digest()
+        source = replace(self.source, depth=replace(self.source.depth, memory_bytes=None))
+        return hashlib.sha256(repr(replace(self, source=source)).encode() + content).hexdigest()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an export goes. folder: of all exports. name: in it, before its kind adds to it. own_output: what a batch
+    wrote there before, in the folder, "" for nothing. may_replace: whatever is there.
+    """
+
+    folder: str
+    name: str
+    own_output: str = ""
+    may_replace: bool = False
+
+    @property
+    def target(self) -> Path:
+        """The file or folder to write, before its kind adds to the name."""
+        return Path(self.folder, self.name)
+
+    @property
+    def claim(self) -> Path:
+        """A file that says which output is being written, until the manifest does: a batch that was killed in between
+        replaces it afterwards.
+        """
+        return Path(self.folder, f"{CLAIM_PREFIX}{hashlib.sha256(os.fsencode(self.name)).hexdigest()[:32]}")
+
+    def may_write(self, output: Path) -> bool:
+        """Whether an output may be replaced."""
+        return self.may_replace or (bool(self.own_output) and output == Path(self.folder, self.own_output))
 
 
 @dataclass(frozen=True)
 class PhotoTask:
-    """One photo, in a form that goes to other machines. target: the file or folder to write, before its kind adds to
-    the name. memory_bytes: a worker's share where the settings name none. key: of `key_of`.
+    """One photo, in a form that goes to other machines. memory_bytes: a worker's share where the settings name none.
+    key: of `key_of`.
     """
 
     photo: str
-    target: str
+    place: Place
     key: str
     settings: BatchSettings
     memory_bytes: int | None = None
+
+    def line(self, output: str, **more: Any) -> bytes:
+        """Of the manifest, about this output."""
+        inner = os.path.relpath(output, self.place.folder)
+        about = {"name": self.place.name, "output": inner, "kind": self.settings.kind, "settings": self.settings.digest}
+        return json.dumps({**about, **more}).encode() + b"\n"
 
     @property
     def source(self) -> Source:
@@ -92,7 +130,8 @@ def key_of(settings: BatchSettings, photo: ArchivePhoto) -> str:
 
     Raises InputError where the photo or its map cannot be read.
     """
-    digest = hashlib.sha256(settings.digest + os.fsencode(photo.name) + b"\0")
+    digest = hashlib.sha256(f"{version('iibr')} {settings!r} {settings.digest}".encode())
+    digest.update(os.fsencode(photo.name) + b"\0")
     path = Path(photo.path)
     map_path = map_to_read(path, settings.source.depth)
     for read in (path, *(() if map_path is None else (map_path,))):

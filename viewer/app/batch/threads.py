@@ -1,31 +1,34 @@
-"""How many threads a photo gets in a worker. Nothing heavy: it is heard before the core is imported there."""
+"""How many threads a photo gets in a worker. Light: a worker reads it before the core is imported there."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
-
-from distributed import WorkerPlugin
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 from iibr_core.runtime.machine import THREADS_VARIABLE
 
 LIBRARIES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+QUIET_AND_SAFE = {"PYTHONWARNINGS": "ignore", "PYTHONSAFEPATH": "1"}
+"""Workers write nothing to the terminal, and import nothing that lies in the working folder."""
 
 
-class ThreadsOfWorker(WorkerPlugin):
-    """Says to this program's own pools, and to those of the libraries, how many threads a photo gets.
+def thread_variables(threads: int) -> dict[str, str]:
+    """What says to this program's own pools, and to those of libraries, how many threads there are."""
+    return dict.fromkeys((THREADS_VARIABLE, *LIBRARIES), str(threads))
 
-    Dask says so to OMP and MKL only; our pools would take every core in every worker.
-    """
 
-    name = "iibr-threads"
-
-    def __init__(self, threads: int) -> None:
-        """threads: of each worker."""
-        self.threads = threads
-
-    def setup(self, worker: Any) -> None:
-        """Before anything of the core is imported there. A worker that was started with its own number keeps it."""
-        os.environ.setdefault(THREADS_VARIABLE, str(self.threads))
-        for name in LIBRARIES:
-            os.environ[name] = os.environ[THREADS_VARIABLE]
+@contextmanager
+def set_environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """The environment of processes that are started in the block; this one keeps what it has read of its own."""
+    changed = {**variables, **QUIET_AND_SAFE}
+    before = {name: os.environ.get(name) for name in changed}
+    os.environ.update(changed)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

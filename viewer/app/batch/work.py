@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -11,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask
+from viewer.app.batch.task import Outcome, PhotoTask
 
 if TYPE_CHECKING:
     from viewer.app.exports.source import ExportSource
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from viewer.model.actions import Action
     from viewer.model.state.scene import Scene
 
-WARM_SIZE = 120, 160
 _own = threading.local()
 """Of a thread: its viewer, kept from photo to photo. GL contexts belong to threads."""
 
@@ -42,42 +40,41 @@ def export_photo(task: PhotoTask) -> Outcome:
     return Outcome(str(output), seconds=time.perf_counter() - started)
 
 
-def warm_up(settings: BatchSettings, memory_bytes: int | None = None) -> None:
-    """Have all kernels compiled, models loaded and shaders built that these settings need, by a photo of no worth."""
-    import numpy as np
-
-    from iibr_core.formats.images.photo import write_image
-    from iibr_core.formats.maps.writer import write_map
-
-    rows, columns = np.indices(WARM_SIZE)
-    is_near = (abs(rows - 60) < 30) & (abs(columns - 80) < 40)
-    texture = np.random.default_rng(0).integers(0, 60, (*WARM_SIZE, 3))
-    with tempfile.TemporaryDirectory() as folder:
-        photo = Path(folder, "photo.png")
-        write_image(photo, (texture + np.where(is_near, 150, 40)[..., None]).astype(np.uint8))
-        if settings.source.depth.start == "auto":
-            write_map(Path(folder, "photo_disparity.pfm"), np.where(is_near, 2.0, 0.5).astype(np.float32))
-        ending = (settings.export_kind.endings or ("",))[0]
-        export_photo(PhotoTask(str(photo), str(Path(folder, "made", f"made{ending}")), "", settings, memory_bytes))
-
-
 def _export(task: PhotoTask) -> Path:
     """Raises InputError."""
-    from iibr_core.formats.outputs import make_folder
+    from iibr_core.formats.outputs import AlreadyThereError, make_folder, require_no_link
     from viewer.app.exports.registry import export_path, require_export_place, writer_of
     from viewer.app.save_places import inputs_of
 
-    kind, options, target = task.settings.export_kind, task.settings.options, Path(task.target)
+    kind, options, place = task.settings.export_kind, task.settings.options, task.place
+    target = place.target
 
     def require_place(scene: Scene) -> None:
         nonlocal target
-        target = export_path(kind, Path(task.target), scene, options)
+        target = export_path(kind, place.target, scene, options)
+        require_no_link(target, Path(place.folder))
         make_folder(target.parent)
-        require_export_place(kind, target, inputs_of(task.source), may_replace=True)
+        require_export_place(kind, target, inputs_of(task.source), place.may_write(target))
+        _claim(task, target)
 
     opened = _open(task, require_place)
-    writer_of(kind)(target, opened, options)
+    try:
+        writer_of(kind)(target, opened, options)
+    except AlreadyThereError:  # somebody put it there meanwhile
+        place.claim.unlink(missing_ok=True)
+        raise
+    if not place.claim.exists():  # whoever waited for this photo has gone
+        _claim(task, target)
     return target
+
+
+def _claim(task: PhotoTask, output: Path) -> None:
+    from iibr_core.formats.outputs import atomic_write
+
+    with atomic_write(task.place.claim) as temporary:
+        temporary.write_bytes(task.line(str(output)))
+        _sync(temporary)
+    _sync(task.place.claim.parent)
 
 
 def _open(task: PhotoTask, require_place: Callable[[Scene], None]) -> ExportSource:
@@ -108,9 +105,13 @@ def _settle_on_disk(output: Path) -> None:
     """Whatever happens to the power now, what was written stays, under its name."""
     inside = [Path(place, name) for place, _, names in os.walk(output) for name in names]
     for path in (*inside, output, output.parent):
-        with suppress(OSError):  # a system that syncs no folders
-            descriptor = os.open(path, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+        _sync(path)
+
+
+def _sync(path: Path) -> None:
+    with suppress(OSError):  # a system that syncs no folders
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

@@ -1,0 +1,172 @@
+"""Workers that are processes of this machine. They are reached by pipes that nobody else can open: no port, no socket,
+no folder.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from queue import SimpleQueue
+from typing import Any, TypeVar
+
+from iibr_core.types import InputError
+from viewer.app.batch.threads import set_environment, thread_variables
+from viewer.app.batch.workers import MOST_DEATHS, Workers
+
+SPAWN = multiprocessing.get_context("spawn")
+FILES_OF_WORKER = 10
+"""Pipes that a worker needs here, each with two ends."""
+FILES_ELSE = 128
+
+Result = TypeVar("Result")
+
+
+@contextmanager
+def local_workers(count: int, threads: int) -> Iterator[Workers]:
+    """So many processes, each with so many threads for one photo at a time. They are killed when the block ends.
+
+    Raises InputError where none can be started.
+    """
+    # What is left here of others stays.
+    others = set(multiprocessing.active_children())
+    _allow_files(count)
+    with set_environment(thread_variables(threads)):
+        _start_resource_tracker()
+        executor = _ProcessExecutor(count)
+        try:
+            executor.require_start()
+            yield Workers(executor, lambda: count, BrokenProcessPool)
+        finally:
+            executor.stop()
+            for process in set(multiprocessing.active_children()) - others:
+                process.kill()
+            executor.shutdown()
+
+
+class _Process:
+    """One process, and the next one where it dies: so it is known which task it died of."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._pool: ProcessPoolExecutor | None = None
+        self._is_stopped = False
+
+    def run(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        """Raises BrokenProcessPool where the process died of this again and again, and what `work` raises."""
+        for _ in range(MOST_DEATHS - 1):
+            try:
+                return self._run_once(work, *arguments)
+            except BrokenProcessPool:
+                self._pool = None
+        return self._run_once(work, *arguments)
+
+    def _run_once(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        with self._lock:
+            if self._is_stopped:
+                raise BrokenProcessPool("stopped")
+            try:
+                self._pool = self._pool or ProcessPoolExecutor(1, SPAWN, _begin_worker)
+                future = self._pool.submit(work, *arguments)
+            except BrokenProcessPool:
+                raise
+            except (OSError, RuntimeError) as error:  # too many files, processes or threads
+                raise InputError(
+                    f"no worker can be started ({getattr(error, 'strerror', '') or error}); lower --workers, or raise"
+                    " the limits of files (ulimit -n) and processes (ulimit -u)"
+                ) from error
+        return future.result()
+
+    def stop(self) -> None:
+        """Start no process any more."""
+        with self._lock:
+            self._is_stopped = True
+
+
+class _ProcessExecutor(ThreadPoolExecutor):
+    """A thread for each process waits for it. Interruptions reach the main thread alone, none while a process starts:
+    processes inherit that from the threads that start them.
+    """
+
+    def __init__(self, count: int) -> None:
+        super().__init__(count, "iibr-worker", _block_interruption)
+        self._processes = [_Process() for _ in range(count)]
+        self._idle: SimpleQueue[_Process] = SimpleQueue()
+        for process in self._processes:
+            self._idle.put(process)
+
+    def submit(self, work: Callable[..., Any], /, *arguments: Any) -> Any:  # type: ignore[override]
+        """As any executor does."""
+        return super().submit(self._run, work, *arguments)
+
+    def require_start(self) -> None:
+        """Raise InputError where a process does not start."""
+        try:
+            self.submit(os.getpid).result()
+        except BrokenProcessPool as error:
+            raise InputError(
+                "no worker can be started: it ends at once; give it more memory, files (ulimit -n) or processes"
+                " (ulimit -u)"
+            ) from error
+
+    def stop(self) -> None:
+        """Start no process any more."""
+        for process in self._processes:
+            process.stop()
+
+    def _run(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        process = self._idle.get()
+        try:
+            return process.run(work, *arguments)
+        finally:
+            self._idle.put(process)
+
+
+def _begin_worker() -> None:
+    """In a worker, before anything else. A terminal's Ctrl-C goes to every process: workers ignore it, are ended from
+    above, and say nothing.
+    """
+    from iibr_core.runtime.allocator import limit_arenas
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    limit_arenas()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+def _start_resource_tracker() -> None:
+    """Or the first worker starts it, and hears interruptions afterwards."""
+    if os.name == "posix":
+        from multiprocessing.resource_tracker import ensure_running
+
+        ensure_running()
+
+
+def _block_interruption() -> None:
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+def _allow_files(workers: int) -> None:
+    """Raise this process's own limit of open files as far as so many workers need it and the system allows."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    needed = FILES_OF_WORKER * workers + FILES_ELSE
+    most = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
