@@ -10,21 +10,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psutil
 import pytest
 
 from iibr_core.formats.images.photo import write_image
-from viewer.app.batch.cluster import ALLOWED_FAILURES, local_workers, outcomes_of, remote_workers
-from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask
-from viewer.model.state.scene import Source
-
-SETTINGS = BatchSettings("disparity", Source(""))
-DEADLY = "deadly.png"
 
 
 @pytest.fixture
@@ -39,9 +32,17 @@ def archive(tmp_path: Path) -> Path:
     return folder
 
 
+def iibr(*words: object) -> list[str]:
+    return [sys.executable, "-P", "-m", "viewer", *map(str, words)]
+
+
 def run_batch(*words: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-P", "-m", "viewer", "batch", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+    return subprocess.run(iibr("batch", *words), capture_output=True, text=True, timeout=300)
+
+
+def workers_of(run: subprocess.Popen[str]) -> list[psutil.Process]:
+    children = psutil.Process(run.pid).children()
+    return [process for process in children if "spawn_main" in " ".join(process.cmdline())]
 
 
 def test_an_archive_is_exported_once(archive: Path, tmp_path: Path) -> None:
@@ -79,8 +80,7 @@ def long_archive(archive: Path) -> Path:
 
 def started_batch(*words: object, until: Path) -> subprocess.Popen[str]:
     """One that runs, in a process group of its own, and has finished something."""
-    command = [sys.executable, "-P", "-m", "viewer", "batch", *map(str, words)]
-    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    run = subprocess.Popen(iibr("batch", *words), stderr=subprocess.PIPE, text=True, start_new_session=True)
     while run.poll() is None and not (until.is_file() and until.stat().st_size):
         time.sleep(0.01)
     return run
@@ -106,7 +106,46 @@ def test_an_interruption_is_one_line_and_the_next_run_goes_on(long_archive: Path
         os.killpg(run.pid, signal.SIGINT)  # as a terminal does, to the workers too
         _, said = run.communicate(timeout=120)
     assert (run.returncode, said) == (130, "iibr: interrupted\n")
+    assert not list(out.rglob(".*"))
     goes_on(long_archive, out, *words)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_an_interruption_while_workers_start_is_one_line(long_archive: Path, tmp_path: Path) -> None:
+    command = ("batch", long_archive, "--to", "depth", "-o", tmp_path / "out", "--workers", 2)
+    with subprocess.Popen(iibr(*command), stderr=subprocess.PIPE, text=True, start_new_session=True) as run:
+        while run.poll() is None and not workers_of(run):
+            time.sleep(0.001)
+        os.killpg(run.pid, signal.SIGINT)
+        _, said = run.communicate(timeout=120)
+    assert (run.returncode, said) == (130, "iibr: interrupted\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_workers_end_with_who_started_them(long_archive: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
+    with started_batch(*words, until=out / "manifest.jsonl") as run:
+        workers = workers_of(run)
+        run.kill()
+        run.communicate(timeout=120)
+    assert workers
+    assert not psutil.wait_procs(workers, timeout=60)[1]
+    goes_on(long_archive, out, *words)
+
+
+def test_a_worker_that_is_killed_costs_no_photo_and_nothing_listens(long_archive: Path, tmp_path: Path) -> None:
+    """Neither on a port nor on a socket of the system's."""
+    out = tmp_path / "out"
+    with started_batch(long_archive, "--to", "depth", "-o", out, "--workers", 2, until=out / "manifest.jsonl") as run:
+        workers = workers_of(run)
+        sockets = [process.net_connections(kind="all") for process in (psutil.Process(run.pid), *workers)]
+        workers[0].kill()
+        _, said = run.communicate(timeout=300)
+    assert (run.returncode, said) == (0, "")
+    assert len(workers) == 2
+    assert sockets == [[], [], []]
+    assert len(list(out.glob("*_depth.pfm"))) == 60
 
 
 @pytest.mark.skipif(os.name != "posix", reason="process groups")
@@ -124,17 +163,39 @@ def test_when_all_is_killed_nothing_finished_is_lost(long_archive: Path, tmp_pat
 
 
 @pytest.fixture
-def cluster_elsewhere(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+def tls_files(tmp_path: Path) -> list[Path]:
+    """A certificate that signed itself, which both sides show: --tls-ca, --tls-cert, --tls-key."""
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        pytest.skip("certificates are made by openssl, which is not installed")
+    cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
+    words = ["req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=iibr", "-days", "2"]
+    subprocess.run([openssl, *words, "-out", cert, "-keyout", key], check=True, capture_output=True)
+    return [cert, cert, key]
+
+
+@pytest.fixture
+def tls_options(request: pytest.FixtureRequest) -> list[str]:
+    """None, but for tests that ask for TLS."""
+    if getattr(request, "param", "") != "tls":
+        return []
+    names = ("--tls-ca", "--tls-cert", "--tls-key")
+    return [str(word) for pair in zip(names, request.getfixturevalue("tls_files")) for word in pair]
+
+
+@pytest.fixture
+def cluster_elsewhere(tmp_path: Path, tls_options: Sequence[str]) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """A scheduler with a worker, as users start them: its process and address."""
     told = tmp_path / "scheduler.json"
     dask = [sys.executable, "-P", "-m", "dask"]
+    tls = [word.replace("--tls-ca", "--tls-ca-file") for word in tls_options]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    where = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)]
-    scheduler = subprocess.Popen([*dask, "scheduler", *where], **quiet)  # type: ignore[call-overload]
+    where = ["--host", "tls://127.0.0.1" if tls else "127.0.0.1", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, "scheduler", *where, *tls, "--scheduler-file", str(told)], **quiet)  # type: ignore[call-overload]
     while scheduler.poll() is None and not (told.is_file() and told.stat().st_size):
         time.sleep(0.01)
     address = json.loads(told.read_text())["address"]
-    worker = subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard"], **quiet)  # type: ignore[call-overload]
+    worker = subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard", *tls], **quiet)  # type: ignore[call-overload]
     yield scheduler, address
     for process in (*psutil.Process(worker.pid).children(recursive=True), worker, scheduler):
         process.kill()
@@ -157,57 +218,18 @@ def test_when_the_scheduler_is_killed_it_is_one_line_and_nothing_finished_is_los
     goes_on(long_archive, out, *words, "--workers", 1)
 
 
-def deadly_or_not(task: PhotoTask) -> Outcome:
-    if task.photo == DEADLY:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return Outcome(task.photo)
-
-
-def threads_in_worker() -> int:
-    from iibr_core.runtime.tiling import THREADS
-
-    return THREADS
-
-
-@pytest.fixture(scope="module")
-def client() -> Iterator[Any]:
-    with local_workers(2, 1) as client:
-        yield client
-
-
-def task(name: str) -> PhotoTask:
-    return PhotoTask(name, name, name, SETTINGS)
-
-
-def test_workers_take_their_part_of_the_cores(client: Any) -> None:
-    assert set(client.run(threads_in_worker).values()) == {1}
-
-
-def test_photos_wait_outside_until_there_is_a_worker(client: Any) -> None:
-    taken = finished = 0
-
-    def tasks() -> Iterator[PhotoTask]:
-        nonlocal taken
-        for number in range(40):
-            taken += 1
-            assert taken - finished <= 2
-            yield task(f"{number}.png")
-
-    for _ in outcomes_of(client, tasks(), deadly_or_not):
-        finished += 1
-    assert (taken, finished) == (40, 40)
-
-
-def test_a_scheduler_elsewhere_lends_its_workers(client: Any) -> None:
-    with remote_workers(client.scheduler.address) as other:
-        outcomes = dict(outcomes_of(other, map(task, ("a.png", "b.png", "c.png")), deadly_or_not))
-    assert sorted(outcome.output for outcome in outcomes.values()) == ["a.png", "b.png", "c.png"]
-
-
-def test_a_worker_that_is_killed_costs_no_photo_and_a_deadly_photo_is_named(client: Any) -> None:
-    os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
-    names = [*(f"{number}.png" for number in range(6)), DEADLY]
-    outcomes = {task.photo: outcome for task, outcome in outcomes_of(client, map(task, names), deadly_or_not)}
-    assert sorted(outcomes) == sorted(names)
-    assert [name for name, outcome in outcomes.items() if outcome.reason] == [DEADLY]
-    assert f"killed its worker, {ALLOWED_FAILURES + 1} times" in outcomes[DEADLY].reason
+@pytest.mark.parametrize("tls_options", ["tls"], indirect=True)
+def test_a_scheduler_with_tls_lends_its_workers_to_who_has_a_certificate(
+    archive: Path, tmp_path: Path, tls_options: list[str], cluster_elsewhere: tuple[subprocess.Popen[bytes], str]
+) -> None:
+    (archive / "torn.png").unlink()
+    _, address = cluster_elsewhere
+    words = (archive, "--to", "depth", "-o", tmp_path / "out", "--scheduler", address)
+    refused = run_batch(*words)
+    (line,) = refused.stderr.splitlines()
+    assert refused.returncode == 2
+    assert "--tls-ca" in line
+    done = run_batch(*words, *tls_options)
+    assert (done.returncode, done.stdout) == (0, f"{tmp_path / 'out'}: 3 written, 0 there before, 0 failed\n"), (
+        done.stderr
+    )

@@ -45,6 +45,7 @@ def run_plain(*words: object) -> subprocess.CompletedProcess[str]:
         ("screenshot", "{photo}", "--view", "1,0", "--size", "96x64", "-o", "{dir}/picture.png"),
         ("plan", "{photo}"),
         ("models",),
+        ("batch", "{dir}", "--to", "depth", "-o", "{dir}/../depths"),
         ("train", "--help"),
         ("evaluate", "--help"),
     ],
@@ -62,7 +63,7 @@ def test_viewing_needs_no_extra(tmp_path: Path, words: tuple[object, ...]) -> No
         (("train", "--steps", 1, "--out", "{dir}/w.safetensors"), "torch; install with: pip install 'iibr[train]'"),
         (("evaluate", "{dir}", "--out", "{dir}/report"), "flip_evaluator; install with: pip install 'iibr[evaluate]'"),
         (
-            ("batch", "{dir}", "--to", "depth", "-o", "{dir}/out"),
+            ("batch", "{dir}", "--to", "depth", "-o", "{dir}/out", "--scheduler", "tcp://127.0.0.1:1"),
             "pip install 'iibr[batch]'",
         ),
         (("plan", "{photo}", "--depth-model", "depth-anything-v2-small"), "pip install 'iibr[depth]'"),

@@ -10,12 +10,13 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
+from iibr_core.formats.files import reason_of
 from iibr_core.types import InputError
 from viewer.app.batch.threads import set_environment, thread_variables
 from viewer.app.batch.workers import MOST_DEATHS, Workers
@@ -37,17 +38,27 @@ def local_workers(count: int, threads: int) -> Iterator[Workers]:
     # What is left here of others stays.
     others = set(multiprocessing.active_children())
     _allow_files(count)
+    executor = _ProcessExecutor(count)
     with set_environment(thread_variables(threads)):
-        _start_resource_tracker()
-        executor = _ProcessExecutor(count)
         try:
-            executor.require_start()
+            _require_start(executor)
             yield Workers(executor, lambda: count, BrokenProcessPool)
         finally:
             executor.stop()
             for process in set(multiprocessing.active_children()) - others:
                 process.kill()
             executor.shutdown()
+
+
+def _require_start(executor: Executor) -> None:
+    try:
+        _start_resource_tracker()
+        executor.submit(os.getpid).result()
+    except (OSError, RuntimeError) as error:  # too many files, processes or threads; or it ended at once
+        raise InputError(
+            f"no worker can be started ({getattr(error, 'strerror', '') or reason_of(error)}); lower --workers, or"
+            " raise the limits of memory, files (ulimit -n) and processes (ulimit -u)"
+        ) from error
 
 
 class _Process:
@@ -64,29 +75,27 @@ class _Process:
             try:
                 return self._run_once(work, *arguments)
             except BrokenProcessPool:
-                self._pool = None
+                self.end()
         return self._run_once(work, *arguments)
 
     def _run_once(self, work: Callable[..., Result], *arguments: Any) -> Result:
         with self._lock:
             if self._is_stopped:
                 raise BrokenProcessPool("stopped")
-            try:
-                self._pool = self._pool or ProcessPoolExecutor(1, SPAWN, _begin_worker)
-                future = self._pool.submit(work, *arguments)
-            except BrokenProcessPool:
-                raise
-            except (OSError, RuntimeError) as error:  # too many files, processes or threads
-                raise InputError(
-                    f"no worker can be started ({getattr(error, 'strerror', '') or error}); lower --workers, or raise"
-                    " the limits of files (ulimit -n) and processes (ulimit -u)"
-                ) from error
+            self._pool = self._pool or ProcessPoolExecutor(1, SPAWN, _begin_worker)
+            future = self._pool.submit(work, *arguments)
         return future.result()
 
     def stop(self) -> None:
         """Start no process any more."""
         with self._lock:
             self._is_stopped = True
+
+    def end(self) -> None:
+        """Wait for what waits for the process, which has ended."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
 
 
 class _ProcessExecutor(ThreadPoolExecutor):
@@ -105,20 +114,16 @@ class _ProcessExecutor(ThreadPoolExecutor):
         """As any executor does."""
         return super().submit(self._run, work, *arguments)
 
-    def require_start(self) -> None:
-        """Raise InputError where a process does not start."""
-        try:
-            self.submit(os.getpid).result()
-        except BrokenProcessPool as error:
-            raise InputError(
-                "no worker can be started: it ends at once; give it more memory, files (ulimit -n) or processes"
-                " (ulimit -u)"
-            ) from error
-
     def stop(self) -> None:
         """Start no process any more."""
         for process in self._processes:
             process.stop()
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """As any executor does; no threads are left of it."""
+        super().shutdown(wait, cancel_futures=cancel_futures)
+        for process in self._processes:
+            process.end()
 
     def _run(self, work: Callable[..., Result], *arguments: Any) -> Result:
         process = self._idle.get()

@@ -7,11 +7,12 @@ dies, only the photos in flight are suspected.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import AbstractContextManager
 from itertools import islice
 from typing import NamedTuple
 
+from iibr_core.formats.files import reason_of
 from iibr_core.types import InputError
 from viewer.app.batch.task import Outcome, PhotoTask
 from viewer.app.batch.work import export_photo
@@ -80,9 +81,9 @@ def _outcome(future: Future[Outcome], death: type[BaseException]) -> Outcome:
         # A scheduler elsewhere counts in its own way.
         deaths = 1 + getattr(error, "allowed_failures", MOST_DEATHS - 1)
         return Outcome(reason=f"killed its worker, {deaths} times: too little memory, or a fault")
-    except (Exception, CancelledError) as error:
+    except Exception as error:  # CancelledError is one
         raise _lost(error) from error
 
 
-def _lost(error: BaseException) -> InputError:
-    return InputError(f"the workers were lost ({type(error).__name__}); give the same command again, and it continues")
+def _lost(error: Exception) -> InputError:
+    return InputError(f"the workers were lost ({reason_of(error)}); give the same command again, and it continues")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,8 @@ import pytest
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.app.batch.archive import ArchivePhoto
-from viewer.app.batch.ledger import FAILURES, MANIFEST, Ledger, require_batch_place
-from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask, key_of
+from viewer.app.batch.ledger import FAILURES, MANIFEST, MOST_LINE_BYTES, Ledger, require_batch_place
+from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask, Place, key_of
 from viewer.model.state.scene import Source
 
 SETTINGS = BatchSettings("disparity", Source(""))
@@ -20,7 +21,8 @@ SETTINGS = BatchSettings("disparity", Source(""))
 def finish(ledger: Ledger, name: str, key: str) -> None:
     output = ledger.folder / name
     output.touch()
-    ledger.add_finished(PhotoTask(f"/photos/{name}", str(output), key, SETTINGS), Outcome(str(output)))
+    task = PhotoTask(f"/photos/{name}", Place(str(ledger.folder), name), key, SETTINGS)
+    ledger.add_finished(task, Outcome(str(output)))
 
 
 def test_what_is_finished_is_known_afterwards(tmp_path: Path) -> None:
@@ -38,7 +40,21 @@ def test_what_is_finished_is_known_afterwards(tmp_path: Path) -> None:
         assert not ledger.has("b.pfm", "3")
 
 
-@pytest.mark.parametrize("left", [b'{"name": "b.pfm", "out', b"\xff\xff", b"[]\n7\n", b"\0" * 100])
+DAMAGE = {
+    "torn": b'{"name": "b.pfm", "out',
+    "one byte": b"{",
+    "no text": b"\xff\xff",
+    "no entries": b'[]\n7\n"a"\nnull\n',
+    "zeros": b"\0" * 100,
+    "deep": b"[" * 100_000,
+    "deep and ended": b'{"a":' * 100_000 + b"\n",
+    "huge": b'{"name": "a.pfm", "output": "a.pfm", "key": "' + b"9" * 2 * MOST_LINE_BYTES + b'"}\n',
+    "huge and torn": b"x" * MOST_LINE_BYTES,
+    "a huge number": b'{"name": ' + b"9" * 5000 + b"}\n",
+}
+
+
+@pytest.mark.parametrize("left", DAMAGE.values(), ids=DAMAGE.keys())
 def test_what_a_power_cut_leaves_costs_only_its_line(tmp_path: Path, left: bytes) -> None:
     with Ledger(tmp_path) as ledger:
         finish(ledger, "a.pfm", "1")
@@ -50,6 +66,48 @@ def test_what_a_power_cut_leaves_costs_only_its_line(tmp_path: Path, left: bytes
     with Ledger(tmp_path) as ledger:
         assert ledger.has("a.pfm", "1")
         assert ledger.has("b.pfm", "2")
+
+
+@pytest.mark.parametrize(("left", "ended"), [(b"", b""), (b"[]\n", b"[]\n"), (b"[]", b"[]\n"), (b"\n[", b"\n[\n")])
+def test_only_a_torn_last_line_is_ended(tmp_path: Path, left: bytes, ended: bytes) -> None:
+    for before, after in ((left, ended), (b"first line\n" + left, b"first line\n" + ended)):
+        (tmp_path / MANIFEST).write_bytes(before)
+        with Ledger(tmp_path):
+            pass
+        assert (tmp_path / MANIFEST).read_bytes() == after
+
+
+def test_the_longest_line_that_a_batch_writes_is_read(tmp_path: Path) -> None:
+    name = "\udcff" * 4096  # six bytes each
+    place, photo = Place(str(tmp_path), name), "/" + name
+    line = PhotoTask(photo, place, "k" * 64, SETTINGS).line(str(tmp_path / name), photo=photo, key="k" * 64)
+    (tmp_path / MANIFEST).write_bytes(line)
+    with Ledger(tmp_path) as ledger:
+        assert ledger.place_of(name).own_output == name
+
+
+@pytest.mark.parametrize("name", [MANIFEST, FAILURES])
+@pytest.mark.parametrize("make", ["symbolic link", "link to nothing", "hard link", "pipe", "folder"])
+def test_what_is_no_file_of_its_own_is_refused_and_not_written(tmp_path: Path, name: str, make: str) -> None:
+    out, photo = tmp_path / "out", tmp_path / "photo.png"
+    out.mkdir()
+    photo.write_bytes(b"pixels")
+    path = out / name
+    if make == "symbolic link":
+        path.symlink_to(photo)
+    elif make == "link to nothing":
+        path.symlink_to(tmp_path / "new")
+    elif make == "hard link":
+        path.hardlink_to(photo)
+    elif make == "pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    for may_replace in (False, True):
+        with pytest.raises(InputError, match=name):
+            Ledger(out, may_replace)
+    assert photo.read_bytes() == b"pixels"
+    assert not (tmp_path / "new").exists()
 
 
 def test_failures_are_those_of_the_last_run(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight
 from iibr_core.types import GridShape
-from viewer.app.batch.task import BatchSettings, PhotoTask
+from viewer.app.batch.task import BatchSettings, PhotoTask, Place
 from viewer.app.batch.work import export_photo
 from viewer.model.state.scene import Source
 
@@ -26,7 +26,7 @@ def test_gloss_is_in_what_is_made_of_views_and_in_what_is_drawn(
     for gloss in (None, GLOSS):
         settings = replace(BatchSettings(kind, Source("", grid=GridShape(3, 3))), gloss=gloss)
         out = tmp_path / str(gloss is None) / target
-        said = export_photo(PhotoTask(str(photo_path), str(out), "", settings))
+        said = export_photo(PhotoTask(str(photo_path), Place(str(out.parent), out.name), "", settings))
         assert not said.reason
         made = Path(said.output)
         files = sorted(made.glob("input_Cam*.png")) if made.is_dir() else [made]
