@@ -40,7 +40,7 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     is_typing = state.prompt is not None and not isinstance(state.prompt, str)
     shows_photo = state.shown_generation == state.generation
     commands = [BY_NAME[name] for name in keys.commands]
-    commands = [c for c in commands if shows_photo or not (c.awaits_photo and c.name in keys.repeats)]
+    commands = [c for c in commands if shows_photo or not (c.when_held == "awaits photo" and c.name in keys.repeats)]
     actions += [command.action(state) for command in commands if not is_typing or command.chords[0].ctrl]
     if any(keys.arrows) and not is_typing:
         eye = state.optics.eye
@@ -100,8 +100,8 @@ def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys
 
     def strikes(command: Command) -> int:
         """Of its keys in this frame: a long frame holds several of those that are held."""
-        chords = [chord for chord in command.chords if is_struck(chord)]
-        if not chords or not command.is_held:
+        chords = [chord for chord in command.chords if is_struck(chord, command.when_held != "once")]
+        if not chords or command.when_held != "paced":
             return len(chords[:1])
         key = getattr(imgui.Key, chords[0].key)
         return imgui.get_key_pressed_amount(key, io.key_repeat_delay, io.key_repeat_rate)

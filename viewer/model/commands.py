@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import PurePath
+from typing import Literal
 
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from viewer.model.actions import (
@@ -111,18 +112,20 @@ class Chord:
         return "Ctrl+" * self.ctrl + "Shift+" * self.shift + key
 
 
+WhenHeld = Literal["once", "repeats", "paced", "awaits photo"]
+"""What a command does while its key stays down: no more; the same again; the same, as often in a second however long a
+frame takes; the same, once the photo asked for before is shown.
+"""
+
+
 @dataclass(frozen=True)
 class Command:
-    """One thing that can be done. action: of the state in which it was asked for. is_held: it goes on while its keys
-    are held, as often in a second however long a frame takes. awaits_photo: it goes on then when the photo asked for
-    before is shown.
-    """
+    """One thing that can be done. action: of the state in which it was asked for."""
 
     name: str
     action: Callable[[AppState], Action]
     chords: tuple[Chord, ...] = ()
-    is_held: bool = False
-    awaits_photo: bool = False
+    when_held: WhenHeld = "once"
 
 
 def _always(action: Action) -> Callable[[AppState], Action]:
@@ -182,28 +185,28 @@ COMMANDS: tuple[Command, ...] = (
     Command("Copy the picture", _always(DoTask(CopyTask())), (Chord("c", ctrl=True),)),
     Command("Paste a picture, or the path of one", _always(DoTask(PasteTask())), (Chord("v", ctrl=True),)),
     Command("Keep these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
-    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), awaits_photo=True),
-    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), awaits_photo=True),
+    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), when_held="awaits photo"),
+    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), when_held="awaits photo"),
     Command("Filmstrip", lambda state: ShowFilmstrip(not state.preferences.shows_filmstrip), (Chord("f"),)),
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),
     Command("Export…", _always(AskToExport()), (Chord("e", ctrl=True),)),
-    Command("Undo", _always(Undo()), (Chord("z", ctrl=True),)),
-    Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True))),
+    Command("Undo", _always(Undo()), (Chord("z", ctrl=True),), "repeats"),
+    Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), "repeats"),
     Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),
     Command("Viewpoint back to the middle", _always(ReturnHome()), (Chord("c"),)),
     *(Command(f"Preset: {name}", _always(ApplyPreset(name))) for name in PRESETS),
     *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
     Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
-    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),), True),
-    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),), True),
-    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),), True),
-    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),), True),
-    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),), True),
-    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),), True),
-    Command("Next pose", _always(StepPose(1)), (Chord("n"),)),
-    Command("Previous pose", _always(StepPose(-1)), (Chord("n", shift=True),)),
+    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),), "paced"),
+    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),), "paced"),
+    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),), "paced"),
+    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),), "paced"),
+    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),), "paced"),
+    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),), "paced"),
+    Command("Next pose", _always(StepPose(1)), (Chord("n"),), "repeats"),
+    Command("Previous pose", _always(StepPose(-1)), (Chord("n", shift=True),), "repeats"),
     Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
     Command("Depth brush", _toggle_brush, (Chord("b"),)),
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
@@ -239,8 +242,13 @@ COMMANDS: tuple[Command, ...] = (
         "Units: a photographer's or a light field's",
         lambda s: SetUnits("photographic" if s.preferences.units == "light field" else "light field"),
     ),
-    Command("Larger text", _scale_text(FONT_STEP), (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True))),
-    Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),)),
+    Command(
+        "Larger text",
+        _scale_text(FONT_STEP),
+        (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True)),
+        "repeats",
+    ),
+    Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),), "repeats"),
     Command("Usual text size", _always(SetFontScale(1.0)), (Chord("_0", ctrl=True),)),
     Command("All commands", _toggle_palette, (Chord("p", ctrl=True),)),
     Command("Mouse and keys", _toggle_help, (Chord("f1"),)),

@@ -10,7 +10,7 @@ import pytest
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model.actions import Action, AskToSave, SetFullscreen, ShowPrompt, Undo
-from viewer.model.commands import BY_NAME
+from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
@@ -60,6 +60,14 @@ def test_a_held_key_goes_on_to_the_next_photo_once_the_one_before_is_shown() -> 
     assert actions_from_keys(held, waiting) == []
     undo = Keys(commands=("Undo",), repeats=frozenset({"Undo"}))
     assert actions_from_keys(undo, waiting) == [Undo()]
+
+
+def test_what_is_switched_is_not_switched_back_while_its_key_is_held() -> None:
+    repeating = {command.name for command in COMMANDS if command.when_held != "once"}
+    for name in ("Undo", "Redo", "Larger text", "Smaller text", "Step forward", "Next photo of the folder"):
+        assert name in repeating
+    for name in ("Before and after", "Depth brush", "Full screen", "Hide or show the panel", "All views"):
+        assert name not in repeating
 
 
 def test_arrows() -> None:

@@ -182,6 +182,22 @@ def test_ctrl_counts_where_it_was_held_when_the_key_was_pressed(viewer: Driver) 
     assert viewer.app.state.prompt is None
 
 
+def test_before_and_after_stays_while_its_key_is_held(viewer: Driver) -> None:
+    """However often the keyboard repeats it."""
+    io = imgui.get_io()
+    viewer.send("keydown", "backslash")
+    viewer.until(lambda app: app.state.shows_before)
+    end = imgui.get_time() + 2 * io.key_repeat_delay
+    while imgui.get_time() < end:
+        viewer.app.step()
+        assert viewer.app.state.shows_before
+    viewer.send("keyup", "backslash")
+    viewer.until_idle()
+    assert viewer.app.state.shows_before
+    viewer.send("key", "backslash")
+    viewer.until(lambda app: not app.state.shows_before)
+
+
 def test_the_palette_runs_what_was_typed(viewer: Driver) -> None:
     viewer.send("key", "ctrl+p")
     viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
