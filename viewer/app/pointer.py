@@ -99,7 +99,7 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
         if _grabs_divider(pointer, layout, state, frame):
             return []
         if pointer.clicks > 1:
-            return [ReturnHome()]
+            return [ReturnHome(takes_back_click=True)]
         at = pixel_at(picture, scene.size, pointer.x, pointer.y)
         picked = pick(*at)
         return [] if picked is None else [FocusOn(place_of(*at, scene), picked)]

@@ -156,6 +156,7 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "folder_order": _folder_order,
     "units": _units,
     "told_sessions": _yes_or_no,
+    "told_aperture": _yes_or_no,
 }
 
 

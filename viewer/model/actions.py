@@ -28,7 +28,9 @@ from viewer.model.zoom import SetZoom
 
 @dataclass(frozen=True)
 class ReturnHome:
-    """Glide back to the middle viewpoint; the click that began the double click no longer counts."""
+    """Glide back to the middle viewpoint. takes_back_click: by a double click, whose first click set the focus."""
+
+    takes_back_click: bool = False
 
 
 @dataclass(frozen=True)

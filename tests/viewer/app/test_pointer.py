@@ -104,7 +104,7 @@ def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
         (replace(OVER_PICTURE), []),
         (replace(OVER_PICTURE, is_down=True, drag_distance=2, step_x=2), []),
         (replace(OVER_PICTURE, is_released=True, clicks=1, drag_distance=40), []),
-        (replace(OVER_PICTURE, is_released=True, clicks=2), [ReturnHome()]),
+        (replace(OVER_PICTURE, is_released=True, clicks=2), [ReturnHome(takes_back_click=True)]),
         (replace(OVER_PICTURE, is_released=True, clicks=1, is_over_panel=True), []),
         (replace(OVER_PICTURE, is_down=True, drag_distance=40, step_x=9, is_over_panel=True), []),
         (replace(OVER_PICTURE, wheel=1.0, is_over_panel=True), []),

@@ -8,11 +8,14 @@ from pathlib import Path
 import pytest
 
 from iibr_core.types import InputError
+from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, load_preferences, store_preferences
 from viewer.model.actions import PlaceWindow, SetFontScale, SetTheme, ToggleSection
 from viewer.model.lens.limits import FONT_SCALE_LIMITS
+from viewer.model.reducers.lens import APERTURE_OPENED
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.optics import FocusOn
 from viewer.model.state.preferences import Preferences
 
 
@@ -27,6 +30,15 @@ def test_what_is_kept_comes_back(tmp_path: Path) -> None:
     assert again.preferences.open_sections == ("view", "focus", "aperture", "light", "scene")
     assert again.recent == ("/photos/ä.png", str(Path("b.png").absolute()))
     assert sorted(path.name for path in folder.iterdir()) == [PREFERENCES_FILE, RECENT_FILE]
+
+
+def test_what_was_told_once_is_not_told_by_the_next_process(tmp_path: Path) -> None:
+    told = reduce(state_with(scene_of()), FocusOn((0.0, 0.0), -1.0))
+    assert told.notices[-1].text == APERTURE_OPENED
+    store_preferences(told, tmp_path)
+    again = reduce(load_preferences(state_with(scene_of()), tmp_path), FocusOn((0.0, 0.0), -1.0))
+    assert again.optics.aperture_diameter > 0
+    assert not again.notices
 
 
 def test_nothing_kept_is_no_news(tmp_path: Path) -> None:

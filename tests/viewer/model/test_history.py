@@ -17,13 +17,26 @@ from viewer.model.actions import (
     SceneOpened,
     SetDepthStrength,
     SetLoop,
+    ShowTiltHandles,
     Tick,
     Undo,
 )
 from viewer.model.reducers.history import EDITS_KEPT
+from viewer.model.reducers.lens import APERTURE_OPENED
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import FocusOn, MoveEye, SetAperture, SetExposure, SetFocus
+from viewer.model.state.optics import (
+    ApplyPreset,
+    FocusOn,
+    MoveEye,
+    Optics,
+    ResetOptics,
+    SetAperture,
+    SetExposure,
+    SetFocus,
+    SetFocusRange,
+    SetTilt,
+)
 from viewer.model.state.scene import Source
 
 values = st.floats(0, 3)
@@ -91,7 +104,7 @@ def test_a_double_click_takes_back_the_focus_its_first_click_set() -> None:
     click = FocusOn((0.0, 0.0), -1.0)
     clicked = after(start, click, EndGesture())
     assert clicked.optics.focus_disparity == -1
-    state = after(clicked, ReturnHome(), Tick(0.0), *(Tick(0.05 * i) for i in range(1, 20)))
+    state = after(clicked, ReturnHome(takes_back_click=True), Tick(0.0), *(Tick(0.05 * i) for i in range(1, 20)))
     assert state.optics.eye == ViewOffset(0, 0)
     assert state.optics.focus_disparity == 1
     assert not state.motion.is_running
@@ -101,8 +114,41 @@ def test_a_double_click_takes_back_the_focus_its_first_click_set() -> None:
 
 def test_a_double_click_on_what_is_sharp_already_keeps_an_earlier_click() -> None:
     click = FocusOn((0.0, 0.0), -1.0)
-    state = after(state_with(scene_of()), click, EndGesture(), click, EndGesture(), ReturnHome())
+    state = after(state_with(scene_of()), click, EndGesture(), click, EndGesture(), ReturnHome(True))
     assert state.optics.focus_disparity == -1
+
+
+def test_going_home_by_its_key_keeps_what_was_clicked_before() -> None:
+    clicked = after(state_with(scene_of()), FocusOn((0.0, 0.0), -1.0), EndGesture())
+    home = after(clicked, ReturnHome())
+    assert home.optics.focus_disparity == -1
+    assert after(home, Undo(), Undo()).optics.focus_disparity == 0
+
+
+def test_a_double_click_takes_back_what_its_first_click_said_too() -> None:
+    """The aperture is closed again: that it opens by itself is still to be told."""
+    clicked = after(state_with(scene_of()), FocusOn((0.0, 0.0), -1.0), EndGesture())
+    assert clicked.preferences.told_aperture
+    assert [notice.text for notice in clicked.notices] == [APERTURE_OPENED]
+    home = after(clicked, ReturnHome(takes_back_click=True))
+    assert home.optics.aperture_diameter == 0
+    assert not home.notices
+    assert not home.preferences.told_aperture
+
+
+def test_reset_takes_all_of_the_lens_back_in_one_step() -> None:
+    edits = (SetFocus(1.0), SetAperture(2.0), SetFocusRange(0.2), ShowTiltHandles(True), SetTilt((0.5, -0.25)))
+    state = after(state_with(scene_of()), *(action for edit in edits for action in (edit, EndGesture())))
+    reset = after(state, ResetOptics())
+    assert reset.optics == Optics()
+    assert reset.tilt_handles is None
+    assert after(reset, Undo()).optics == state.optics
+
+
+def test_a_preset_without_tilt_has_no_handles() -> None:
+    state = after(state_with(scene_of()), ShowTiltHandles(True), SetTilt((0.5, 0.0)), ApplyPreset("macro"))
+    assert state.optics.focus_tilt == (0.0, 0.0)
+    assert state.tilt_handles is None
 
 
 def test_undo_after_a_loop_returns_to_where_it_began() -> None:

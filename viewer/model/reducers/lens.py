@@ -55,16 +55,16 @@ def reduce_lens(state: AppState, action: LensAction) -> AppState:
 
 
 def _note_choice(state: AppState, action: LensAction) -> AppState:
-    """Remember what the user has decided about focus and aperture."""
+    """Remember what the user has decided about focus and aperture. Where the tilt goes, its handles do too."""
     match action:
         case FocusOn() | SetFocus():
             return replace(state, has_chosen_focus=True)
         case SetAperture():
             return replace(state, has_chosen_aperture=True)
         case ApplyPreset():
-            return replace(state, has_chosen_aperture=True, has_chosen_focus=False)
+            return replace(state, has_chosen_aperture=True, has_chosen_focus=False, tilt_handles=None)
         case ResetOptics():
-            return replace(state, has_chosen_aperture=False, has_chosen_focus=False)
+            return replace(state, has_chosen_aperture=False, has_chosen_focus=False, tilt_handles=None)
     return state
 
 
@@ -73,8 +73,22 @@ def _open_for_focus(state: AppState, scene: Scene) -> AppState:
     widest = aperture_limit(scene.grid)
     if state.has_chosen_aperture or state.optics.aperture_diameter > 0 or widest == 0:
         return state
-    opened = replace(state, optics=replace(state.optics, aperture_diameter=FIRST_APERTURE * widest), told_aperture=True)
-    return opened if state.told_aperture else add_notice(opened, Notice(APERTURE_OPENED))
+    opened = replace(state, optics=replace(state.optics, aperture_diameter=FIRST_APERTURE * widest))
+    if state.preferences.told_aperture:
+        return opened
+    return add_notice(_tell_aperture(opened, True), Notice(APERTURE_OPENED))
+
+
+def take_back_opening(state: AppState) -> AppState:
+    """Where the click that opened the aperture no longer counts, what it said is still to be said."""
+    notices = tuple(notice for notice in state.notices if notice.text != APERTURE_OPENED)
+    if notices == state.notices or state.optics.aperture_diameter > 0:
+        return state
+    return replace(_tell_aperture(state, False), notices=notices)
+
+
+def _tell_aperture(state: AppState, is_told: bool) -> AppState:
+    return replace(state, preferences=replace(state.preferences, told_aperture=is_told))
 
 
 def _edit_optics(state: AppState, scene: Scene, action: LensAction) -> Optics:

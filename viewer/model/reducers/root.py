@@ -68,7 +68,7 @@ from viewer.model.reducers.folder import list_folder, photo_after, scroll_filmst
 from viewer.model.reducers.free_camera import reduce_free_camera
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
-from viewer.model.reducers.lens import reduce_lens
+from viewer.model.reducers.lens import reduce_lens, take_back_opening
 from viewer.model.reducers.notices import add_notice
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
@@ -265,8 +265,8 @@ def _reduce_motion(state: AppState, action: MotionAction) -> AppState:
     if scene is None:
         return state
     match action:
-        case ReturnHome():
-            state = replace(_without_click(state), free_camera=None)
+        case ReturnHome(takes_back_click):
+            state = replace(_without_click(state) if takes_back_click else state, free_camera=None)
             gliding = replace(state, motion=glide_home(motion, state.optics))
             return record_edit(state, gliding, "ReturnHome", always=True)
         case SetLoop(kind):
@@ -288,7 +288,8 @@ def _without_click(state: AppState) -> AppState:
     history = state.history
     if history.last != "FocusOn" or not history.past:
         return state
-    return replace(state, optics=history.past[-1].optics, history=replace(history, past=history.past[:-1], last=""))
+    before = replace(state, optics=history.past[-1].optics, history=replace(history, past=history.past[:-1], last=""))
+    return take_back_opening(before)
 
 
 def _set_depth_strength(state: AppState, action: SetDepthStrength) -> AppState:

@@ -82,8 +82,8 @@ class AppState:
     free_progress: how much is done of what its views are made of, None when that is there.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
     file has them. saving, exporting: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this
-    scene what is sharp, and how wide the aperture is; told_aperture: that it opens by itself, once. has_dialogs:
-    whether the system has file dialogs. left_field: None where the open scene was left unfinished, or not at all.
+    scene what is sharp, and how wide the aperture is. has_dialogs: whether the system has file dialogs. left_field:
+    None where the open scene was left unfinished, or not at all.
     shown_generation: whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a
     number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
     of it, perhaps of the one before. is_fullscreen,
@@ -125,7 +125,6 @@ class AppState:
     downloading: Downloading | None = None
     has_chosen_focus: bool = False
     has_chosen_aperture: bool = False
-    told_aperture: bool = False
     has_dialogs: bool = False
     left_field: FinishedField | None = None
     shown_generation: int = 0

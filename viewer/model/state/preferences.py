@@ -18,7 +18,8 @@ SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "gloss", 
 @dataclass(frozen=True)
 class Preferences:
     """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
-    whether it filled the screen then. told_sessions: that depth edits are kept.
+    whether it filled the screen then. told_sessions: that depth edits are kept; told_aperture: that
+    focusing opens the aperture. Each is told once.
     """
 
     theme: Theme = "dark"
@@ -30,3 +31,4 @@ class Preferences:
     folder_order: FolderOrder = "name"
     units: Units = "photographic"
     told_sessions: bool = False
+    told_aperture: bool = False
