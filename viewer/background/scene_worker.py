@@ -11,12 +11,15 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
@@ -178,7 +181,18 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         color_space=loaded.photo.color_space,
         own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
         infinity_px=(infinity_of(loaded.disparity) - plan.disparity_zero) * plan.disparity_scale,
+        found_span_px=_found_span_px(loaded, plan),
     )
+
+
+def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:
+    """Of the field disparity before edits, which make_plan keeps at its scale."""
+    if loaded.depth_settings.edits == UNEDITED:
+        far, near = plan.disparity_range_px
+        return near - far
+    found = loaded.refined.values
+    span = float(np.ptp(found)) if plan.given_range is None else measure_relief(found).range
+    return span * abs(plan.disparity_scale)
 
 
 def _known_focal_px(photo: Photo) -> float | None:

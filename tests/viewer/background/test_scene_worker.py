@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanford, write_stereo_pair
@@ -29,7 +30,12 @@ from viewer.background.scene_worker import (
     results_of,
     sketch_of,
 )
-from viewer.model.state.optics import CENTRE
+from viewer.model.actions import OpenPath, SceneOpened
+from viewer.model.lens.photographic_units import equivalent_f_number
+from viewer.model.reducers.root import reduce
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_editing import DepthSettings
+from viewer.model.state.optics import CENTRE, SetAperture
 from viewer.model.state.scene import Progress, Source
 
 DEADLINE_S = 120.0
@@ -179,6 +185,23 @@ def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
     ready = next(results_of(SceneRequest(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
+
+
+def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> None:
+    """The views are others, the aperture is carried over to them: its f-number stays."""
+    source, loaded, stops, state = Source(str(photo_path)), None, [], AppState()
+    state = reduce(state, OpenPath(source))
+    for count in (0, 1, 4):
+        strokes = tuple(Stroke("nearer", ((0.5, 0.5), (0.6, 0.5)), 0.1, 1.0) for _ in range(count))
+        state = replace(state, generation=count + 1, depth=DepthSettings(1.0, DepthEdits(strokes=strokes)))
+        request = SceneRequest(count + 1, source, loaded=loaded, depth_settings=state.depth)
+        ready = next(results_of(request, lambda: False, lambda: CENTRE))
+        assert isinstance(ready, SceneReady)
+        state, loaded = reduce(state, SceneOpened(count + 1, replace(ready.scene, source=source))), ready.loaded
+        state = state if count else reduce(state, SetAperture(1.0))
+        stops.append(equivalent_f_number(ready.scene, state.optics.aperture_diameter))
+    assert ready.scene.found_span_px < 0.5 * np.ptp(ready.scene.disparity_range_px)
+    assert stops == pytest.approx([stops[0]] * 3)
 
 
 def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:

@@ -55,10 +55,11 @@ def f_number(scene: Scene, aperture_diameter: float) -> float | None:
 def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
     """The f-number of a full-frame lens that blurs alike, where `f_number` is not known; None for a pinhole.
 
-    It is a portrait lens, focused at `ASSUMED_DISTANCE_M` on the nearest surface, with the farthest one at infinity.
+    It is a portrait lens, focused at `ASSUMED_DISTANCE_M` on the nearest surface, with the farthest one at infinity:
+    those that were found, for painted depth is no other lens.
     """
     far, near = scene.disparity_range_px
-    blur_px = aperture_diameter * (near - far)
+    blur_px = aperture_diameter * (near - far if scene.found_span_px is None else scene.found_span_px)
     if not blur_px > 0:
         return None
     return EQUIVALENT_FOCAL_M**2 / ASSUMED_DISTANCE_M * scene.width / FULL_FRAME_WIDTH_M / blur_px

@@ -70,7 +70,8 @@ class Scene:
     over the disparity as given, None where distances are not known in metres. color_space: of its views. own_size: of
     the photo in its file, which a view may be smaller than; None for light fields. given_grid: of the views that are in
     a light field's files; None for photos. infinity_px: a photo's field disparity of what is infinitely far, as far as
-    it is known. is_sketch: it is shown in small while it is read.
+    it is known. is_sketch: it is shown in small while it is read. found_span_px: from the farthest to the nearest field
+    disparity before any of it was edited, None where it cannot be edited.
     """
 
     source: Source
@@ -96,6 +97,7 @@ class Scene:
     is_sketch: bool = False
     infinity_px: float = 0.0
     given_grid: GridShape | None = None
+    found_span_px: float | None = None
 
     @property
     def size(self) -> ScreenSize:
