@@ -74,8 +74,11 @@ class DepthCanvas:
 
     def before_strokes(self, edits: DepthEdits) -> FloatImage:
         """The map without the strokes of these edits: what stays as it is where the brush does not go."""
+        if edits.tone == UNEDITED and self._is_known:
+            return self._given
         self.apply(edits)
-        return self._given if self._toned is None else self._toned
+        assert self._toned is not None
+        return self._toned
 
     def _forget(self, edits: DepthEdits) -> None:
         assert self._toned is not None

@@ -259,6 +259,8 @@ def test_the_map_before_strokes_is_not_painted() -> None:
     photo, disparity = plain_photo(), plane()
     canvas = DepthCanvas(photo, disparity)
     np.testing.assert_array_equal(canvas.before_strokes(DepthEdits(strokes=(dab(),))), disparity)
+    canvas.apply(DepthEdits(gamma=2.0))
+    np.testing.assert_array_equal(canvas.before_strokes(DepthEdits()), disparity)
     assert canvas.apply(UNEDITED) is disparity
 
 
