@@ -37,13 +37,6 @@ def _find_crumbs(values, step, first, last, crumbs):
     together = np.empty((MOST_PX + 9, 2), np.int64)
     for y in range(first, last):
         for x in range(width):
-            # Most pixels have enough neighbours.
-            fellows = -1
-            for v in range(max(y - 1, 0), min(y + 2, height)):
-                for u in range(max(x - 1, 0), min(x + 2, width)):
-                    fellows += abs(values[v, u] - values[y, x]) <= step
-            if fellows >= MOST_PX:
-                continue
             # A flood that ends as soon as it is too large.
             together[0, 0], together[0, 1], count, looked_at = y, x, 1, 0
             while looked_at < count <= MOST_PX:

@@ -135,6 +135,36 @@ def test_a_notch_at_the_frame_does_not_go_on():
     np.testing.assert_array_equal(np.flatnonzero(found[-1] == 0) - MARGINS.left, [20, 21])
 
 
+@pytest.mark.parametrize("width", [NOTCH_PX, NOTCH_PX + 1])
+def test_what_is_wider_than_a_notch_goes_on_without_an_outline(width):
+    disparity = np.ones((20, 30), np.float32)
+    disparity[-2:, 12 : 12 + width] = 0.0
+    found = surfaces_of(disparity, follow_surfaces(disparity, MARGINS, 0.5), MARGINS)
+    assert (found[-1] == 0).sum() == (width if width > NOTCH_PX else 0)
+
+
+def test_what_is_narrow_does_not_go_on_by_one_outline_alone():
+    """A gap whose left side runs far into the photo, and whose right side ends with what stands there."""
+    disparity = np.ones((20, 30), np.float32)
+    disparity[-2:, 15:] = 2.0
+    disparity[-12:, 12:15] = 0.0
+    _, weights = _trace_outlines(np.ascontiguousarray(disparity[::-1][: TRACED_PX + 1]), 0.5)
+    assert (weights[11] > 0, weights[14] > 0) == (True, False)
+    found = surfaces_of(disparity, follow_surfaces(disparity, MARGINS, 0.5), MARGINS)
+    assert set(found[-1]) == {1.0, 2.0}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_blocks_against_the_definition(seed):
+    """Many outlines, of which some meet, some end, some are notches, and some lie beside a corner."""
+    rng = np.random.default_rng(seed)
+    disparity = np.kron(rng.integers(0, 4, (7, 9)), np.ones((4, 3))) + rng.uniform(0, 0.1, (28, 27))
+    disparity[rng.random((28, 27)) < 0.02] += 1
+    disparity = disparity.astype(np.float32)
+    found = surfaces_of(disparity, follow_surfaces(disparity, MARGINS, 0.5), MARGINS)
+    np.testing.assert_array_equal(found, follow_slowly(disparity, MARGINS, 0.5).astype(np.float32))
+
+
 def test_a_map_without_steps_goes_on_straight():
     disparity = np.add.outer(np.arange(12.0), np.arange(20.0)).astype(np.float32)
     found = surfaces_of(disparity, follow_surfaces(disparity, MARGINS, 2.0), MARGINS)

@@ -17,10 +17,10 @@ def weave():
     return (checks[..., None] * np.float32([0, 1, 1])).astype(np.float32)
 
 
-def disocclusion():
+def disocclusion(front=12.0):
     """(colors, disparity, hole, photo_disparity, offset): a red square has left a hole in a checked wall."""
     disparity, photo_disparity = np.zeros(SIZE, np.float32), np.zeros(SIZE, np.float32)
-    disparity[15:45, 38:50], photo_disparity[15:45, 50:62] = 12.0, 12.0
+    disparity[15:45, 38:50], photo_disparity[15:45, 50:62] = front, front
     hole = np.zeros(SIZE, bool)
     hole[HOLE] = True
     colors = np.where(disparity[..., None] > 0, np.float32([1, 0, 0]), weave()).astype(np.float32)
@@ -32,8 +32,9 @@ def fineness(colors):
     return np.abs(np.diff(colors[HOLE][..., 1], axis=1)).mean()
 
 
-def test_a_hole_gets_the_texture_of_what_lies_around_and_nothing_of_what_is_in_front():
-    scene, plain = disocclusion(), disocclusion()
+@pytest.mark.parametrize("front", [12.0, 3.0])
+def test_a_hole_gets_the_texture_of_what_lies_around_and_nothing_of_what_is_in_front(front):
+    scene, plain = disocclusion(front), disocclusion(front)
     fill_patches(*scene)
     fill_background(*plain)
     truth = fineness(weave())
@@ -41,6 +42,21 @@ def test_a_hole_gets_the_texture_of_what_lies_around_and_nothing_of_what_is_in_f
     assert 0.5 * truth < fineness(scene[0]) < 1.2 * truth
     assert scene[0][HOLE][..., 0].max() == 0
     np.testing.assert_array_equal(scene[1], plain[1])
+
+
+def test_pixels_of_the_view_tell_what_is_in_front():
+    """Half the disparity, seen from twice as far, is the same picture."""
+    (colors, disparity, hole, photo_disparity, offset), farther = disocclusion(3.0), disocclusion(3.0)[0]
+    fill_patches(farther, disparity / 2, hole, photo_disparity / 2, ViewOffset(0.0, 2.0))
+    fill_patches(colors, disparity, hole, photo_disparity, offset)
+    np.testing.assert_array_equal(farther, colors)
+
+
+def test_nothing_gets_darker_than_black():
+    scene = disocclusion()
+    scene[0][:] = np.where(scene[0] > 0.4, np.float32(1), np.float32(0))
+    fill_patches(*scene)
+    assert scene[0].min() == 0
 
 
 def test_a_line_that_ends_at_the_frame_s_hole_goes_on_into_it():
@@ -85,6 +101,61 @@ def test_matches_are_whole_never_in_front_and_as_good_as_they_say():
         squares = [((colors[y + j, x + k] - colors[v + j, u + k]) ** 2).sum() for j, k in taps]
         weights = [patch.HOLE_WEIGHT if hole[y + j, x + k] else 1.0 for j, k in taps]
         assert said == pytest.approx(np.average(squares, weights=weights), rel=1e-4, abs=1e-7)
+
+
+def searched(known_error, filled_error):
+    """Which of two patches is found for one whose left part is known and whose larger right part was filled; errors:
+    of the first and the second patch against either part.
+    """
+    colors, hole = np.zeros((9, 40, 3), np.float32), np.zeros((9, 40), bool)
+    target, patches = (4, 5), ((4, 15), (4, 25))
+    hole[:, 5:9] = True
+    nearest = np.full(hole.shape, np.inf, np.float32)
+    for (y, x), of_known, of_filled in zip(patches, known_error, filled_error):
+        colors[:, x - RADIUS_PX : x], colors[:, x : x + RADIUS_PX + 1] = of_known, of_filled
+        nearest[y, x] = 0.0
+    pixels = np.array([target, (target[0], target[1] + 1)]) @ [40, 1]
+    number = np.full(hole.shape, -1, np.int32)
+    number.ravel()[pixels] = 0, 1
+    # Its own is the first, its neighbour's the second.
+    before = np.array([patches[0], (patches[1][0], patches[1][1] + 1)], np.int32)
+    match, cost = np.full((2, 2), -1, np.int32), np.empty(2, np.float32)
+    disparity = np.zeros(hole.shape, np.float32)
+    patch._search(colors, disparity, hole, nearest, np.float32(2.0), number, pixels, 0, 1, 0, before, match, cost)
+    return patches.index(tuple(map(int, match[0])))
+
+
+@pytest.mark.parametrize("known_first", [True, False])
+def test_what_is_known_counts_more_than_what_was_filled_which_counts_too(known_first):
+    order = slice(None, None, 1 if known_first else -1)
+    assert searched((0.0, 0.1)[order], (0.1, 0.0)[order]) == (0 if known_first else 1)
+    assert searched((0.1, 0.1), (0.0, 0.1)[order]) == (0 if known_first else 1)
+
+
+def test_of_what_patches_change_the_mean_around_is_left_out():
+    """Slow and plain: what each hole pixel would change, less the mean over the hole pixels of the patch around it."""
+    hole = np.random.default_rng(0).random((14, 18)) < 0.7
+    targets = np.flatnonzero(hole | (np.random.default_rng(1).random(hole.shape) < 0.5))[:-9]
+    number = np.full(hole.shape, -1, np.int32)
+    number.ravel()[targets] = np.arange(len(targets))
+    change = np.random.default_rng(2).normal(0, 1, (len(targets), 3)).astype(np.float32)
+    tempered = np.full_like(change, np.nan)
+    patch._temper(hole, number, targets, change, 0, len(targets), tempered)
+    counted = hole & (number >= 0)
+    for i, (y, x) in enumerate(zip(*np.unravel_index(targets, hole.shape))):
+        around = np.s_[max(y - RADIUS_PX, 0) : y + RADIUS_PX + 1, max(x - RADIUS_PX, 0) : x + RADIUS_PX + 1]
+        fine = change[i] - change[number[around][counted[around]]].mean(axis=0) if hole[y, x] else np.nan
+        np.testing.assert_allclose(tempered[i], np.broadcast_to(fine, 3), atol=1e-5)
+
+
+def test_cracks_are_left_as_they_were_filled():
+    colors, disparity, hole, photo_disparity, offset = disocclusion()
+    hole[:] = False
+    hole[15:45, 50:52] = True
+    plain = colors.copy(), disparity.copy()
+    fill_patches(colors, disparity, hole, photo_disparity, offset)
+    fill_background(*plain, hole, photo_disparity, offset)
+    np.testing.assert_array_equal(colors, plain[0])
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 40), (5, 6), (7, 7), (40, 3)])

@@ -146,6 +146,13 @@ def test_on_a_slope_nothing_is_split(fall, is_split):
     assert (split_mixed_pixels(colors, disparity, edge_step=0.5)[3][4, 5] > 0) == is_split
 
 
+def test_an_edge_that_resampling_has_made_a_ramp_is_not_split():
+    """Twice as large, with values between both surfaces': such a pixel falls away half as far as it rises."""
+    colors, disparity = edge_photo(0.5)
+    disparity[:, 4:8] = 0.0, 0.5, 1.5, 2.0
+    assert split_mixed_pixels(colors, disparity, edge_step=0.3)[3][4, 5] == 0
+
+
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2), (4, 4)])
 def test_tiny_photos(size):
     own, *_, coverage = split_mixed_pixels(np.ones((*size, 3), np.float32), np.ones(size, np.float32), 0.5)

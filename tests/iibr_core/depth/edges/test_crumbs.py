@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.edges.crumbs import MOST_PX, fill_crumbs
+from iibr_core.depth.edges.crumbs import MOST_PX, MOST_SHARE, fill_crumbs
 from iibr_core.runtime.tiling import Cancelled, never
 
 WALL, NEAR, STEP = 1.0, 9.0, 0.5
@@ -56,6 +56,28 @@ def test_thin_things_are_none(way):
     for k in range(MOST_PX + 1):
         values[10 + k * way[0], 30 + k * way[1]] = NEAR
     np.testing.assert_array_equal(fill_crumbs(GREY, values, STEP, never), values)
+
+
+def test_as_many_as_count_as_a_crumb_go():
+    values = wall()
+    values[10, 30 : 30 + MOST_PX] = NEAR
+    np.testing.assert_array_equal(fill_crumbs(GREY, values, STEP, never), wall())
+
+
+def test_pixels_that_differ_by_the_very_step_hang_together():
+    values = wall()
+    values[10, 30:34] = NEAR, NEAR + STEP, NEAR, NEAR + STEP
+    np.testing.assert_array_equal(fill_crumbs(GREY, values, STEP, never), values)
+
+
+@pytest.mark.parametrize("is_more", [False, True])
+def test_a_map_of_which_more_is_crumbs_is_noise(is_more):
+    values = wall()
+    lone = np.zeros(values.shape, np.bool_)
+    lone[::2, ::2] = True
+    places = np.flatnonzero(lone)[: round(MOST_SHARE * values.size) + is_more]
+    values.ravel()[places] = NEAR
+    np.testing.assert_array_equal(fill_crumbs(GREY, values, STEP, never), values if is_more else wall())
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 3), (2, 9), (40, 60)])

@@ -66,6 +66,16 @@ def test_rims_that_waver_more_than_insides_are_smoothed():
     np.testing.assert_array_equal(steadied[~rim], given[~rim])
 
 
+def test_what_goes_is_the_share_of_the_variance_that_insides_do_not_have():
+    """Noise twice as strong beside edges has four times the variance: three quarters of every deviation go."""
+    off = np.random.default_rng(2).normal(0, 0.1, 400).astype(np.float32)
+    unknown = np.float32([np.nan, np.nan])
+    assert rim_noise._noise_share(np.append(2 * off, unknown), np.append(unknown, off)) == pytest.approx(0.75)
+    assert rim_noise._noise_share(off, 2 * off) == 0
+    assert rim_noise._noise_share(2 * off, off[: rim_noise.LEAST_SAMPLES - 1]) == 0
+    assert rim_noise._noise_share(2 * off, off[: rim_noise.LEAST_SAMPLES]) > 0
+
+
 def test_maps_that_waver_as_much_everywhere_stay():
     values, front, _ = disc()
     given = values + np.random.default_rng(5).normal(0, 0.08, SIZE).astype(np.float32)

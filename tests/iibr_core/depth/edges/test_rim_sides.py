@@ -118,6 +118,24 @@ def test_sides_are_those_of_the_slow_field_and_of_the_truth():
     assert (np.abs(chosen - truth) > 1).sum() <= 2
 
 
+def test_a_pass_of_the_field_is_the_slow_one():
+    """Beliefs, sides and drives at random: every neighbour's vote counts, for whichever surface, straight or not."""
+    photo, given, _, _ = shifted_square()
+    rng = np.random.default_rng(7)
+    values = rng.choice(np.float32([FAR, 3.0, NEAR]), given.shape)
+    other = np.where(rng.random(given.shape) < 0.6, rng.choice(np.float32([FAR, 3.0, NEAR]), given.shape), values)
+    drive, believed = rng.normal(0, 1, given.shape), rng.random(given.shape)
+    pixels = np.flatnonzero(other != values)
+    believed = np.where(other != values, believed, 1)
+    number = np.full(given.shape, -1, np.int32)
+    number.ravel()[pixels] = np.arange(len(pixels))
+    belief = np.empty(len(pixels), np.float32)
+    others, drives, beliefs = (np.float32(each.ravel()[pixels]) for each in (other, drive, believed))
+    rim_sides._believe(photo, values, pixels, number, others, drives, 0.2, beliefs, belief, 0)
+    expected = slow_pass(photo, values, other, drive, 0.2, believed)
+    np.testing.assert_allclose(belief, expected.ravel()[pixels], atol=1e-5)
+
+
 def test_colours_that_contradict_the_map_inside_surfaces_change_nothing():
     photo, _, unknown, truth = shifted_square()
     shaded = np.roll(np.roll(photo, 3, axis=1), 3, axis=0)
