@@ -200,7 +200,7 @@ def _looked_at(photo: Camera, target: Camera, depths: tuple[float, float]) -> tu
         beyond = np.array([width, height]) * MOST_BEYOND
         before = along > 0
         inside = before & (at > -beyond).all(axis=1) & (at < beyond + np.array([width, height])).all(axis=1)
-        shown.append(np.clip(at[before], -beyond, beyond + np.array([width, height])))
+        shown.append(at[before])
         crossed.append(crossing[inside])
     places = np.concatenate(shown)
     if not ((places > -0.5) & (places < np.array([width, height]) - 0.5)).all(axis=1).any():
@@ -213,7 +213,7 @@ def _margins(size: ImageSize, places: Points) -> Margins:
     (left, top), (right, bottom) = -0.5 - places.min(axis=0), 0.5 + places.max(axis=0) - (size.width, size.height)
 
     def margin(reach: float, length: int) -> int:
-        return min(ceil(reach) + AROUND_PX, ceil(MOST_BEYOND * length)) if reach > LEAST_BEYOND_PX else 0
+        return ceil(min(reach + AROUND_PX, MOST_BEYOND * length)) if reach > LEAST_BEYOND_PX else 0
 
     return Margins(
         margin(top, size.height), margin(bottom, size.height), margin(left, size.width), margin(right, size.width)

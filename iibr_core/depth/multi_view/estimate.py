@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
+from iibr_core.depth.multi_view.agreement import find_confirmed
 from iibr_core.depth.multi_view.gradient_refinement import refine_by_gradients
 from iibr_core.depth.multi_view.matching import MatchingViews, choose_views, luma_of, matching_views, sweep
 from iibr_core.depth.multi_view.semi_global import choose_disparity
@@ -48,8 +49,6 @@ AFTER_STEPS = 12
 LEAST_SIDE_PX = 8
 FEW_VIEWS = 4
 """So few match by chance in many places: their maps are checked against each other."""
-AGREE_STEPS = 2.0
-"""By so many steps of a sweep the disparities of a place may differ, seen from two views."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,14 +174,8 @@ def _agrees(
     turned = MatchingViews(views.textures[order], views.offsets[order] - views.offsets[other], views.textures[other])
     seen, _ = choose_disparity(sweep(turned, disparities, should_stop), turned.luma, disparities, should_stop)
     seen = _median(seen, should_stop)
-    y, x = np.indices(values.shape)
-    t, s = views.offsets[other]
-    row, column = np.rint(y - values * t).astype(int), np.rint(x - values * s).astype(int)
-    height, width = values.shape
-    is_inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    there = seen[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
-    agrees: NDArray[np.bool_] = is_inside & (np.abs(there - values) <= AGREE_STEPS * (disparities[1] - disparities[0]))
-    return agrees
+    offsets = [ViewOffset(float(t), float(s)) for t, s in views.offsets[[0, other]]]
+    return find_confirmed([values, seen], offsets, 0, should_stop)
 
 
 def _fill_unseen(

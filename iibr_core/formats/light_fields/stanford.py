@@ -124,7 +124,7 @@ def _slope(x: np.ndarray, y: np.ndarray) -> float:
     """Of the line through (x, y), each (N,); 0 where all x are equal."""
     centred = x - x.mean()
     spread = float((centred**2).sum())
-    return float((centred * (y - y.mean())).sum() / spread) if spread > 0 else 0.0
+    return float((centred * y).sum() / spread) if spread > 0 else 0.0
 
 
 def _focal_px(folder: Path, name: re.Match[str], view: KnownView) -> float:

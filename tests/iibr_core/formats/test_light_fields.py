@@ -226,6 +226,26 @@ def test_columns_of_stanford_go_where_the_camera_went(tmp_path: Path) -> None:
     assert any("stand up to 0.10 view steps off" in note for note in scene.notes)
 
 
+@pytest.mark.parametrize(("rows", "columns", "step"), [(3, 3, 20.0), (3, 1, 45.0), (1, 3, 20.0)])
+def test_a_step_of_stanford_is_from_column_to_column_of_one_column_from_row_to_row(
+    tmp_path: Path, rows: int, columns: int, step: float
+) -> None:
+    """Rows may stand farther apart; that is no stray."""
+    places = {at: (300 + 45.0 * at[0], -700 + 20.0 * at[1]) for at in np.ndindex(rows, columns)}
+    names = {
+        f"out_{row:02d}_{column:02d}_{y}_{x}.png": ViewOffset(y / step, x / step)
+        for (row, column), (y, x) in places.items()
+    }
+    scene = read_scene(write_numbered(tmp_path / "wide", names))
+    assert scene is not None
+    assert scene.grid == GridShape(rows, columns)
+    found = {view.path.stem[:9]: view.offset for view in scene.views}
+    for (row, column), (y, x) in places.items():
+        offset, first = found[f"out_{row:02d}_{column:02d}"], found["out_00_00"]
+        assert (offset.t - first.t, offset.s - first.s) == pytest.approx(((y - 300) / step, (x + 700) / step))
+    assert "Viewpoints from the names." in scene.notes
+
+
 def write_rendered(folder: Path, config: str = "", focal_mm: float = 50.0) -> Path:
     """As light-field-renderer's exporter for Blender has it: rows upwards, columns to the left, v written as -v."""
     step = 20.0

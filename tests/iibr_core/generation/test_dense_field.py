@@ -57,22 +57,43 @@ def test_a_view_is_the_mean_of_what_the_views_around_show_by_nearness_and_covera
     scene = random_scene(np.random.default_rng(13), SIZE, 2.0)
     sparse = drawn_views(SPARSE, scene)
     given = [GivenView(*at, colors, 2 * disparity) for at, (colors, disparity) in sparse.items()]
-    made = by_index(list(densify(given, SPARSE, DENSE)))[1, 3]
+    made = by_index(list(densify(given, SPARSE, GridShape(7, 7))))[1, 4]
     total, weights = np.zeros((*SIZE, 3)), np.zeros(SIZE)
+    heaviest, shown = np.zeros(SIZE), np.zeros(SIZE)
     with ViewSynthesis() as synthesis:
         for (row, column), (colors, disparity) in sparse.items():
-            away = ViewOffset(1.0 - 2 * row, 3.0 - 2 * column)
-            if max(abs(away.t), abs(away.s)) > 2:
+            away = ViewOffset(1.0 - 3 * row, 4.0 - 3 * column)
+            if max(abs(away.t), abs(away.s)) > 3:
                 continue
-            view, covered = synthesis.render_seen(rays_of_photo(encoded_from_stored(colors), disparity, 2, 0), away)
+            rays = rays_of_photo(encoded_from_stored(colors), 2 * disparity / np.float32(3), 3, 0)
+            view, covered = synthesis.render_seen(rays, away)
             for y, x in np.ndindex(*SIZE):
                 if not view.occluded[y, x]:
-                    near = (1 - abs(away.t) / 2) * (1 - abs(away.s) / 2) + BESIDE_WEIGHT
-                    total[y, x] += near * covered[y, x] ** 2 * view.colors[y, x]
-                    weights[y, x] += near * covered[y, x] ** 2
+                    near = (1 - abs(away.t) / 3) * (1 - abs(away.s) / 3) + BESIDE_WEIGHT
+                    weight = near * covered[y, x] ** 2
+                    total[y, x] += weight * view.colors[y, x]
+                    weights[y, x] += weight
+                    if weight > heaviest[y, x]:
+                        heaviest[y, x], shown[y, x] = weight, view.disparity[y, x]
     seen = weights > 0
     assert (seen == ~made.inpainted).all()
     assert np.abs(made.colors[seen] / 255 - np.clip(total[seen] / weights[seen][:, None], 0, 1)).max() < 0.6 / 255
+    np.testing.assert_allclose(made.disparity[seen], shown[seen], atol=1e-5)
+
+
+def test_what_only_views_a_whole_step_away_see_is_not_inpainted():
+    """A slit in a panel that hides what lies behind it from views beside; those below see some of it, past its end."""
+    wall, given = bytes_from_encoded(smooth_texture(48, 80)), []
+    for row, column in np.ndindex(2, 2):
+        y, x = np.mgrid[:48, :80]
+        panel_y, panel_x = y + 8 * row, x + 8 * (column - 0.5)
+        is_panel = (panel_x >= 20) & (panel_x < 60) & (panel_y < 40) & ~((panel_x >= 38) & (panel_x < 42))
+        colors = np.where(is_panel[..., None], np.uint8([200, 30, 30]), wall)
+        given.append(GivenView(row, column, colors, np.where(is_panel, np.float32(8), np.float32(0))))
+    between = by_index(list(densify(given, GridShape(2, 2), GridShape(3, 3))))[0, 1]
+    assert between.inpainted[10:28, 39:41].all()
+    assert not between.inpainted[34:39, 39:41].any()
+    assert np.abs(between.colors[34:39, 39:41].astype(int) - wall[34:39, 39:41]).max() < 12
 
 
 def test_what_no_given_view_shows_is_inpainted_once_and_shared():

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iibr_core.generation.free_views import FARTHEST_STEPS, MOST_BEYOND, FreeViews, inverse_depth_of, reach_of
+from iibr_core.generation.free_views import (
+    FARTHEST_STEPS,
+    MOST_BEYOND,
+    MOST_PARALLAX,
+    FreeViews,
+    inverse_depth_of,
+    reach_of,
+    steered,
+)
 from iibr_core.types import InputError
 from tests.iibr_core.rendering.test_free_view import about, camera, square_scene
 
@@ -41,6 +49,14 @@ def test_the_plane_is_looked_through_as_far_as_cameras_stand_beside():
     assert {(round(at.t, 6), round(at.s, 6)) for at in reach.outer} >= {(-2.0, 4.0), (-2.0, 0.0), (0.0, 4.0)}
 
 
+def test_a_camera_far_beside_asks_for_half_a_picture_of_parallax_at_most():
+    photo, beside = camera(40, 48), camera(40, 48, place=(0.9, 0.0, 0.0))
+    reach = reach_of(photo, [photo, beside], (1.0, 3.0))
+    # From 1 to 3 units away, a unit's move is 60 (1 - 1/3) px.
+    assert 40 * FARTHEST_STEPS * reach.step == pytest.approx(MOST_PARALLAX * 48)
+    assert max(at.s for at in reach.outer) == pytest.approx(FARTHEST_STEPS)
+
+
 def test_from_behind_it_is_looked_through_all_over():
     photo, behind = camera(40, 48), camera(40, 48, place=(0.0, 0.0, -0.5))
     reach = reach_of(photo, [behind], (1.0, 3.0))
@@ -61,6 +77,17 @@ def test_cameras_that_look_along_add_nothing():
     reach = reach_of(photo, [photo], (1.0, 3.0))
     assert reach.margins == (0, 0, 0, 0)
     assert reach.outer == ()
+
+
+@pytest.mark.parametrize(("right", "down"), [(0.6, 0.0), (-1.0, 0.0), (0.0, 0.7), (0.5, -0.8)])
+def test_a_steered_camera_looks_where_it_is_told_and_stays_level(right, down):
+    given = camera(40, 48, place=(1.0, 2.0, 3.0), turned=about(2, 20.0))
+    found = steered(given, right, down, 0.5)
+    np.testing.assert_allclose(found.position - given.position, given.world_from_camera @ (0, 0, 0.5), atol=1e-12)
+    to_right, _, ahead = (given.world_from_camera.T @ found.world_from_camera).T
+    assert to_right[1] == pytest.approx(0), "level"
+    assert ahead[0] / ahead[2] == pytest.approx(right * 24 / 60)
+    assert ahead[1] / np.hypot(ahead[0], ahead[2]) == pytest.approx(down * 20 / 60)
 
 
 @pytest.mark.parametrize(

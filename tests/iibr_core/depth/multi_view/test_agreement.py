@@ -49,3 +49,12 @@ def test_maps_that_share_nothing_stay_as_they_are():
     maps = [np.full((8, 8), value, np.float32) for value in (-900.0, 0.0, 900.0)]
     kept = reconcile([np.zeros((8, 8, 3), np.uint8)] * 3, maps, OFFSETS)
     assert all((a == b).all() for a, b in zip(kept, maps))
+
+
+def test_maps_agree_within_a_pixel_of_the_other_view():
+    """Two steps away, disparities may differ by half a pixel a step."""
+    maps = [np.full((6, 40), 1.0, np.float32), np.repeat(np.float32([1.0, 1.4, 1.6, 0.6, 0.4]), 8) * np.ones((6, 1))]
+    confirmed = find_confirmed([maps[0], maps[1].astype(np.float32)], OFFSETS[:2], 0)
+    # The first map's pixels lie two further to the left in the second.
+    expected = np.repeat([True, True, False, True, False], 8)
+    np.testing.assert_array_equal(confirmed[:, 2:], np.tile(expected, (6, 1))[:, :-2])

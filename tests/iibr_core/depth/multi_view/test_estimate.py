@@ -55,6 +55,21 @@ def test_two_views_beside_each_other_are_enough():
     assert np.quantile(error, 0.9) < 0.15
 
 
+def test_of_a_pair_what_one_view_alone_sees_takes_what_looks_like_it_around():
+    """A bright square, 8 px nearer than a dark wall: the wall to its left is hidden in the other view."""
+    rng = np.random.default_rng(8)
+    wall, square = (np.kron(rng.integers(*levels, (40, 52)), np.ones((2, 2))) for levels in ((0, 90), (160, 250)))
+    views = []
+    for at in (40, 32):
+        view = wall.copy()
+        view[20:60, at : at + 30] = square[20:60, 40:70]
+        views.append(np.repeat(view[..., None], 3, -1).astype(np.uint8))
+    pair = [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)]
+    found = estimate_disparity(views, pair, 0, (-2.0, 12.0))
+    assert np.median(np.abs(found[24:56, 32:36])) < 1.5  # 5.3 where it is matched like the rest
+    assert np.abs(found[24:56, 44:66] - 8).max() < 1
+
+
 def test_procedural_scenes_with_hidden_parts_come_out_mostly_right():
     size = ImageSize(120, 140)
     scene = random_scene(np.random.default_rng(5), size, 2.5)

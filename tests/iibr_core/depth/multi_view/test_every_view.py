@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.multi_view.estimate import estimate_coarse
-from iibr_core.depth.multi_view.every_view import estimate_all, matched_views
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.depth.multi_view.every_view import _carry, estimate_all, matched_views
+from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, ViewOffset
@@ -40,6 +40,24 @@ def test_a_carried_map_is_what_the_matched_ones_show_there():
     views = [np.roll(wall, shift, axis=1) for shift in (2, 0, -2)]
     maps = estimate_all(views, LINE, (-2.0, 3.0))
     assert np.abs(maps[1] - 1.0)[4:-4, 8:-8].max() < 0.1
+
+
+def test_what_the_nearest_views_do_not_see_is_carried_from_the_next():
+    """A slit in a panel, as wide as the panel moves: the views beside see another part of the wall, those above and
+    below, which are farther, see the same. Colours tell nothing.
+    """
+    offsets = [ViewOffset(0, 0), ViewOffset(0, -1), ViewOffset(0, 1), ViewOffset(-1.5, 0), ViewOffset(1.5, 0)]
+    maps = {}
+    for index, at in enumerate(offsets):
+        y, x = np.mgrid[:48, :64]
+        column, row = x + 4 * at.s, y + 4 * at.t  # where the panel's point stands in the first view
+        is_panel = (column >= 12) & (column < 52) & (row >= 8) & (row < 40) & ~((column >= 30) & (column < 34))
+        maps[index] = np.where(is_panel, 4.0, 0.0).astype(np.float32)
+    views = [np.full((48, 64, 3), 90, np.uint8)] * 5
+    del maps[0]
+    carried = _carry(maps, views, offsets, 0, never)
+    np.testing.assert_allclose(carried[16:32, 31:33], 0.0, atol=0.01)
+    np.testing.assert_allclose(carried[16:32, [28, 35]], 4.0, atol=0.01)
 
 
 def test_maps_that_show_nothing_of_a_view_between_are_taken_as_they_are():

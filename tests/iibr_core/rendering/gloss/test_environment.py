@@ -32,6 +32,14 @@ def test_it_is_the_mean_under_the_lobe():
         assert np.allclose(smooth[place], plain_mean(light, roughness**2, place), rtol=0.12)
 
 
+def test_upside_down_or_turned_it_is_the_same_picture():
+    light = np.random.default_rng(1).uniform(0, 4, (16, 32, 3)).astype(np.float32)
+    smooth = prefilter_environment(light, 0.6)
+    np.testing.assert_allclose(prefilter_environment(light[::-1].copy(), 0.6), smooth[::-1], rtol=1e-4)
+    np.testing.assert_allclose(prefilter_environment(light[:, ::-1].copy(), 0.6), smooth[:, ::-1], rtol=1e-4)
+    np.testing.assert_allclose(prefilter_environment(np.roll(light, 5, axis=1), 0.6), np.roll(smooth, 5, 1), rtol=1e-4)
+
+
 def test_a_mirror_sees_the_picture_itself():
     light = np.random.default_rng(0).uniform(0, 4, (32, 64, 3)).astype(np.float32)
     assert np.array_equal(prefilter_environment(light, 0.0), light)

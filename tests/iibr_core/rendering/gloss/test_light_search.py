@@ -75,6 +75,14 @@ def test_a_matt_photo_has_no_light_of_its_own(shape, seed):
     assert find_light(GLOSS, *lit(shape(), FROM_SIDE, 0.0, painted(np.random.default_rng(seed)))) is None
 
 
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_bright_blotch_of_grey_paint_is_no_light(seed):
+    """White light leaves its colour, too; but a lobe explains less than half of it."""
+    blotches = np.random.default_rng(seed).random((SIZE[0] // 20, SIZE[1] // 20)).repeat(20, 0).repeat(20, 1)
+    grey = np.repeat(0.1 + 0.5 * blotches[..., None], 3, -1)
+    assert find_light(GLOSS, *lit(flat_thing(), FROM_SIDE, 0.0, grey)) is None
+
+
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
 def test_a_photo_of_one_colour_or_a_surface_of_a_few_pixels_has_none(value):
     _, points, normals, mask = lit(round_thing(), FROM_SIDE, 0.0, np.zeros((*SIZE, 3)))

@@ -101,6 +101,19 @@ def test_a_path_of_ones_own_goes_through_its_keys(source: ExportSource, tmp_path
     assert (path[4].eye, path[4].focus_disparity, path[4].aperture_diameter) == (ViewOffset(-1, 0), 0.0, 1.5)
 
 
+def test_between_keys_the_path_is_the_spline_of_catmull_and_rom(source: ExportSource, tmp_path: Path) -> None:
+    """Half-way by its textbook's weights (-1, 9, 9, -1) / 16 of four keys; at a key it goes along its neighbours."""
+    keys = np.array([(-0.5, 0, 0.5, 1), (0.3, 0.5, -0.1, 2), (0.6, -0.4, 0.2, 1.5), (-0.2, -0.6, 0, 1)])
+    (tmp_path / "keys.txt").write_text("\n".join(" ".join(map(str, key)) for key in keys))
+    path = path_of(source, keys=tmp_path / "keys.txt", frames=400)
+    found = np.array([(o.eye.s, o.eye.t, o.focus_disparity, o.aperture_diameter) for o in path])
+    for k in range(4):
+        before, here, after, last = (keys[(k + i) % 4] for i in (-1, 0, 1, 2))
+        np.testing.assert_allclose(found[100 * k + 50], (-before + 9 * here + 9 * after - last) / 16, atol=1e-9)
+        slope = 100 * (found[100 * k + 1] - found[100 * k - 1]) / 2
+        np.testing.assert_allclose(slope, (after - before) / 2, atol=1e-3)
+
+
 @pytest.mark.parametrize("text", ["", "1", "1 2 3 4 5", "a b", "nan 0", "900 0", "0 0 500"])
 def test_keys_that_mean_nothing_are_refused(source: ExportSource, tmp_path: Path, text: str) -> None:
     keys = tmp_path / "keys.txt"

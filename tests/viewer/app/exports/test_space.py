@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,10 @@ from plyfile import PlyData
 from iibr_core.formats.cameras import FieldCameras, infinity_of
 from iibr_core.formats.light_fields.llff import read_llff
 from iibr_core.formats.maps.pfm import read_pfm
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.cameras import cameras_of
+from viewer.app.exports.points import _new
 from viewer.app.exports.source import ExportSource
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import ScreenSize
@@ -109,6 +111,34 @@ def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp
     assert depth.min() == pytest.approx(1, rel=1e-4)
     square = (colors[:, 0] - colors[:, 2]) > 0.3
     assert np.median(depth[count:]) > 1.1 * np.median(depth[:count][square[:count]]), "made up behind what is near"
+
+
+def test_what_stays_still_changes_neither_distances_nor_places(source: ExportSource) -> None:
+    straight = cameras_of(source)
+    for zero in (-0.7, 0.0, 0.4):
+        cameras = cameras_of(replace(source, scene=replace(source.scene, plan=source.plan(zero))))
+        assert cameras.at_infinity - straight.at_infinity == pytest.approx(
+            (source.plan().disparity_zero - zero) * source.plan().disparity_scale
+        )
+        assert cameras.depth_range == pytest.approx(straight.depth_range)
+        assert cameras.step == pytest.approx(straight.step)
+
+
+def test_what_several_views_had_made_up_in_one_place_is_taken_once() -> None:
+    cameras, seen = FieldCameras(GRID, SIZE, 80.0, (0.0, 6.0), -1.0), set()
+
+    def made_up(row: int, column: int, disparity: float) -> np.ndarray:
+        """What is new of a block of the centre view, 6 x 10, as another view shows it."""
+        t, s = GRID.offset(row, column)
+        top, left = 20 - round(disparity * t), 30 - round(disparity * s)
+        inpainted = np.zeros(SIZE, np.bool_)
+        inpainted[top : top + 6, left : left + 10] = True
+        view = ViewUpdate(row, column, np.zeros((*SIZE, 3), np.uint8), np.full(SIZE, disparity, np.float32), inpainted)
+        return _new(view, cameras, seen)
+
+    assert made_up(0, 0, 3.0).sum() == 60
+    assert made_up(2, 2, 3.0).sum() == made_up(0, 2, 3.0).sum() == 0
+    assert made_up(2, 0, 4.0).sum() == 60, "another surface"
 
 
 def test_point_cloud(source: ExportSource, tmp_path: Path) -> None:
