@@ -269,6 +269,18 @@ def test_missing_odd_and_damaged_views_are_named(tmp_path):
         read_light_field(folder)
 
 
+def test_of_numbers_without_parameters_gaps_are_missing_views_unless_most_are_gaps(tmp_path):
+    for name in ("few", "gap"):
+        (tmp_path / name).mkdir()
+    for number in (0, 2, 4, 6):
+        write_image(tmp_path / "few" / f"input_Cam{10 * number:03d}.png", np.zeros((6, 9, 3), np.uint8))
+    assert read_light_field(tmp_path / "few")[0].grid == GridShape(2, 2)
+    for number in (0, 1, 3, 4):
+        write_image(tmp_path / "gap" / f"input_Cam{number:03d}.png", np.zeros((6, 9, 3), np.uint8))
+    with pytest.raises(InputError, match=r"input_Cam002\.png: this view is missing"):
+        read_light_field(tmp_path / "gap")
+
+
 @pytest.mark.parametrize("count", ["0", "-3", "1000000000", "4"])
 def test_parameters_that_do_not_fit(tmp_path, count):
     write(tmp_path / "lf", updates())

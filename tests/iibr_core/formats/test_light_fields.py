@@ -87,6 +87,32 @@ def test_views_of_no_grid_are_refused_by_saying_what_reads_them(tmp_path: Path) 
         assert "\n" not in str(caught.value)
 
 
+def test_llff_counts_in_steps_between_neighbours_across_the_viewing_direction(tmp_path: Path) -> None:
+    """Half a unit apart and some of them nearer; bounds are depths, so disparity is focal length x step / depth."""
+    folder = tmp_path / "fern"
+    write_numbered(folder / "images", {f"IMG_{n}.png": ViewOffset(0, n) for n in range(3)}, (HEIGHT, WIDTH))
+    down, right, back = np.eye(3)[[1, 0, 2]] * [[1], [1], [-1]]
+    places = [(-0.5, 0.0, 0.3), (0.0, 0.0, 0.0), (0.0, 0.5, 0.1)]
+    poses = [np.column_stack([down, right, back, place, [HEIGHT, WIDTH, 50]]).ravel() for place in places]
+    np.save(folder / "poses_bounds.npy", np.array([[*pose, 5.0, 40.0] for pose in poses]))
+    scene = open_light_field(folder)
+    found = [(view.offset.t, view.offset.s) for view in scene.views]
+    np.testing.assert_allclose(found, [(0, -1), (0, 0), (1, 0)], atol=1e-12)
+    assert scene.range_px == pytest.approx((50 * 0.5 / 40, 50 * 0.5 / 5))
+    assert scene.focal_px == 50
+    assert any("up to 0.6 view steps before or behind" in note for note in scene.notes)
+
+
+def test_where_stanford_s_positions_tell_nothing_rows_go_upwards(tmp_path: Path) -> None:
+    names = {f"out_{row:02d}_{column:02d}_0_0.png": ViewOffset(-row, column) for row, column in np.ndindex(2, 3)}
+    scene = open_light_field(write_numbered(tmp_path / "lego", names))
+    assert {view.path.stem[:9]: view.place for view in scene.views}["out_01_02"] == (0, 2)
+    steps = {view.path.stem[:9]: view.offset for view in scene.views}
+    first, last = steps["out_00_00"], steps["out_01_02"]
+    assert (last.t - first.t, last.s - first.s) == (-1, 2)
+    assert any("positions are not told" in note for note in scene.notes)
+
+
 def test_a_folder_that_no_reader_knows(tmp_path: Path) -> None:
     assert find_light_field(tmp_path) is None
     with pytest.raises(InputError, match=r"holds no light field; laid out as HCI, Stanford"):

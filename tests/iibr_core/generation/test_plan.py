@@ -159,6 +159,8 @@ def test_less_memory_gives_fewer_views():
     needed = whole_bytes(300 * 800, roomy.field_bytes, roomy.peak_bytes, keeps_views=True)
     tight = plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=needed - roomy.field_bytes // 2))
     assert tight.grid.columns < roomy.grid.columns
+    assert plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=needed)).grid == roomy.grid, "just enough"
+    assert plan_for_viewing(photo, disparity, PlanOverrides(memory_bytes=needed - 1)).grid.columns < roomy.grid.columns
 
 
 @pytest.mark.parametrize(

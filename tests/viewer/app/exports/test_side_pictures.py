@@ -57,6 +57,15 @@ def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
     assert places[0.0] == pytest.approx(2 * near * 3, abs=0.8), "else it moves by its disparity, times the scale"
 
 
+def test_parts_that_are_held_still_are_as_wide_as_may_be(source: ExportSource) -> None:
+    """The first and the last reach the picture's two borders."""
+    both = RenderSettings(Optics(focus_disparity=1.5), ScreenSize(96, 64))
+    parts = [eye.part for eye in side_pictures(source.scene, both, 3, 2.0)]
+    assert max(part.left + part.width for part in parts) == pytest.approx(1)
+    assert min(part.left for part in parts) == pytest.approx(0)
+    assert all((part.top, part.height) == (0, 1) for part in parts)
+
+
 def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:
     with pytest.raises(InputError, match="too much to be held still"):
         side_pictures(source.scene, RenderSettings(Optics(focus_disparity=30.0), ScreenSize(96, 64)), 2, 2.0)

@@ -14,11 +14,12 @@ from plyfile import PlyData
 
 from iibr_core.formats.cameras import FieldCameras, infinity_of
 from iibr_core.formats.light_fields.llff import read_llff
+from iibr_core.formats.light_fields.registry import open_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
 from tests.viewer.app.exports.conftest import exported
 from viewer.app.exports.cameras import cameras_of
-from viewer.app.exports.points import _new
+from viewer.app.exports.points import SAME_DISPARITY_PX, _new, scene_points
 from viewer.app.exports.source import ExportSource
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import ScreenSize
@@ -141,6 +142,21 @@ def test_what_several_views_had_made_up_in_one_place_is_taken_once() -> None:
     assert made_up(2, 0, 4.0).sum() == 60, "another surface"
 
 
+def test_points_are_the_centre_view_s_and_what_the_corner_views_had_made_up(source: ExportSource) -> None:
+    """Every place that was made up is taken once: seen from where the photo was taken, and as far away."""
+    found, places = 0, set()
+    for view in source.views():
+        if view.row == view.column == 1:
+            found += view.disparity.size
+        elif (view.row, view.column) in ((0, 0), (0, 2), (2, 0), (2, 2)):
+            t, s = GRID.offset(view.row, view.column)
+            for y, x in np.argwhere(view.inpainted):
+                d = view.disparity[y, x]
+                places.add((round(x + d * s), round(y + d * t), round(d / SAME_DISPARITY_PX)))
+    assert len(places) > 100
+    assert len(scene_points(source)[0]) == pytest.approx(found + len(places), abs=3), "rounding"
+
+
 def test_point_cloud(source: ExportSource, tmp_path: Path) -> None:
     cloud = PlyData.read(str(exported(source, "point-cloud", tmp_path / "a.ply")))["vertex"]
     splats = PlyData.read(str(exported(source, "splats", tmp_path / "b.ply")))["vertex"]
@@ -213,6 +229,17 @@ def test_a_picture_with_its_depth_beside_it(
     assert np.abs(pixels[picture].astype(int) - source.draw(RenderSettings(Optics(), ScreenSize(96, 64)))).max() <= 1
     assert (pixels[depth].min(), pixels[depth].max()) == (0, 255)
     assert pixels[depth][32, 48, 0] == 255, "the square in the middle is near"
+    low, high = source.scene.disparity_range_px
+    expected = 255 * (source.centre_view().disparity - low) / (high - low)
+    assert np.abs(pixels[depth] - expected[..., None]).max() <= 0.51
+
+
+def test_a_light_field_is_written_with_its_focal_length(source: ExportSource, tmp_path: Path) -> None:
+    scene = open_light_field(exported(source, "hci", tmp_path / "field"))
+    assert source.loaded is not None
+    assert scene.focal_px == pytest.approx(source.loaded.photo.focal_px)
+    assert scene.range_px is not None
+    assert scene.range_px == pytest.approx(source.scene.disparity_range_px, abs=0.2)
 
 
 def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:

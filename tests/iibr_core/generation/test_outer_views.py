@@ -1,0 +1,58 @@
+"""Which views complete a ray set, and how far beyond the frame they see."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iibr_core.generation.outer_views import (
+    AROUND_PX,
+    MOST_MARGIN,
+    farthest_views,
+    margins_beyond_frame,
+    outer_views,
+    outer_views_of_grid,
+)
+from iibr_core.types import GridShape, ViewOffset
+
+UPPER_LEFT, LOWER_RIGHT = ViewOffset(-2.0, -1.0), ViewOffset(1.0, 3.0)
+
+
+def test_corners_come_first_opposite_ones_in_pairs_then_the_middles_of_sides():
+    found = outer_views([ViewOffset(0.5, -1.0), UPPER_LEFT, ViewOffset(0.0, 2.0), LOWER_RIGHT])
+    corners = [(-2, -1), (1, 3), (-2, 3), (1, -1)]
+    assert found == [*corners, (0, -1), (0, 3), (-2, 0), (1, 0)]
+    assert farthest_views(found) == 3
+    assert farthest_views([]) == farthest_views([ViewOffset(0.0, -0.5)]) == 1
+
+
+def test_the_photo_s_own_view_is_none_and_none_comes_twice():
+    assert outer_views([ViewOffset(0.0, 2.0)]) == [(0, 2)]
+    assert outer_views([]) == []
+    assert outer_views_of_grid(GridShape(1, 5)) == [(0, -2), (0, 2)]
+    assert outer_views_of_grid(GridShape(3, 5)) == outer_views(GridShape(3, 5).offset(*at) for at in np.ndindex(3, 5))
+
+
+@pytest.mark.parametrize("disparity", [1.5, -1.5])
+def test_margins_are_what_views_see_beyond_the_frame(disparity):
+    """The view at (t, s) shows at y what the photo would show at y + d t."""
+    margins = margins_beyond_frame(np.full((80, 90), disparity, np.float32), [UPPER_LEFT, LOWER_RIGHT])
+    far = {"top": 3.0, "bottom": 1.5, "left": 1.5, "right": 4.5}
+    if disparity < 0:
+        far = {"top": 1.5, "bottom": 3.0, "left": 4.5, "right": 1.5}
+    assert margins._asdict() == {side: int(np.ceil(reach)) + AROUND_PX for side, reach in far.items()}
+
+
+def test_each_side_s_own_disparity_counts_and_nothing_where_no_view_looks_out():
+    disparity = np.zeros((40, 400), np.float32)
+    disparity[:, -1] = 2.0
+    assert margins_beyond_frame(disparity, [UPPER_LEFT, LOWER_RIGHT]) == (0, 0, 0, 6 + AROUND_PX)
+    assert margins_beyond_frame(disparity, [ViewOffset(0.0, -3.0)]) == (0, 0, 0, 0)
+
+
+def test_margins_are_bounded_and_wild_pixels_do_not_count():
+    wide = margins_beyond_frame(np.full((80, 120), 50.0, np.float32), [UPPER_LEFT, LOWER_RIGHT])
+    assert wide == (MOST_MARGIN * 80, MOST_MARGIN * 80, MOST_MARGIN * 120, MOST_MARGIN * 120)
+    disparity = np.zeros((400, 400), np.float32)
+    disparity[0, :3] = 9.0
+    assert margins_beyond_frame(disparity, [UPPER_LEFT, LOWER_RIGHT]).top == 0
