@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from plyfile import PlyData
 
-from iibr_core.formats.cameras import FieldCameras, infinity_of
+from iibr_core.formats.cameras import FieldCameras
 from iibr_core.formats.light_fields.llff import read_llff
 from iibr_core.formats.light_fields.registry import open_light_field
 from iibr_core.formats.maps.pfm import read_pfm
@@ -166,38 +166,6 @@ def test_point_cloud(source: ExportSource, tmp_path: Path) -> None:
     shown = source.draw(RenderSettings(Optics(), ScreenSize(96, 64))).reshape(-1, 3).astype(int)
     colors = np.column_stack([cloud[name] for name in ("red", "green", "blue")]).astype(int)
     assert np.abs(colors[: len(shown)] - shown).max() <= 1
-
-
-def test_points_of_a_view_land_where_they_are_seen() -> None:
-    """For a field whose still plane is at a finite distance, as they mostly are."""
-    cameras = FieldCameras(GRID, SIZE, 80.0, (-1.5, 2.5), -2.0)
-    rng = np.random.default_rng(0)
-    disparity = rng.uniform(-1.5, 2.5, SIZE).astype(np.float32)
-    points = cameras.points(disparity, ViewOffset(0, 0)).astype(float)
-    y, x = np.indices(SIZE)
-    for offset in (ViewOffset(1, -2), ViewOffset(0.5, 3)):
-        moved = points - cameras.place(offset)
-        cx, cy = cameras.principal_point(offset)
-        np.testing.assert_allclose(80 * moved[..., 0] / moved[..., 2] + cx - 0.5, x - disparity * offset.s, atol=1e-3)
-        np.testing.assert_allclose(80 * moved[..., 1] / moved[..., 2] + cy - 0.5, y - disparity * offset.t, atol=1e-3)
-    assert cameras.depth(disparity).min() >= 1
-    assert cameras.depth_range == (1.0, pytest.approx(9.0))
-
-
-@pytest.mark.parametrize(("low", "high"), [(1.0, 5.0), (-3.0, 3.0), (0.001, 9.0), (2.0, 2.0), (-2.0, -2.0)])
-def test_infinity_lies_beyond_all(low: float, high: float) -> None:
-    infinity = infinity_of(low, high)
-    assert infinity < low
-    assert (high - infinity) / (low - infinity) <= 20.001
-    if low == 1.0:
-        assert infinity == 0
-
-
-@pytest.mark.parametrize("numbers", [(np.nan, 0, 1, -1), (0.0, 0, 1, -1), (80.0, 0, 1, 0), (80.0, 2, 1, 0)])
-def test_cameras_that_make_no_sense_are_refused(numbers: tuple[float, ...]) -> None:
-    focal_px, low, high, infinity = numbers
-    with pytest.raises(InputError, match="make no cameras"):
-        FieldCameras(GRID, SIZE, focal_px, (low, high), infinity)
 
 
 def test_maps(source: ExportSource, tmp_path: Path) -> None:
