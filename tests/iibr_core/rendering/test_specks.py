@@ -9,7 +9,14 @@ from scipy import ndimage
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import OWN_SURFACE_PX
-from iibr_core.rendering.specks import GAP_PX, STANDS_OUT, STANDS_OUT_TIMES, measure_detail, without_specks
+from iibr_core.rendering.specks import (
+    GAP_PX,
+    STANDS_OUT,
+    STANDS_OUT_TIMES,
+    _interpolated,
+    measure_detail,
+    without_specks,
+)
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
@@ -107,6 +114,15 @@ def test_the_photos_own_view_stays() -> None:
     rays = rays_of_photo(photo, values, 1.0, 0)
     nothing = np.zeros((20, 30), np.bool_)
     assert (without_specks(rays, ViewOffset(0.0, 0.0), photo, values, nothing) == photo).all()
+
+
+def test_detail_between_pixels_is_bilinear() -> None:
+    size = 5, 7
+    image = np.random.default_rng(0).random(size).astype(np.float32)
+    places = np.random.default_rng(1).uniform(0, 1, (50, 2)) * np.subtract(size, 1)
+    places = np.concatenate([places, [(4, 6), (4, 0), (0, 6), (0, 0), (2, 3)]])
+    expected = ndimage.map_coordinates(image.astype(float), places.T, order=1)
+    np.testing.assert_allclose([_interpolated(image, *place) for place in places.astype(float)], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2)])

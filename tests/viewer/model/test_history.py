@@ -71,6 +71,9 @@ def test_undoing_everything_and_doing_it_again_comes_back_to_the_same(wanted: li
         back = reduce(back, Redo())
         assert back.optics == optics
     assert reduce(back, Redo()).optics == state.optics
+    for optics in reversed(seen[:-1]):
+        back = reduce(back, Undo())
+        assert back.optics == optics, "what was done again is undone again"
 
 
 def test_a_drag_is_one_edit() -> None:

@@ -7,7 +7,17 @@ from scipy.ndimage import map_coordinates
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
 from iibr_core.depth.multi_view.guided_filter import GuidedFilter
-from iibr_core.depth.multi_view.matching import _match, choose_views, luma_of, matching_views, sweep
+from iibr_core.depth.multi_view.matching import (
+    COST_STEPS,
+    HIDDEN_FACTOR,
+    MOST_COST,
+    _match,
+    _store_costs,
+    choose_views,
+    luma_of,
+    matching_views,
+    sweep,
+)
 from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.training.scenes.random_scene import random_scene
@@ -127,6 +137,26 @@ def test_a_sweep_is_least_where_the_surface_is():
     values, sureness = choose_disparity(costs, matched.luma, disparities)
     assert np.abs(values[8:-8, 8:-8]).max() < 0.1
     assert sureness[8:-8, 8:-8].min() > 0.5
+
+
+def test_a_sweep_costs_nothing_where_views_are_alike_and_all_there_is_where_nothing_matches():
+    one, other = (np.random.default_rng(seed).random((24, 30)).astype(np.float32) for seed in (1, 2))
+    offsets = [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)]
+    alike, unlike = (sweep(matching_views([one, view], offsets), np.float32([0.0]))[..., 0] for view in (one, other))
+    assert alike.max() == 0
+    assert np.median(unlike) > 200
+
+
+def test_what_half_of_the_views_match_much_better_counts_as_hidden_in_the_rest():
+    """Slow and plain: the root of the whole's mean, or of the best half's where that is so many times better."""
+    parts = (1e-3 * np.random.default_rng(3).random((5, 6, 8))).astype(np.float32)
+    parts[4] = parts[:4].mean(axis=0)
+    found = np.empty((6, 8), np.uint8)
+    _store_costs(parts, np.float32(MOST_COST**2), found)
+    cost = np.minimum(parts[4], HIDDEN_FACTOR * parts[:4].min(axis=0))
+    expected = COST_STEPS * np.minimum(np.sqrt(cost / MOST_COST**2), 1)
+    assert (parts[4] < HIDDEN_FACTOR * parts[:4].min(axis=0)).any()
+    assert np.abs(found - np.floor(expected)).max() <= 1
 
 
 def test_one_disparity_leaves_no_choice():
