@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.edges.rims import settle_rims
+from iibr_core.depth.edges.rims import _find_between, settle_rims
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import Cancelled
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
@@ -79,6 +79,27 @@ def test_no_pixel_changes_sides_alone():
     given = resampled(truth)
     photo[32, 10] = RED
     assert settle(photo, given)[32, 10] == FAR
+
+
+@pytest.mark.parametrize("height", [8.2, 5.0])
+def test_a_lone_pixel_between_two_surfaces_is_none_of_them_but_the_tip_of_a_thing_is(height):
+    """Before a wall and behind what is nearer: such a thing may be thin, and ends somewhere."""
+    values = np.full((40, 40), FAR, np.float32)
+    values[:, 21:] = NEAR
+    values[10, 20] = height
+    assert np.argwhere(_find_between(values, EDGE, tiling.never)[0]).tolist() == [[10, 20]]
+    values[11, 20:22] = values[12, 19:22] = values[13:, 19:22] = height
+    found, clear = _find_between(values, EDGE, tiling.never)
+    assert found.sum() == clear == (height == 5.0)
+
+
+def test_beside_the_border_nothing_is_clearly_between():
+    """There is no room for a plateau, and the other side of the map is none."""
+    values = np.full((40, 40), FAR, np.float32)
+    values[:, :6], values[:, -1], values[10, -2] = NEAR, NEAR, 5.0
+    for turn in range(4):
+        found, clear = _find_between(np.ascontiguousarray(np.rot90(values, turn)), EDGE, tiling.never)
+        assert (found.sum(), clear) == (1, 0)
 
 
 def test_exact_maps_stay_as_they_are():

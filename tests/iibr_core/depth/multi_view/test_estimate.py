@@ -157,6 +157,9 @@ def test_what_half_of_the_views_match_much_better_counts_as_hidden_in_the_rest()
     expected = COST_STEPS * np.minimum(np.sqrt(cost / MOST_COST**2), 1)
     assert (parts[4] < HIDDEN_FACTOR * parts[:4].min(axis=0)).any()
     assert np.abs(found - np.floor(expected)).max() <= 1
+    # Where halves match alike, the whole counts.
+    _store_costs(np.full((5, 6, 8), 0.25 * MOST_COST**2, np.float32), np.float32(MOST_COST**2), found)
+    assert np.abs(found - 0.5 * COST_STEPS).max() <= 1
 
 
 def test_one_disparity_leaves_no_choice():
