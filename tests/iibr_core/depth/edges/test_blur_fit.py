@@ -129,6 +129,62 @@ def test_edges_move_where_the_misfit_falls() -> None:
     assert wrong_side(fitted[25:40], exact[25:40]) < wrong_side(ragged(exact)[25:40], exact[25:40])
 
 
+def slow_vote(photo: np.ndarray, fitted: np.ndarray, y: int, x: int, here: float, there: float) -> float:
+    """Mean colours of clean pixels of both heights, by 1 / squared distance; how far on the way between them."""
+    near = max(blur_fit.SAME_SIDE * abs(there - here), LEAST_EDGE)
+    found: tuple[list, list] = ([], [])
+    reach = range(-blur_fit.COLOR_PX, blur_fit.COLOR_PX + 1)
+    for v, u in ((y + j, x + i) for j in reach for i in reach):
+        if (v - y) ** 2 + (u - x) ** 2 <= 2 or not (1 <= v <= SIZE[0] - 2 and 1 <= u <= SIZE[1] - 2):
+            continue
+        is_clean = all(abs(fitted[v + j, u + i] - fitted[v, u]) < near for j, i in ((1, 0), (-1, 0), (0, 1), (0, -1)))
+        apart = abs(fitted[v, u] - here), abs(fitted[v, u] - there)
+        if is_clean and min(apart) < near:
+            found[0 if apart[0] < near else 1].append((1 / ((v - y) ** 2 + (u - x) ** 2), photo[v, u]))
+    if not all(found):
+        return 0.0
+    own, other = (np.average([color for _, color in side], 0, [weight for weight, _ in side]) for side in found)
+    way, color = other - own, photo[y, x] - own
+    share = color @ way / (way @ way)
+    rest = max(color @ color - share * (color @ way), 0)
+    return 2 * (np.clip(share, 0, 1) - 0.5) * (way @ way) / (way @ way + rest + blur_fit.COLOR_NOISE)
+
+
+def test_votes_and_moves_are_those_of_the_definition() -> None:
+    """Each pixel alone: of its four neighbours' heights the one that lowers misfit, outline and colours most."""
+    photo, exact = disc()
+    photo = (photo + np.random.default_rng(0).normal(0, 0.1, photo.shape)).astype(np.float32)
+    start, soft, moved = ragged(exact), blur(exact, SIGMA), 0
+    start[:5, :9] = 2.0  # a corner of the map
+    missing = np.empty(SIZE, np.float32)
+    blur_fit._find_missing(soft, start, *cells(), 0, 3, missing)
+    padded = np.pad(missing, 6)
+    beside = [(y, x) for y in range(1, 95) for x in range(1, 127) if np.ptp(start[y - 1 : y + 2, x]) > LEAST_EDGE]
+    for y, x in beside[::11]:
+        here, sums = start[y, x], np.empty((2, 4))
+        wanted = (padded[y : y + 13, x : x + 13] * full_taps()).sum()
+        best, expected = 0.0, here
+        for v, u in ((y + 1, x), (y - 1, x), (y, x + 1), (y, x - 1)):
+            there = start[v, u]
+            if abs(there - here) < LEAST_EDGE:
+                continue
+            vote = blur_fit._color_vote(photo, start, y, x, here, there, LEAST_EDGE, sums)
+            assert vote == pytest.approx(slow_vote(photo, start, y, x, here, there), abs=1e-4)
+            around, near = start[y - 1 : y + 2, x - 1 : x + 2], abs(there - here) / 2
+            fellows = np.count_nonzero(abs(around - here) < near) - np.count_nonzero(abs(around - there) < near) - 1
+            assert blur_fit._fellows(start, y, x, here, there) == fellows
+            change = 1 - 2 * wanted / ((there - here) * (full_taps() ** 2).sum())
+            change += blur_fit.OUTLINE_WEIGHT * fellows - blur_fit.COLOR_WEIGHT * vote
+            if change < best:
+                best, expected = change, there
+        fitted, settled = start.copy(), np.ones(SIZE, np.bool_)
+        settled[y, x] = False
+        blur_fit._move_edges(photo, fitted, missing.copy(), *cells(), LEAST_EDGE, y, y + 1, settled)
+        assert fitted[y, x] == expected
+        moved += expected != here
+    assert moved > 5
+
+
 def test_colours_of_clean_pixels_on_both_sides_vote() -> None:
     photo, exact = disc()
     photo[exact > 1.2], photo[exact < 1.2] = [0.8, 0.2, 0.1], [0.1, 0.3, 0.7]

@@ -144,6 +144,20 @@ def test_fronts_grow_as_the_slow_ones_do():
     np.testing.assert_array_equal(widened, slow_widen(photo, values))
 
 
+@pytest.mark.parametrize("way", [(0, 1), (0, -1), (1, 0), (-1, 0)])
+def test_the_front_is_the_nearest_pixel_that_stands_before_and_not_too_far(way):
+    for away in range(1, SOFT_PX + 4):
+        values = np.zeros((30, 30), np.float32)
+        place = 15 + away * way[0], 15 + away * way[1]
+        values[place] = 5.0
+        assert soft_outlines._nearest_front(values, 15, 15, 1.0) == (place if away <= SOFT_PX + 1 else (15, 15))
+        values[15 - way[0], 15 - way[1]] = 0.9
+        values[15 - 2 * way[0], 15 - 2 * way[1]] = 1.1
+        if away != 2:
+            nearest = place if away < 2 else (15 - 2 * way[0], 15 - 2 * way[1])
+            assert soft_outlines._nearest_front(values, 15, 15, 1.0) == nearest
+
+
 def test_a_surface_that_rises_to_its_front_beside_an_edge_has_no_outline_there():
     _, photo, values = soft_front(8)
     values[:], values[:, :30], values[:, 30] = FAR + 0.9 * STEP, FAR + 1.2 * STEP, FAR
