@@ -32,6 +32,14 @@ def test_it_is_the_mean_under_the_lobe():
         assert np.allclose(smooth[place], plain_mean(light, roughness**2, place), rtol=0.12)
 
 
+def test_a_single_light_is_seen_as_the_lobe_itself():
+    roughness, light = 0.7, np.zeros((16, 32, 3), np.float32)
+    light[5, 9] = 100.0
+    smooth = prefilter_environment(light, roughness)
+    for place in ((5, 9), (5, 12), (8, 9), (2, 20), (11, 3)):
+        assert np.allclose(smooth[place], plain_mean(light, roughness**2, place), rtol=0.02)
+
+
 def test_upside_down_or_turned_it_is_the_same_picture():
     light = np.random.default_rng(1).uniform(0, 4, (16, 32, 3)).astype(np.float32)
     smooth = prefilter_environment(light, 0.6)

@@ -1,0 +1,117 @@
+"""One pixel's way from a blurred edge to a step, piece by piece, on profiles that are known."""
+
+from math import erf, erfc, sqrt
+
+import numpy as np
+import pytest
+
+from iibr_core.depth.edges import refine
+from iibr_core.depth.edges.ridges import SHARES
+
+Y, X = np.mgrid[:21, :61].astype(np.float32)
+GREY = np.full((21, 61, 3), 0.5, np.float32)
+
+
+def blurred_step(at, sigma, height=2.0, slope=0.0):
+    """From 1 to 1 + height across a column, on a slant, blurred by a Gaussian."""
+    share = np.array([0.5 * (1 + erf((x - at) / (sqrt(2) * sigma))) for x in range(61)])
+    return np.tile(1 + height * share + slope * np.arange(61), (21, 1)).astype(np.float32)
+
+
+def test_a_plateau_s_own_slope_goes_on_part_of_the_way():
+    plane = 1 + 0.02 * X
+    level = plane[10, 40]
+    found = refine._continue_plateau(plane, 30, 10, 1.0, 0.0, 10.0, level, 1.0)
+    assert found == pytest.approx(level - refine.EXTENSION * 10 * 0.02, abs=1e-5)
+    assert refine._continue_plateau(plane, 30, 10, 1.0, 0.0, 10.0, level, 0.01) == pytest.approx(
+        level - refine.EXTENSION * 10 * 0.01, abs=1e-5
+    )
+    assert refine._continue_plateau(-plane, 30, 10, 1.0, 0.0, 10.0, -level, 0.01) == pytest.approx(
+        -level + refine.EXTENSION * 10 * 0.01, abs=1e-5
+    )
+
+
+def test_beyond_the_blur_a_surface_bends_faster():
+    plane = 1 + 0.02 * X
+    found = refine._beyond_blur(plane, 30, 10, 1.0, 0.0, 6.0, 2.0, 1.0)
+    assert found == pytest.approx(plane[10, 36] - refine.BEND * 6 * 0.02, abs=1e-5)
+    found = refine._beyond_blur(plane, 30, 10, 1.0, 0.0, 6.0, 2.0, 0.005)
+    assert found == pytest.approx(plane[10, 36] - refine.BEND * 6 * 0.005, abs=1e-5)
+
+
+@pytest.mark.parametrize("sigma", [1.0, 3.0])
+def test_a_tail_is_what_a_gaussian_leaves_there(sigma):
+    assert refine._tail(2 * sigma, sigma) == pytest.approx(0.5 * erfc(sqrt(2)))
+    assert refine._tail(0.0, sigma) == refine.MOST_TAIL < 0.5
+
+
+def test_a_colour_lies_between_those_of_both_surfaces():
+    photo = GREY.copy()
+    photo[:, 30:], photo[:, :30] = (0.9, 0.5, 0.3), (0.1, 0.2, 0.4)
+    vote = lambda: refine._foreground_colour(photo, 30, 10, 1.0, 0.0, 4.0, 4.0)  # noqa: E731
+    assert vote() == pytest.approx(0.5, abs=0.01)
+    photo[10, 30] = photo[10, 10]
+    assert vote() == pytest.approx(-0.5, abs=0.01)
+    photo[10, 30] = 0.75 * photo[10, 50] + 0.25 * photo[10, 10]
+    assert vote() == pytest.approx(0.25, abs=0.01)
+    assert refine._foreground_colour(GREY, 30, 10, 1.0, 0.0, 4.0, 4.0) == 0
+    # Off the line between both it tells the less.
+    photo[10, 30] = 0.75 * photo[10, 50] + 0.25 * photo[10, 10] + np.float32([-0.4, 0.9, 0.0])
+    assert 0 < vote() < 0.15
+
+
+def test_flat_is_what_differs_on_no_side():
+    for place in ((10, 27), (10, 33), (7, 30), (13, 30)):
+        values = np.zeros((21, 61), np.float32)
+        values[place] = 0.5
+        assert not refine._is_flat(values, 30, 10, 3, 0.5)
+        assert refine._is_flat(values, 30, 10, 3, 0.51)
+        assert refine._is_flat(values, 30, 10, 2, 0.1)
+
+
+@pytest.mark.parametrize("apart", [1, 2])
+@pytest.mark.parametrize("form", [(0.03, 0.01, 0.0), (-0.01, -0.05, 0.02), (0.0, 0.02, 0.03), (0.02, -0.04, -0.01)])
+def test_curvature_is_the_larger_eigenvalue_of_the_second_derivatives(form, apart):
+    xx, yy, xy = form
+    values = (0.5 * xx * (X - 30) ** 2 + 0.5 * yy * (Y - 10) ** 2 + xy * (X - 30) * (Y - 10) + 0.1 * X).astype(
+        np.float32
+    )
+    bend, across, down = refine._curvature(values, 30, 10, apart)
+    sizes, ways = np.linalg.eigh([[xx, xy], [xy, yy]])
+    mean = xx + yy
+    expected = np.argmax(sizes) if mean >= 0 else np.argmin(sizes)
+    assert bend == pytest.approx(sizes[expected], abs=1e-5)
+    assert abs(np.dot(ways[:, expected], (across, down))) == pytest.approx(1, abs=1e-3)
+    assert refine._curvature(np.zeros((21, 61), np.float32), 30, 10, apart) == (0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("sigma", [1.5, 3.0])
+@pytest.mark.parametrize("at", [30.0, 30.25, 30.5, 30.75])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_blurred_step_becomes_the_step_it_was(sigma, at, turned):
+    values, across = blurred_step(at, sigma), 1.0
+    if turned:
+        values, across, at = np.ascontiguousarray(values[:, ::-1]), -1.0, 60 - at
+    shares, taps = np.empty(SHARES), np.empty(SHARES)
+    for x in range(round(at - 2 * sigma), round(at + 2 * sigma) + 1):
+        found = refine._as_step(values, GREY, x, 10, across, 0.0, sigma, 0.2, 1e-3, shares, taps)
+        if abs(x - at) > 0.3:
+            assert found == pytest.approx(3.0 if (x - at) * across > 0 else 1.0, abs=0.06)
+
+
+def test_half_way_a_ramp_is_steeper_about_its_middle():
+    values, shares, taps = blurred_step(30.0, 2.0), np.empty(SHARES), np.empty(SHARES)
+    found = [refine._as_step(values, GREY, x, 10, 1.0, 0.0, 2.0, 0.2, 0.5, shares, taps) for x in range(26, 35)]
+    assert found == sorted(found)
+    assert found[4] == pytest.approx(2.0, abs=0.06)
+    assert found[5] - found[3] == pytest.approx(2 * (values[10, 31] - values[10, 29]), rel=0.15)
+
+
+def test_what_is_lower_than_an_edge_or_rises_like_a_slant_stays():
+    shares, taps = np.empty(SHARES), np.empty(SHARES)
+    low, slant = blurred_step(30.0, 2.0, height=0.19), blurred_step(30.0, 2.0, height=0.0, slope=0.2)
+    for values in (low, slant):
+        assert refine._as_step(values, GREY, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3, shares, taps) == values[10, 31]
+    # Three times as wide as this blur makes a step.
+    wide = blurred_step(30.0, 6.0)
+    assert refine._as_step(wide, GREY, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3, shares, taps) == wide[10, 31]
