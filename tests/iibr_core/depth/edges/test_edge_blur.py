@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iibr_core.depth.edges.edge_blur import measure_edge_blur
+from iibr_core.depth.edges import edge_blur
+from iibr_core.depth.edges.edge_blur import EdgeBlur, extent, measure_edge_blur
 from iibr_core.training.degradation import blur
+from iibr_core.types import ImageSize
 from tests.iibr_core.scenes import smooth_texture
 
 
@@ -59,3 +61,84 @@ def test_a_wire_alone_tells_the_blur(sigma: float) -> None:
     photo, disparity = smooth_texture(120, 160) * 0.4 + 0.4, np.zeros((120, 160), np.float32)
     photo[:, 80:83], disparity[:, 80:83] = [0.1, 0.1, 0.3], 2.0
     np.testing.assert_allclose(measure_edge_blur(photo, blur(disparity, sigma)).sigma_px, sigma, rtol=0.2)
+
+
+def test_smaller_maps_are_means_of_squares() -> None:
+    values = np.random.default_rng(0).random((7, 9)).astype(np.float32)
+    expected = values[:6, :8].reshape(3, 2, 4, 2).mean(axis=(1, 3))
+    np.testing.assert_allclose(edge_blur._half(values), expected, rtol=1e-6)
+
+
+def test_the_median_counts_weights() -> None:
+    values, weights = np.float32([3, 1, 2, 9]), np.float32([1, 1, 1, 5])
+    assert edge_blur._weighted_median(values, np.ones(4, np.float32)) == 2
+    assert edge_blur._weighted_median(values, weights) == 9
+    assert edge_blur._weighted_median(values[:0], weights[:0]) == 0
+
+
+def test_the_range_leaves_out_a_few_at_both_ends() -> None:
+    values = np.linspace(-2, 3, 10_000, dtype=np.float32).reshape(100, 100)
+    values[0, :5], values[1, :5] = 1e6, -1e6
+    assert extent(values) == pytest.approx(0.96 * 5, rel=0.01)
+    assert extent(np.zeros((0, 4), np.float32)) == 0
+
+
+def test_cells_cover_their_pixels() -> None:
+    cells = np.array([[True, False, False], [False, True, True]])
+    pixels = EdgeBlur(cells.astype(np.float32), 4).at_pixels(cells, ImageSize(6, 11))
+    assert pixels.shape == (6, 11)
+    assert all(pixels[y, x] == cells[y // 4, x // 4] for y, x in np.ndindex(6, 11))
+
+
+def found_edges(agree: float, count: int, apart: int, sigma: float = 2.0) -> np.ndarray:
+    """(6, N), see `_edges`: along a row, so far apart."""
+    at = np.arange(count) * apart
+    rest = (np.full(count, sigma), np.ones(count), np.full(count, agree), np.ones(count))
+    return np.stack([at, np.zeros(count), *rest]).astype(np.float32)
+
+
+def test_the_photo_is_believed_where_it_agrees_more_often_than_chance_has_it() -> None:
+    """Chance has half of the shoulders; edges near to each other are one witness."""
+    far, near = 2 * edge_blur.WITNESS_PX, 1
+    assert edge_blur._photo_is_sure(found_edges(1.0, 8, far))
+    assert not edge_blur._photo_is_sure(found_edges(0.5, 500, far))
+    assert edge_blur._photo_is_sure(found_edges(0.65, 60, far))
+    assert not edge_blur._photo_is_sure(found_edges(0.65, 60, near))
+    assert not edge_blur._photo_is_sure(found_edges(1.0, 0, far))
+
+
+def test_edges_are_as_soft_as_each_other_within_a_factor() -> None:
+    edges = np.concatenate([found_edges(1.0, 1, 1, sigma) for sigma in (1.0, 1.4, 2.0, 2.9, 3.1)], axis=1)
+    assert edge_blur._as_soft_as(2.0, edges)[2].tolist() == [np.float32(1.4), 2.0, np.float32(2.9)]
+
+
+def test_shoulders_are_flat_or_not() -> None:
+    def shoulders(slope: float, at: float = 30.0) -> bool:
+        x = np.arange(61)
+        values = np.tile(
+            np.clip(0.2 * (x - 30), -0.5, 0.5) + slope * np.sign(x - 30) * np.maximum(abs(x - 30) - 3, 0), (9, 1)
+        )
+        return bool(edge_blur._has_flat_shoulders(values.astype(np.float32), at, 4.0, 1.0, 0.0, 30 - at, 2.0, 0.2))
+
+    limit = edge_blur.STEEPEST_SHOULDER * 0.2
+    assert shoulders(0.0)
+    assert shoulders(0.9 * limit)
+    assert shoulders(-0.9 * limit)
+    assert shoulders(0.9 * limit, at=31.0)
+    assert not shoulders(1.1 * limit)
+    assert not shoulders(-1.1 * limit)
+
+
+def test_the_photo_agrees_where_it_changes_most_at_the_middle() -> None:
+    def agrees(*changes: tuple[int, float]) -> float:
+        """changes: (column, by how much) of a photo's brightness; the edge at column 30, blurred by 2 px."""
+        light = sum(by * (np.arange(61) >= at) for at, by in changes)
+        photo = np.tile(np.asarray(light, np.float32)[None, :, None], (9, 1, 3))
+        return float(edge_blur._photo_agrees(photo, 29.0, 4.0, 1.0, 0.0, 1.0, 2.0))
+
+    assert agrees((30, 0.4)) == 1
+    assert agrees((30, 0.4), (36, 0.6)) == 0.5
+    assert agrees((30, 0.4), (24, 0.6)) == 0.5
+    assert agrees((30, 0.4), (24, 0.6), (36, 0.6)) == 0
+    assert agrees((30, 0.4), (45, 0.6)) == 1, "too far to count"
+    assert agrees((30, 0.01)) == 0.5, "nothing tells"
