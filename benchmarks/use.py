@@ -129,7 +129,7 @@ class User:
     def save(self) -> None:
         """Save a picture and wait for it."""
         self.do(DoTask(SaveTask(str(self.out / "picture.png"), ScreenSize(270, 180), may_replace=True)))
-        self.until(lambda: self.app.state.saving is None and not self.app.state.tasks)
+        self.until(lambda: not self.app.state.jobs and not self.app.state.tasks)
         self.do(DismissNotices())
 
     def export(self) -> None:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear
 from iibr_core.generation.memory_model import budget_of, require_own_size
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import (
     ColorSpace,
     FloatImage,
@@ -25,19 +22,17 @@ from iibr_core.types import (
     ignore_progress,
     image_size,
 )
-from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Progress, Scene
+from viewer.model.state.scene import Scene
 
 if TYPE_CHECKING:
     # What draws is imported by the thread that draws: the window comes first.
     from iibr_core.rendering.large_views import LargePhoto
     from iibr_core.rendering.ray_set import RaySet
 
-TELL_EVERY_S = 0.1
 MOST_PIXELS = 100_000_000
 """Of the photo; a larger one is read that large."""
 
@@ -114,38 +109,6 @@ class FullPicture:
             light = draw_large(photo, lens, pixels, synthesis, self.smaller, should_stop, report_progress)
         size = ImageSize(self.size.height, self.size.width)
         return mean_of_areas(light, size, should_stop, (top - pixels.top, left - pixels.left, down, across))
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnFull:
-    """What became of a `FullPicture`: linear light (height, width, 3)."""
-
-    light: FloatImage
-
-
-FullPictureResult = DrawnFull | ProgressReport[int] | Failed[int]
-
-
-class FullPictureWorker(JobThread[FullPicture, FullPictureResult]):
-    """Draws pictures at the photo's own size, one at a time, beside the window."""
-
-    def __init__(self, wake: Callable[[], None]) -> None:
-        """wake: called, in the thread, when a result was posted."""
-        super().__init__("iibr-full", wake, _results_of, lambda asked, message: Failed(0, message))
-
-
-def _results_of(job: Job[FullPicture, FullPictureResult]) -> Iterator[FullPictureResult]:
-    told_s, begun_s = -math.inf, time.perf_counter()
-
-    def report(done: float, total: float, doing: str) -> None:
-        nonlocal told_s
-        now_s = time.perf_counter()
-        if now_s - told_s >= TELL_EVERY_S:
-            told_s = now_s
-            job.post(ProgressReport(0, Progress(int(done), int(total), now_s - begun_s, doing)))
-
-    with suppress(Cancelled):
-        yield DrawnFull(job.request.draw(job.should_stop, report))
 
 
 def encode_light(

@@ -189,7 +189,7 @@ class App:
         self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
-        self.do(*self._side_effects.draw(SAVE_BUDGET_S))
+        self.do(*self._side_effects.draw(self.state, SAVE_BUDGET_S))
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_look.advance(self.state))

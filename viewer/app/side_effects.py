@@ -4,33 +4,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
 
-from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.formats.outputs import AlreadyThereError
-from iibr_core.types import FloatImage, InputError
 from viewer.app.clipboard import Pasted, paste_picture
 from viewer.app.dialogs import Dialog, SaveDialog, has_dialogs
-from viewer.app.exporter import Exporter
-from viewer.app.image_export import export_map, settings_of
-from viewer.app.picture_saver import PictureSaver, refusal
-from viewer.app.save_places import inputs_of_scene, map_path
+from viewer.app.exporter import add_export
+from viewer.app.image_export import settings_of
+from viewer.app.job_queue import JobQueue
+from viewer.app.picture_saver import add_copy, add_save
+from viewer.app.save_places import inputs_of_scene
 from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.background.model_download import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.background.photo_folder import list_photos
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, AskForPath, EditsSaved, Notify, OpenPath, ShowPrompt, TaskTaken
+from viewer.model.actions import Action, AskForPath, Notify, OpenPath, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import CancelExportTask, ExportTask
+from viewer.model.state.exporting import ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
+from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.model_download import (
     CancelGetTask,
     Downloading,
@@ -42,8 +41,7 @@ from viewer.model.state.model_download import (
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import ApertureMask, SetApertureShape
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
-from viewer.model.state.prompts import SavePrompt
-from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, WriteSidecarTask
+from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.scene import source_beside
 from viewer.model.state.tasks import ChoosePlaceTask, ChooseTask, ReadMaskTask, ReadTruthTask, SaveTask, Task
 
@@ -53,10 +51,8 @@ class SideEffects:
 
     def __init__(self, scene_view: SceneView, wake: Callable[[], None], clipboard_text: Callable[[], str]) -> None:
         """wake: called, in another thread, when something came of a task. clipboard_text: what it holds, "" without."""
-        self._scene_view = scene_view
         self._clipboard_text = clipboard_text
-        self._saver = PictureSaver(scene_view, wake)
-        self._exporter = Exporter(scene_view, wake)
+        self._jobs = JobQueue(scene_view, wake)
         self._files = FileWorker("iibr-files", wake)
         self._downloads = ModelDownloads(wake)
         self._ids = count(1)
@@ -72,7 +68,7 @@ class SideEffects:
     @property
     def is_drawing(self) -> bool:
         """Whether a picture is being drawn to be saved or exported."""
-        return self._saver.is_drawing or self._exporter.is_drawing
+        return self._jobs.is_drawing
 
     def run(self, state: AppState) -> list[Action]:
         """Take up the state's tasks and say what came of earlier ones, and of a dialog that was closed."""
@@ -80,20 +76,18 @@ class SideEffects:
         for task in state.tasks:
             if isinstance(task, ReadTruthTask) and not is_scene_open(state):
                 continue  # what it must fit is not known yet
-            if isinstance(task, PasteTask) and self._saver.is_copying:
+            if isinstance(task, PasteTask) and self._jobs.is_copying:
                 continue  # what is pasted is not in the clipboard yet
             actions += [TaskTaken(task), *self._begin(task, state)]
         return actions
 
-    def draw(self, budget_s: float) -> list[Action]:
-        """Go on with the picture that is being saved, else with what is being exported, for about that long."""
-        is_saving = self._saver.is_drawing
-        return self._saver.advance(budget_s) + ([] if is_saving else self._exporter.advance(budget_s))
+    def draw(self, state: AppState, budget_s: float) -> list[Action]:
+        """Continue what is being saved, copied and exported, for about that long."""
+        return self._jobs.advance(state, budget_s)
 
     def close(self) -> None:
         """Finish the files that are being written; give up everything else."""
-        self._saver.close()
-        self._exporter.close()
+        self._jobs.close()
         self._downloads.close()
         self._files.close(cancels=False)
 
@@ -114,14 +108,12 @@ class SideEffects:
                 self._submit(partial(_read_facts, path))
             case ListFolderTask(path):
                 self._submit(partial(list_photos, path))
-            case SaveTask(what="map"):
-                return self._save_map(task, state)
             case SaveTask():
-                return self._saver.add(task, state, self._inputs(state))
+                return add_save(task, state, self._inputs(state), self._jobs)
             case ExportTask():
-                return self._exporter.add(task, state, self._inputs(state))
-            case CancelExportTask():
-                self._exporter.cancel()
+                return add_export(task, state, self._inputs(state), self._jobs)
+            case CancelJobTask(id_):
+                self._jobs.cancel(id_)
             case WriteSidecarTask() if state.scene is not None and is_scene_open(state):
                 settings = settings_of(state, state.scene.size)
                 self._submit(partial(write_sidecar, Path(state.scene.source.path), settings))
@@ -133,37 +125,18 @@ class SideEffects:
                 self._downloads.cancel()
                 return [DownloadingChanged(None)]
             case CopyTask():
-                return self._saver.copy(state)
+                return add_copy(state, self._jobs)
             case PasteTask():
                 self._submit(partial(paste_picture, self._clipboard_text()))
-            case CancelSaveTask():
-                self._saver.cancel()
         return []
 
     def _inputs(self, state: AppState) -> tuple[Path, ...]:
-        return (*inputs_of_scene(state), *self._masks)
+        return (*inputs_of_scene(state), *self._jobs.inputs, *self._masks)
 
     def _submit(self, work: Callable[[], Any]) -> None:
         id_ = next(self._ids)
         self._under_way.add(id_)
         self._files.submit(FileRequest(id_, work))
-
-    def _save_map(self, task: SaveTask, state: AppState) -> list[Action]:
-        """The disparity map of the scene on the screen, edits included, in px per view step as given."""
-        if state.scene is None:
-            return []
-        if self._scene_view.generation != state.generation or state.scene.is_sketch:
-            return [Notify(Notice("The map is still being made; save it again in a moment."))]
-        try:
-            path = map_path(task, self._inputs(state))
-            if self._scene_view.loaded is None:
-                raise InputError(f"{path}: this scene has no disparity map of its own")
-        except AlreadyThereError:
-            return [ShowPrompt(SavePrompt(task.path, task.size_px, already_there=True, what="map"))]
-        except InputError as error:
-            return [refusal(task, state, error)]
-        self._submit(partial(_save_map, path, self._scene_view.loaded.disparity.values, state.depth.edits))
-        return [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
 
     def _take_results(self, state: AppState) -> list[Action]:
         actions: list[Action] = []
@@ -217,8 +190,6 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return [TruthRead(truth)]
         case Path() as sidecar:
             return [Notify(Notice(f"Saved {sidecar}"))]
-        case SavedMap(sentence, edits):
-            return [Notify(Notice(sentence)), EditsSaved(edits)]
     raise AssertionError(f"nothing comes of {result.value!r}")
 
 
@@ -234,19 +205,6 @@ def _actions_from_download(result: DownloadResult, state: AppState) -> list[Acti
             uses = state.source is not None and not model.lacks
             return [*said, action_for_path("model", model.name, state)] if uses else said
     raise AssertionError(f"nothing comes of {result!r}")
-
-
-@dataclass(frozen=True)
-class SavedMap:
-    """A map was written. sentence: for people. edits: that it has."""
-
-    sentence: str
-    edits: DepthEdits
-
-
-def _save_map(path: Path, values: FloatImage, edits: DepthEdits) -> SavedMap:
-    """Raises InputError where it cannot be written."""
-    return SavedMap(export_map(path, values), edits)
 
 
 def read_truth(path: str) -> GroundTruth:

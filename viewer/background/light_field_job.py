@@ -77,7 +77,7 @@ def showings_of_light_field(
         yield Showing(scene, chain(read, views), work.measuring("reading"))
         return
     if takes_drafts:
-        yield Showing(scene, _keep(read, views), work.measuring("reading"))
+        yield Showing(scene, (replace(view, is_final=False) for view in _keep(read, views)), work.measuring("reading"))
     else:
         for view in views:
             read.append(view)

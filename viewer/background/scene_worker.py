@@ -6,7 +6,7 @@ The newest request wins: the job before it stops at its next row band, see `view
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -124,7 +124,7 @@ def results_of(
     should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None] = lambda progress: None,
-) -> Iterator[SceneReady | ViewReady]:
+) -> Generator[SceneReady | ViewReady]:
     """Everything a job has to say, in order: the scene, then each of its views; a light field perhaps more than once.
 
     report_progress: is told what it does while there is nothing new to show. Raises InputError for a file that cannot

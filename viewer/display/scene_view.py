@@ -20,9 +20,12 @@ from viewer.background.gloss import GlossFound, GlossRequest
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
+from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import Box
+from viewer.gpu.gloss_textures import GlossTextures
+from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.refocus.lens import TargetWindow
+from viewer.gpu.refocus.open_field import field_that_fits
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
@@ -71,7 +74,7 @@ class SceneView:
         self._centre: ViewUpdate | None = None
         self._stand_in: ViewUpdate | None = None
         self._gloss: GlossFound | None = None
-        self._is_preview = False
+        self._is_preview = self._is_edited = False
         self._waiting: deque[ViewUpdate] = deque()
         self._is_final: dict[tuple[int, int], bool] = {}
         self._disparities: dict[ViewOffset, FloatImage] = {}
@@ -100,8 +103,8 @@ class SceneView:
             raise
         self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
         self.generation, self.loaded, self._scene, self._centre = ready.generation, ready.loaded, scene, ready.centre
-        self._is_preview = True
-        self.views_uploaded, self._is_final = 1, {scene.grid.centre: True}
+        self._is_preview, self._is_edited = True, False
+        self.views_uploaded, self._is_final = 1, {scene.grid.centre: ready.centre.is_final}
         self._waiting.clear()
         self._disparities.clear()
         self._keep_for_picking(scene, ready.centre)
@@ -117,7 +120,8 @@ class SceneView:
         assert field is not None
         shown = self._disparities.get(CENTRE) if self._is_preview else None
         differs = None if shown is None else shown != disparity
-        if differs is None or _is_beyond(disparity[differs], field.range_px):
+        self._is_edited = True
+        if differs is None or field.is_shared or _is_beyond(disparity[differs], field.range_px):
             self._open_field(scene, PREVIEW_GRID)
             self.views_uploaded, self._is_final = 1, {scene.grid.centre: True}
             self._is_preview = True
@@ -157,6 +161,7 @@ class SceneView:
         scene = self._scene
         assert scene is not None
         if (view.row, view.column) == scene.grid.centre:
+            self._is_final[scene.grid.centre] = view.is_final
             return  # there since the scene was opened
         if self._is_preview and self._centre is not None:
             self._open_field(scene, scene.grid)
@@ -189,11 +194,12 @@ class SceneView:
     def upload(self, budget_s: float) -> bool:
         """Upload waiting views until the time is spent, at least one. True where some still wait.
 
-        A view that is there is not replaced while a picture is drawn a step at a time: that would stop it.
+        A view that is there is not replaced while somebody else holds the views, to draw a picture of them.
         """
         end = time.perf_counter() + budget_s
         while self._waiting:
-            if (self._waiting[0].row, self._waiting[0].column) in self._is_final and self.renderer.is_drawing_picture:
+            field, view = self.renderer.field, self._waiting[0]
+            if (view.row, view.column) in self._is_final and field is not None and field.is_shared:
                 break
             view = self._waiting.popleft()
             self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
@@ -251,9 +257,48 @@ class SceneView:
         """The converged picture of any size. Before the first view it is black. The window's own picture stays."""
         return self.renderer.converged_picture(settings)
 
-    def start_picture(self, settings: RenderSettings) -> PictureDrawing:
-        """The same, to be drawn a step at a time; another one, or other views, stop it."""
-        return self.renderer.start_picture(settings)
+    def start_picture(self, settings: RenderSettings, field: LightFieldTexture | None = None) -> PictureDrawing:
+        """The same, to be drawn a step at a time. field: of a snapshot, by default what is shown."""
+        return self.renderer.start_picture(settings, field)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether every view of the scene is there as it will stay, and no edit of its depth is shown in advance."""
+        scene = self._scene
+        if scene is None or scene.is_sketch or self._is_edited:
+            return False
+        return sum(self._is_final.values()) == scene.grid.rows * scene.grid.columns
+
+    def snapshot(self) -> SceneSnapshot | None:
+        """What is shown now, to be released; None before anything is open."""
+        if self._scene is None or self._centre is None:
+            return None
+        is_free, field = self._stand_in is not None, self.renderer.drawn_field.share()
+        return SceneSnapshot(self._scene, self.loaded, self._centre, field, self._gloss, is_free)
+
+    def snapshot_of(self, ready: SceneReady) -> SceneSnapshot:
+        """A scene that is not shown, with its centre view; the others are to be stored in its field.
+
+        Raises InputError where it does not fit the graphics card.
+        """
+        scene, centre = ready.scene, ready.centre
+        size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
+        field, _ = field_that_fits(self._gl.ctx, scene.grid, *size)
+        field.color_space = scene.color_space
+        field.upload(*scene.grid.centre, centre.colors, centre.disparity)
+        return SceneSnapshot(scene, ready.loaded, centre, field)
+
+    def add_gloss(self, snapshot: SceneSnapshot, found: GlossFound) -> None:
+        """Have a snapshot drawn with this gloss."""
+        if snapshot.field.gloss is not None:
+            snapshot.field.gloss.release()
+        snapshot.field.gloss = None if found.maps is None else GlossTextures(self._gl.ctx, found.maps)
+        snapshot.gloss = found
+
+    def is_shown(self, snapshot: SceneSnapshot) -> bool:
+        """Whether these are the views on the screen: then they take no memory of their own."""
+        field = self.renderer.field
+        return field is not None and field.colors is snapshot.field.colors
 
     @property
     def note(self) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.gloss.settings import Gloss
 from viewer.gpu.programs import Program
+from viewer.gpu.shared import Holders
 
 if TYPE_CHECKING:
     from iibr_core.rendering.gloss.shading import GlossMaps
@@ -34,6 +35,7 @@ class GlossTextures:
         if maps.environment is not None:
             self._textures["surroundings"] = _texture(ctx, maps.environment, "f2")
             self._textures["surroundings"].repeat_x = True
+        self._holders = Holders(self._free)
 
     def use(self, program: Program, wanted: Gloss, eye: tuple[float, float]) -> None:
         """Bind the textures and set the uniforms of a program with GLOSS. eye: (s, t) in view steps."""
@@ -58,8 +60,16 @@ class GlossTextures:
             gloss_lobe=(width2, disc, gloss.reflectance),
         )
 
+    def share(self) -> GlossTextures:
+        """The same, for one more holder, who is to release it too."""
+        self._holders.add()
+        return self
+
     def release(self) -> None:
-        """Free the textures."""
+        """Free the textures, unless somebody else holds them."""
+        self._holders.release()
+
+    def _free(self) -> None:
         for texture in self._textures.values():
             texture.release()
 

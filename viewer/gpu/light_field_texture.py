@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
+from viewer.gpu.shared import Holders
 
 if TYPE_CHECKING:
     from viewer.gpu.gloss_textures import GlossTextures
@@ -77,6 +78,7 @@ class LightFieldTexture:
         self.blocks = _allocate(ctx, blocks if with_disparity else (1, 1, 1), 2, "f2")
         self.blocks.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._texels = np.zeros((height, width, 4), self._dtype)
+        self._holders = Holders(self._free)
 
     def layer(self, row: int, column: int) -> int:
         """Array layer of a view that is kept."""
@@ -128,19 +130,32 @@ class LightFieldTexture:
         depth = np.clip((values - far) * (top_value / (near - far)), 0, top_value)
         np.copyto(self._texels[(*box, 3)], depth if self.hdr else np.rint(depth), casting="unsafe")
 
-    def snapshot(self) -> LightFieldTexture:
-        """The same arrays, with the views that are there now: those that come later are not seen in it."""
+    def share(self) -> LightFieldTexture:
+        """The same arrays, with the views and the gloss that are there now: what comes later is not seen in it.
+
+        Both are to be released. Until then no view that is there should be stored again.
+        """
         now = copy(self)
         now.present, now.has_disparity = self.present.copy(), self.has_disparity.copy()
+        now.gloss = None if self.gloss is None else self.gloss.share()
+        self._holders.add()
         return now
 
+    @property
+    def is_shared(self) -> bool:
+        """Whether somebody else holds these arrays too."""
+        return self._holders.is_shared
+
     def release(self) -> None:
-        """Free the arrays."""
+        """Free the arrays, unless somebody else holds them."""
+        if self.gloss is not None:
+            self.gloss.release()
+        self._holders.release()
+
+    def _free(self) -> None:
         self.colors.release()
         self.disparities.release()
         self.blocks.release()
-        if self.gloss is not None:
-            self.gloss.release()
 
     def _viewport(self, row: int, column: int, box: Box) -> tuple[int, int, int, int, int, int]:
         rows, columns = box

@@ -8,9 +8,10 @@ from iibr_core.depth.editing.edits import DepthEdits
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport, Hover
 from viewer.model.state.depth_editing import DepthAction
-from viewer.model.state.exporting import AskToExport, ExportingChanged
+from viewer.model.state.exporting import AskToExport
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import DownloadingChanged
 from viewer.model.state.motion import LoopKind
 from viewer.model.state.notices import Notice
@@ -18,7 +19,7 @@ from viewer.model.state.optics import LensAction, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import Section, Theme, Units
 from viewer.model.state.prompts import ChoiceOf, Prompt, Saved
-from viewer.model.state.saving import SavedSettings, SavingChanged
+from viewer.model.state.saving import SavedSettings
 from viewer.model.state.scene import Progress, Scene, Source
 from viewer.model.state.tasks import Task
 from viewer.model.zoom import SetZoom
@@ -352,14 +353,14 @@ Action = (
     | ResumeWork
     | WorkerLost
     | PictureDrawn
-    | SavingChanged
     | DoTask
     | TaskTaken
     | ShowPrompt
     | AskForPath
     | AskToSave
     | AskToExport
-    | ExportingChanged
+    | JobsChanged
+    | QuitWhenDone
     | DownloadingChanged
     | SetHover
     | Notify

@@ -235,7 +235,7 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout, pa
         "gloss": lambda: gloss_section(state, layout, palette),
         "depth": lambda: depth_section(state, scene, layout),
         "inspect": lambda: inspect_section(state, scene, layout),
-        "scene": lambda: [*scene_section(scene, state.facts, layout), *_recent_elsewhere(state, layout)],
+        "scene": lambda: [*scene_section(scene, state.source, state.facts, layout), *_recent_elsewhere(state, layout)],
     }
     is_open = section in state.preferences.open_sections
     toggled: list[Action] = [ToggleSection(section)] if heading(SECTION_WORDS[section], is_open, layout) else []

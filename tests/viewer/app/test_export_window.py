@@ -14,9 +14,10 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.main_loop import App
 from viewer.gpu.refocus.render_settings import RenderSettings
-from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, ShowPrompt
+from viewer.model.actions import DismissNotice, DoTask, ShowPrompt
 from viewer.model.layout import ScreenSize
-from viewer.model.state.exporting import CancelExportTask, ExportOptions, ExportPrompt, ExportTask
+from viewer.model.state.exporting import ExportOptions, ExportPrompt, ExportTask
+from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.optics import MoveEye
 from viewer.model.state.scene import Source
 
@@ -40,7 +41,7 @@ def texts(app: App) -> list[str]:
 def start(viewer: Driver, path: Path) -> None:
     """Ask for a long one, and wait until some of it is drawn."""
     viewer.app.do(DoTask(ExportTask("gif", str(path), LARGE)))
-    viewer.until(lambda app: app.state.exporting is not None and app.state.exporting.done > 0)
+    viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
 
 
 def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) -> None:
@@ -54,12 +55,11 @@ def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) ->
         app.step()
         turns += 1
     assert app.frames_shown - frames >= 5
-    assert app.state.exporting is not None
-    assert app.state.exporting.waiting == 1
-    app.do(DoTask(CancelExportTask()))
+    assert [job.doing for job in app.state.jobs] == ["drawing frames", ""]
+    app.do(DoTask(CancelJobTask(app.state.jobs[0].id)))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(app) == [f"Exported {out}"], "what was cancelled is not spoken of"
-    viewer.until(lambda app: app.state.exporting is None)
+    viewer.until(lambda app: not app.state.jobs)
     with Image.open(out) as image:
         assert (image.size, image.n_frames) == ((96, 64), 4)  # type: ignore[attr-defined]
     assert not (tmp_path / "long.gif").exists()
@@ -74,18 +74,11 @@ def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: 
     assert np.abs(view - shown).max() <= 2
 
 
-@pytest.mark.parametrize("how", ["another photo", "another strength", "closing"])
-def test_what_goes_away_is_given_up_and_leaves_nothing(viewer: Driver, tmp_path: Path, how: str) -> None:
+def test_closing_gives_up_and_leaves_nothing(viewer: Driver, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     folder.mkdir()
     start(viewer, folder / "a.gif")
-    if how == "closing":
-        viewer.close()
-    else:
-        other = OpenPath(Source(str(write_scene(tmp_path, "other", seed=1)), grid=GridShape(3, 3)))
-        viewer.app.do(other if how == "another photo" else SetDepthStrength(0.5, is_finished=True))
-        viewer.until(lambda app: any("changed meanwhile" in text for text in texts(app)))
-        viewer.until(lambda app: app.state.exporting is None)
+    viewer.close()
     assert list(folder.iterdir()) == []
 
 

@@ -27,7 +27,7 @@ class OpenField:
         self, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool, color_space: ColorSpace
     ) -> None:
         """Start an empty one; see `Renderer.open_field`."""
-        field, self.note = _field_that_fits(self._ctx, grid, width, height, hdr, with_disparity)
+        field, self.note = field_that_fits(self._ctx, grid, width, height, hdr, with_disparity)
         if self.field is not None:
             self.field.release()
         field.color_space = color_space
@@ -71,10 +71,13 @@ class OpenField:
         self.field = self._stand_in = None
 
 
-def _field_that_fits(
+def field_that_fits(
     ctx: moderngl.Context, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool
 ) -> tuple[LightFieldTexture, str]:
-    """Room for as many views as the driver can hold, and a sentence where that is not all."""
+    """Room for as many views as the driver can hold, and a sentence where that is not all.
+
+    Raises InputError where it cannot hold a single one.
+    """
     note = ""
     for stride in range(1, max(grid) + 1):
         try:

@@ -30,7 +30,7 @@ class PictureDrawing:
 
     image: (height, width, 3), whole once `is_done`: float32 linear light, not cut off at white or 0, or uint8, encoded
     by sRGB's curve.
-    is_stopped: by `stop`, because the field it is drawn from has changed; the image then stays unfinished.
+    is_stopped: by `stop`, before it was whole; the image then stays unfinished.
     """
 
     def __init__(
@@ -44,15 +44,15 @@ class PictureDrawing:
     ) -> None:
         """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun.
 
-        is_linear, color_space: see `RenderSettings`. Views that `field` gets from now on are not seen: all tiles show
-        the same.
+        is_linear, color_space: see `RenderSettings`. field: held until `stop`, so that another may take its place on
+        the screen. Views that it gets from now on are not seen: all tiles show the same.
         """
         width, height = whole.size_px
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
-        self.is_done = self.is_stopped = False
+        self.is_done = self.is_stopped = self._is_released = False
         self._gl = gl
         self._accumulator = accumulator
-        self._field = field.snapshot()
+        self._field = field.share()
         self._whole = whole
         self._is_linear = is_linear
         self._color_space = color_space
@@ -80,10 +80,13 @@ class PictureDrawing:
                     return
 
     def stop(self) -> None:
-        """Draw no more, and free every GL object; nothing happens where it is done."""
-        self.is_stopped = not self.is_done
+        """Draw no more, and free every GL object; the image stays. To be called even where it is done."""
+        if self._is_released:
+            return
+        self._is_released, self.is_stopped = True, not self.is_done
         self._steps.close()
         self._accumulator.release()
+        self._field.release()
 
     def _draw(self) -> Generator[None]:
         for tile in self._tiles:

@@ -71,7 +71,6 @@ class Renderer:
         self._refining_s = 4 * gl.seconds_per_fetch
         self._level = 0
         self._errors = ErrorEstimate()
-        self._picture: PictureDrawing | None = None
 
     @property
     def adaptive(self) -> bool:
@@ -86,6 +85,11 @@ class Renderer:
     def field(self) -> LightFieldTexture | None:
         """The light field, None before the first."""
         return self._fields.field
+
+    @property
+    def drawn_field(self) -> LightFieldTexture:
+        """What is drawn: the field, or what stands in for it. Raises ValueError before the first."""
+        return self._fields.drawn
 
     @property
     def note(self) -> str:
@@ -107,21 +111,16 @@ class Renderer:
         cannot hold a single one; the old field then stays.
         """
         self._fields.open(grid, width, height, hdr, with_disparity, color_space)
-        self._stop_picture()
         self._accumulation = None
 
     def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Add or replace one view; see LightFieldTexture.upload."""
-        field = self._fields.loaded
-        if 0 <= row < field.grid.rows and 0 <= column < field.grid.columns and field.present[row, column]:
-            self._stop_picture()
-        field.upload(row, column, colors, disparity)
+        self._fields.loaded.upload(row, column, colors, disparity)
         if not self.is_renewing:
             self._accumulation = None
 
     def change_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
         """Replace the disparity of the view uploaded last; see LightFieldTexture.change_disparity."""
-        self._stop_picture()
         self._fields.loaded.change_disparity(row, column, disparity, box)
         if not self.is_renewing:
             self._accumulation = None
@@ -131,13 +130,11 @@ class Renderer:
 
         It has the size of the field's views, a disparity, and sRGB's colours.
         """
-        self._stop_picture()
         self._fields.stand_in(view)
         self._accumulation = None
 
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """What gloss means for the field, for optics that have one; None where it means nothing."""
-        self._stop_picture()
         self._fields.set_gloss(maps)
         self._accumulation = None
 
@@ -224,30 +221,23 @@ class Renderer:
             self._errors.add(self.read_image(), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
-    def start_picture(self, settings: RenderSettings) -> PictureDrawing:
-        """A picture with every sample it will get, to be drawn step by step; one at a time.
+    def start_picture(self, settings: RenderSettings, field: LightFieldTexture | None = None) -> PictureDrawing:
+        """A picture with every sample it will get, to be drawn step by step, and stopped once it is no longer wanted.
 
-        What was drawn last stays as it is. Another field, or another image of a view that is there, stops it.
+        What was drawn last stays as it is. field: it is drawn from, by default what the screen shows.
         """
-        self._stop_picture()
+        field = self._fields.drawn if field is None else field
         accumulator = Accumulator(self.ctx, self.programs)
         accumulator.passes.adaptive = self.adaptive
-        whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part)
-        is_linear, space = settings.is_linear, settings.color_space
-        self._picture = PictureDrawing(self.gl, accumulator, self._fields.drawn, whole, is_linear, space)
-        return self._picture
+        whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
+        return PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
 
     def converged_picture(self, settings: RenderSettings) -> NDArray[np.uint8 | np.float32]:
         """The picture of `start_picture`, at once."""
         drawing = self.start_picture(settings)
         drawing.advance()
-        self._stop_picture()
+        drawing.stop()
         return drawing.image
-
-    @property
-    def is_drawing_picture(self) -> bool:
-        """Whether the picture of `start_picture` is on its way."""
-        return self._picture is not None and not (self._picture.is_done or self._picture.is_stopped)
 
     @property
     def is_converged(self) -> bool:
@@ -261,8 +251,7 @@ class Renderer:
 
     def prepare(self, optics: Optics) -> None:
         """Have what draws such a picture compiled, so that the first frame of it does not wait; none is shown."""
-        if not self.is_drawing_picture:
-            self.converged_picture(RenderSettings(optics, PREPARED_SIZE))
+        self.converged_picture(RenderSettings(optics, PREPARED_SIZE))
 
     @property
     def samples_drawn(self) -> int:
@@ -295,7 +284,6 @@ class Renderer:
 
     def release(self) -> None:
         """Free every GL object."""
-        self._stop_picture()
         self.programs.release()
         self._accumulator.release()
         self._screen.release()
@@ -306,9 +294,14 @@ class Renderer:
         return self._accumulation
 
     def _accumulation_of(
-        self, optics: Optics, size_px: ScreenSize, level: QualityLevel, part: TargetWindow = WHOLE_PICTURE
+        self,
+        optics: Optics,
+        size_px: ScreenSize,
+        level: QualityLevel,
+        part: TargetWindow = WHOLE_PICTURE,
+        field: LightFieldTexture | None = None,
     ) -> ProgressiveAccumulation:
-        field = self._fields.drawn
+        field = self._fields.drawn if field is None else field
         whole_width_px = round(size_px[0] / part.width)
         lens = replace(lens_of(optics, field, whole_width_px, self.prefilter, level), part=part)
         count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
@@ -325,11 +318,6 @@ class Renderer:
         self._accumulator.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
         self._screen.show(targets)
         self.passes_shown = self._current().pass_index
-
-    def _stop_picture(self) -> None:
-        if self._picture is not None:
-            self._picture.stop()
-            self._picture = None
 
     def _work(self, optics: Optics, size_px: ScreenSize, part: TargetWindow, level: QualityLevel) -> DrawCost:
         field = self._fields.drawn

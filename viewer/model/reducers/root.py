@@ -73,9 +73,10 @@ from viewer.model.reducers.notices import add_notice
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction, DepthSettings
-from viewer.model.state.exporting import AskToExport, ExportingChanged
+from viewer.model.state.exporting import AskToExport
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
+from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import DownloadingChanged
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
@@ -83,7 +84,7 @@ from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, 
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import SECTIONS, Preferences
 from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
-from viewer.model.state.saving import SavedSettings, SavingChanged, path_beside
+from viewer.model.state.saving import SavedSettings, path_beside
 from viewer.model.state.scene import Progress
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
@@ -139,8 +140,10 @@ def reduce(state: AppState, action: Action) -> AppState:
         case EditsSaved(edits):
             return replace(state, saved_edits=edits)
         case Quit(is_sure):
-            asks = state.has_unsaved_edits and not is_sure
-            return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
+            return _quit(state, is_sure)
+        case QuitWhenDone():
+            state = replace(state, quits_when_done=True, prompt=None)
+            return state if state.jobs else _quit(state, is_sure=False)
     return _reduce_files(state, action)
 
 
@@ -197,16 +200,16 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
             return replace(state, report=report)
         case AskToExport():
             return ask_to_export(state)
-        case ExportingChanged(exporting):
-            return replace(state, exporting=exporting)
+        case JobsChanged(jobs):
+            state = replace(state, jobs=jobs)
+            return _quit(state, is_sure=False) if state.quits_when_done and not jobs else state
         case DownloadingChanged(downloading):
             return replace(state, downloading=downloading)
-        case SavingChanged(saving):
-            return replace(state, saving=saving)
         case SetHover(hover):
             return move_pointer(state, hover)
         case Notify(notice):
-            return add_notice(state, notice)
+            # what went wrong must be seen
+            return replace(add_notice(state, notice), quits_when_done=state.quits_when_done and not notice.is_error)
         case DismissNotice(notice):
             return replace(state, notices=tuple(other for other in state.notices if other != notice))
         case DismissNotices():
@@ -224,6 +227,13 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state
+
+
+def _quit(state: AppState, is_sure: bool) -> AppState:
+    """Ask first where that would lose something."""
+    asks = (state.has_unsaved_edits or bool(state.jobs)) and not is_sure
+    state = replace(state, quits_when_done=False)
+    return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
 
 
 def _take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:

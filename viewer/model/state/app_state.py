@@ -11,10 +11,10 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.depth_editing import AS_FOUND, Brush, DepthSettings
-from viewer.model.state.exporting import Exporting
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
+from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import Downloading
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
@@ -22,7 +22,6 @@ from viewer.model.state.optics import GlossBrush, Optics
 from viewer.model.state.photo_facts import NO_FACTS, FactsRead
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import Prompt
-from viewer.model.state.saving import Saving
 from viewer.model.state.scene import Progress, Scene, Source
 from viewer.model.state.tasks import Task
 from viewer.model.zoom import Zoom
@@ -81,9 +80,10 @@ class AppState:
     zoom: None where the whole picture is seen. free_camera: None on the plane of the views; poses: of a file, for it;
     free_progress: how much is done of what its views are made of, None when that is there.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
-    file has them. saving, exporting: None without. has_chosen_focus, has_chosen_aperture: whether the user said in this
-    scene what is sharp, and how wide the aperture is. has_dialogs: whether the system has file dialogs. left_field:
-    None where the open scene was left unfinished, or not at all.
+    file has them. jobs: saves, copies and exports under way; quits_when_done: the window closes once there are none.
+    has_chosen_focus, has_chosen_aperture: whether the user said in this scene what is sharp, and how wide the aperture
+    is. has_dialogs: whether the system has file dialogs. left_field: None
+    where the open scene was left unfinished, or not at all.
     shown_generation: whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a
     number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
     of it, perhaps of the one before. is_fullscreen,
@@ -120,8 +120,8 @@ class AppState:
     stroke: Stroke | None = None
     gloss_brush: GlossBrush = field(default_factory=GlossBrush)
     saved_edits: DepthEdits = UNEDITED
-    saving: Saving | None = None
-    exporting: Exporting | None = None
+    jobs: tuple[JobProgress, ...] = ()
+    quits_when_done: bool = False
     downloading: Downloading | None = None
     has_chosen_focus: bool = False
     has_chosen_aperture: bool = False

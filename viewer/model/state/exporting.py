@@ -60,29 +60,5 @@ class ExportTask:
 
 
 @dataclass(frozen=True)
-class CancelExportTask:
-    """Give up what is being exported; the next one follows."""
-
-
-@dataclass(frozen=True)
 class AskToExport:
     """Ask what to export, and where to."""
-
-
-@dataclass(frozen=True)
-class Exporting:
-    """What is being exported. name: of its file or folder. done: share of what it is doing now, 0..1. doing: in words.
-    waiting: how many more wait for it.
-    """
-
-    name: str
-    done: float = 0.0
-    doing: str = ""
-    waiting: int = 0
-
-
-@dataclass(frozen=True)
-class ExportingChanged:
-    """Another one is being exported, or it has come further; None: nothing is any more."""
-
-    exporting: Exporting | None

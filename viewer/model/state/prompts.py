@@ -51,4 +51,4 @@ class PalettePrompt:
 
 
 Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "welcome", "quit"]
-"""quit: whether to close although depth edits are saved nowhere."""
+"""quit: whether to close although jobs are under way, or depth edits are saved nowhere."""

@@ -1,4 +1,4 @@
-"""A picture on its way to a file: what the panel says of it, the action that changes that, and what the file keeps."""
+"""Pictures to files and to the clipboard and back: where they go, what a file keeps, and the tasks."""
 
 from __future__ import annotations
 
@@ -22,26 +22,6 @@ def path_beside(path: str, name: str) -> str:
     folder = PurePath(path).parent
     is_ours = folder.name == PASTED_FOLDER or folder.is_relative_to(resource_folder("assets"))
     return str((PurePath("~") if is_ours else folder) / name)
-
-
-@dataclass(frozen=True)
-class Saving:
-    """The picture that is being saved. name: of its file. drawn: share that is drawn, 0..1; at 1 it is being written.
-
-    waiting: how many more wait for it. seconds_left: about, None where that is not known.
-    """
-
-    name: str
-    drawn: float = 0.0
-    waiting: int = 0
-    seconds_left: int | None = None
-
-
-@dataclass(frozen=True)
-class SavingChanged:
-    """Another picture is being saved, or it has come further; None: nothing is any more."""
-
-    saving: Saving | None
 
 
 @dataclass(frozen=True)
@@ -72,8 +52,3 @@ class PasteTask:
 @dataclass(frozen=True)
 class WriteSidecarTask:
     """Keep what the photo is left with beside it too, for other machines."""
-
-
-@dataclass(frozen=True)
-class CancelSaveTask:
-    """Give up the picture that is being drawn for a file; the next one follows."""

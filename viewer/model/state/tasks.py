@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from viewer.model.layout import ScreenSize
-from viewer.model.state.exporting import CancelExportTask, ExportTask
+from viewer.model.state.exporting import ExportTask
 from viewer.model.state.folder import ListFolderTask
+from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.model_download import CancelGetTask, GetModelTask, ListModelsTask
 from viewer.model.state.photo_facts import ReadFactsTask
 from viewer.model.state.prompts import ChoiceOf, Saved, SavePrompt
-from viewer.model.state.saving import CancelSaveTask, CopyTask, PasteTask, WriteSidecarTask
+from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,11 @@ Task = (
     ChooseTask
     | ChoosePlaceTask
     | SaveTask
-    | CancelSaveTask
     | CopyTask
     | PasteTask
     | WriteSidecarTask
     | ExportTask
-    | CancelExportTask
+    | CancelJobTask
     | ReadMaskTask
     | ReadTruthTask
     | ListFolderTask

@@ -16,6 +16,7 @@ from viewer.model.commands import COMMANDS, Command, action_for_path, commands_m
 from viewer.model.layout import PANEL_WIDTH, Layout, ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
+from viewer.model.state.jobs import JobProgress, QuitWhenDone
 from viewer.model.state.model_download import GetModelTask, ModelsPrompt
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
@@ -121,7 +122,7 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case PalettePrompt():
             return _palette(prompt, state, layout)
         case "quit":
-            return _quit(layout)
+            return _quit(state, layout)
         case "help":
             keys = ((", ".join(chord.words for chord in c.chords), c.name) for c in COMMANDS if c.chords)
             return _help(layout, [*MOUSE, *keys], imgui.TableFlags_.scroll_y)
@@ -296,13 +297,29 @@ def _help(layout: Layout, rows: list[tuple[str, str]], flags: int = 0) -> list[A
     return [ShowPrompt(None)] if is_closed else []
 
 
-def _quit(layout: Layout) -> list[Action]:
-    imgui.text("The depth edits are not saved.")
+def _quit(state: AppState, layout: Layout) -> list[Action]:
+    """What would be lost, and what can be done about it. Jobs that end while it is asked need no answer."""
+    offers: list[tuple[str, Action]] = []
+    if state.jobs:
+        imgui.text(f"{jobs_text(state.jobs)} under way.")
+        offers.append(("Wait, then quit", QuitWhenDone()))
+    if state.has_unsaved_edits:
+        imgui.text("The depth edits are not saved.")
+        offers.append(("Save the depth map…", AskToSave("map")))
     gap(layout, 2)
-    if button("Save the depth map…", layout):
-        return [AskToSave("map")]
-    imgui.same_line()
-    if button("Quit without saving", layout):
-        return [Quit(is_sure=True)]
-    imgui.same_line()
-    return [ShowPrompt(None)] if button("Cancel", layout) else []
+    sure = "Quit without saving" if state.has_unsaved_edits else "Give up and quit" if state.jobs else "Quit"
+    actions: list[Action] = []
+    for words, action in (*offers, (sure, Quit(is_sure=True)), ("Cancel", ShowPrompt(None))):
+        if button(words, layout):
+            actions.append(action)
+        if words != "Cancel":
+            imgui.same_line()
+    return actions
+
+
+def jobs_text(jobs: Sequence[JobProgress]) -> str:
+    """What is under way, in words: "2 exports are", "1 picture and 1 export are"."""
+    exports = sum(job.kind == "export" for job in jobs)
+    counts = (("picture", len(jobs) - exports), ("export", exports))
+    words = " and ".join(f"{count} {noun}{'s' if count > 1 else ''}" for noun, count in counts if count)
+    return f"{words} {'is' if len(jobs) == 1 else 'are'}"

@@ -10,7 +10,7 @@ from viewer.model.actions import Action, OpenPath, SetInpainter
 from viewer.model.dense_field import denser_grids, with_views_between
 from viewer.model.layout import Layout
 from viewer.model.state.photo_facts import FactsRead
-from viewer.model.state.scene import Scene
+from viewer.model.state.scene import Scene, Source
 from viewer.ui.widgets import gap, label, last_part, quiet, tooltip
 
 HOLES_TIP = (
@@ -25,8 +25,11 @@ BETWEEN_TIP = (
 )
 
 
-def scene_section(scene: Scene, facts: FactsRead, layout: Layout) -> list[Action]:
-    """Build the section; what can be changed in it: a photo's ways to fill holes, views between a light field's."""
+def scene_section(scene: Scene, asked: Source | None, facts: FactsRead, layout: Layout) -> list[Action]:
+    """Build the section; what can be changed in it: a photo's ways to fill holes, views between a light field's.
+
+    asked: what was asked for last.
+    """
     gap(layout, 2)
     of_file = facts.facts if facts.path == scene.source.path else ()
     for what, value in (*of_file, *_sizes(scene), ("Depth", scene.depth_source)):
@@ -36,7 +39,7 @@ def scene_section(scene: Scene, facts: FactsRead, layout: Layout) -> list[Action
     for reason in scene.plan.reasons if scene.plan else (_of_light_field(scene),):
         quiet(reason)
     if scene.given_grid is not None and denser_grids(scene.given_grid):
-        return _views_between(scene, scene.given_grid, layout)
+        return _views_between(scene, asked, scene.given_grid, layout)
     return _holes(scene, layout) if scene.plan is not None and scene.plan.has_disocclusion else []
 
 
@@ -54,13 +57,15 @@ def _holes(scene: Scene, layout: Layout) -> list[Action]:
     return actions
 
 
-def _views_between(scene: Scene, given: GridShape, layout: Layout) -> list[Action]:
-    """The views on disk alone, or one of the denser grids."""
+def _views_between(scene: Scene, asked: Source | None, given: GridShape, layout: Layout) -> list[Action]:
+    """The views on disk alone, or one of the denser grids; what was chosen is shown at once."""
     actions: list[Action] = []
+    is_asked = asked is not None and asked.path == scene.source.path
+    chosen = (asked.filled_grid or given) if asked is not None and is_asked else scene.grid
     label("Views", layout, BETWEEN_TIP)
-    if imgui.begin_combo("##views", _grid_words(scene.grid, given)):
+    if imgui.begin_combo("##views", _grid_words(chosen, given)):
         for grid in (given, *denser_grids(given)):
-            if imgui.selectable(_grid_words(grid, given), grid == scene.grid)[0] and grid != scene.grid:
+            if imgui.selectable(_grid_words(grid, given), grid == chosen)[0] and grid != chosen:
                 actions.append(OpenPath(with_views_between(scene, grid)))
         imgui.end_combo()
     tooltip(BETWEEN_TIP, layout)

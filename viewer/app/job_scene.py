@@ -1,0 +1,132 @@
+"""What a job shows, made ready in its thread: the snapshot of the window's scene, or the same scene made once more
+where the window left it before all was there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from functools import partial
+from typing import Any
+
+from numpy.typing import NDArray
+
+from iibr_core.types import ViewUpdate
+from viewer.app.exports.source import ExportSource
+from viewer.app.job import Job
+from viewer.app.save_places import require_size
+from viewer.app.window_work import Result, Steps, WindowWork
+from viewer.background.gloss import GlossRequest, answer
+from viewer.background.scene_worker import SceneReady, ViewReady, results_of
+from viewer.display.scene_view import SceneView
+from viewer.display.snapshot import SceneSnapshot
+from viewer.gpu.refocus.render_settings import RenderSettings
+from viewer.model.state.optics import CENTRE
+from viewer.model.state.scene import Progress
+
+MAKING_VIEWS = "making views"
+DRAWING = "drawing"
+WAKE_EVERY_S = 0.1
+"""Progress wakes the window no more often: each time it draws a frame."""
+
+
+class JobScenes:
+    """Everything is called from the threads of the jobs; what touches OpenGL is handed to the window's."""
+
+    def __init__(self, scene_view: SceneView, window_work: WindowWork, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when a job has come further."""
+        self._scene_view, self._window_work, self._wake = scene_view, window_work, wake
+        self._woken_s = 0.0
+
+    def source_of(self, job: Job) -> ExportSource:
+        """What it is made of. Raises InputError where its scene cannot be opened again, Cancelled once given up."""
+        if job.snapshot is None:
+            self._make_scene(job)
+        snapshot = job.snapshot
+        assert snapshot is not None
+        optics = job.optics_on(snapshot.scene)
+
+        def draw(settings: RenderSettings) -> NDArray[Any]:
+            require_size(settings.size_px)
+            self._find_gloss(job, snapshot, settings)
+            return self._run(job, self._draw(job, snapshot, settings))
+
+        scene, report = snapshot.scene, partial(self._report, job)
+        return ExportSource(scene, snapshot.loaded, optics, draw, report, job.should_stop, snapshot.centre)
+
+    def _report(self, job: Job, done: float, total: float, doing: str) -> None:
+        job.report(done, total, doing)
+        now_s = time.perf_counter()
+        if now_s - self._woken_s >= WAKE_EVERY_S:
+            self._woken_s = now_s
+            self._wake()
+
+    def _make_scene(self, job: Job) -> None:
+        """Read it and make its views, as far as they are needed."""
+
+        def report(progress: Progress) -> None:
+            self._report(job, progress.done, progress.total, progress.doing or MAKING_VIEWS)
+
+        assert job.request is not None
+        results = results_of(job.request, job.should_stop, lambda: CENTRE, report)
+        with closing(results):
+            ready = next(results)
+            assert isinstance(ready, SceneReady)
+            snapshot = self._run(job, _in_one_step(lambda: self._open(job, ready)))
+            if job.needs(ready.scene, job.optics_on(ready.scene)) == "views":
+                self._make_views(job, snapshot, results, report)
+
+    def _open(self, job: Job, ready: SceneReady) -> SceneSnapshot:
+        """In the window's thread, which also releases it."""
+        job.snapshot = self._scene_view.snapshot_of(ready)
+        return job.snapshot
+
+    def _make_views(
+        self,
+        job: Job,
+        snapshot: SceneSnapshot,
+        results: Iterator[SceneReady | ViewReady],
+        report: Callable[[Progress], None],
+    ) -> None:
+        for made in results:
+            assert isinstance(made, ViewReady)
+            if (made.view.row, made.view.column) != snapshot.scene.grid.centre:
+                self._run(job, _store(snapshot, made.view))
+            report(made.progress)
+
+    def _find_gloss(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> None:
+        """Have at hand what the optics' gloss means for the scene, unless it is."""
+        gloss, known = settings.optics.gloss, snapshot.gloss
+        if gloss is None or snapshot.is_free_view:
+            return
+        if known is not None and known.request.is_for(gloss, snapshot.centre):
+            return
+        found = answer(GlossRequest(gloss, snapshot.scene, snapshot.centre), job.should_stop)
+        self._run(job, _in_one_step(lambda: self._scene_view.add_gloss(snapshot, found)))
+
+    def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
+        """In the window's thread. Exports count their pictures themselves."""
+        drawing = self._scene_view.start_picture(settings, snapshot.field)
+        try:
+            while True:
+                drawing.advance(budget_s=0.0)
+                if job.kind != "export":
+                    job.report(drawing.progress, 1.0, DRAWING)
+                if drawing.is_done:
+                    return drawing.image
+                yield
+        finally:
+            drawing.stop()
+
+    def _run(self, job: Job, steps: Steps[Result]) -> Result:
+        return self._window_work.run(steps, job.should_stop, is_urgent=job.kind != "export")
+
+
+def _store(snapshot: SceneSnapshot, view: ViewUpdate) -> Steps[None]:
+    return _in_one_step(lambda: snapshot.field.upload(view.row, view.column, view.colors, view.disparity))
+
+
+def _in_one_step(work: Callable[[], Result]) -> Steps[Result]:
+    yield from ()
+    return work()

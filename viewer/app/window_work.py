@@ -1,0 +1,88 @@
+"""What jobs in other threads have done by the thread of the window: a step at a time, between its frames."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+
+LOOK_S = 0.05
+"""How often a thread that waits looks whether its job is still wanted."""
+
+Result = TypeVar("Result")
+Steps = Generator[None, None, Result]
+"""Work in steps: what it returns at the end is its result."""
+
+
+@dataclass(eq=False)
+class _Asked:
+    """steps: made by another thread, run by the window's. error: what they raised."""
+
+    steps: Steps[Any]
+    should_stop: ShouldStop
+    is_urgent: bool
+    is_done: threading.Event = field(default_factory=threading.Event)
+    result: Any = None
+    error: Exception | None = None
+
+
+class WindowWork:
+    """`run` is called by other threads, everything else by the thread of the window."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread that asks, when there is something to do."""
+        self._wake = wake
+        self._new: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
+        self._asked: list[_Asked] = []
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether `advance` has something to do."""
+        return bool(self._asked) or not self._new.empty()
+
+    def run(self, steps: Steps[Result], should_stop: ShouldStop, is_urgent: bool = False) -> Result:
+        """Have this done, and wait. is_urgent: before what is not. Raises what the steps raise, and Cancelled once
+        should_stop is true.
+        """
+        asked = _Asked(steps, should_stop, is_urgent)
+        self._new.put(asked)
+        self._wake()
+        while not asked.is_done.wait(LOOK_S):
+            raise_if_stopped(should_stop)
+        if asked.error is not None:
+            raise asked.error
+        result: Result = asked.result
+        return result
+
+    def advance(self, budget_s: float) -> None:
+        """Take steps for about that long, at least one."""
+        end = time.perf_counter() + budget_s
+        self.forget_stopped()
+        while self._asked:
+            self._step(min(self._asked, key=lambda asked: not asked.is_urgent))
+            if time.perf_counter() >= end:
+                return
+
+    def forget_stopped(self) -> None:
+        """Take no more steps for jobs that should stop, and free what they hold."""
+        while not self._new.empty():
+            self._asked.append(self._new.get())
+        for stopped in [asked for asked in self._asked if asked.should_stop()]:
+            stopped.steps.close()
+            self._asked.remove(stopped)
+
+    def _step(self, asked: _Asked) -> None:
+        try:
+            next(asked.steps)
+            return
+        except StopIteration as end:
+            asked.result = end.value
+        except Exception as error:  # the thread that asked says so
+            asked.error = error
+        self._asked.remove(asked)
+        asked.is_done.set()

@@ -1,0 +1,77 @@
+"""Long work in the notice corner, however it was started: what it is, how far it is, how long it takes, and a button
+that gives it up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from iibr_core.runtime.time_left import about_left
+from viewer.model.actions import Action, DoTask, StopWork
+from viewer.model.free_camera import LeaveCamera
+from viewer.model.layout import Layout
+from viewer.model.state.app_state import AppState
+from viewer.model.state.jobs import WRITING, CancelJobTask, JobKind, JobProgress
+from viewer.model.state.model_download import CancelGetTask
+from viewer.ui.panel import progress_text
+
+VERBS: dict[JobKind, str] = {"picture": "Saving", "map": "Saving", "copy": "Copying", "export": "Exporting"}
+
+
+@dataclass(frozen=True)
+class ProgressRow:
+    """key: names its button. done: share, 0..1. cancel: None where it can no longer be given up."""
+
+    key: str
+    words: str
+    done: float
+    cancel: Action | None
+
+
+def progress_rows(state: AppState) -> list[ProgressRow]:
+    """Of all that is under way, that which was begun by a question or a key."""
+    return [*_work_on_views(state), *map(_job_row, state.jobs)]
+
+
+def build_rows(rows: list[ProgressRow], layout: Layout) -> list[Action]:
+    """A bar, a button and the words of each; what was pressed comes back."""
+    actions: list[Action] = []
+    for row in rows:
+        imgui.progress_bar(row.done, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+        if row.cancel is not None:
+            if imgui.button(f"Cancel##{row.key}"):
+                actions.append(row.cancel)
+            imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        imgui.text_wrapped(row.words)
+    return actions
+
+
+def job_text(job: JobProgress) -> str:
+    """What it is and how far: "Saving a.png: drawing, 23 %, about 8 s left"."""
+    words = f"{VERBS[job.kind]} {job.name}: {job.doing or 'waiting for its turn'}"
+    if job.doing == WRITING:
+        return words
+    words += f", {round(100 * job.done)} %" if job.done else ""
+    return words if job.left_s is None else f"{words}, {about_left(job.left_s)}"
+
+
+def _job_row(job: JobProgress) -> ProgressRow:
+    cancel = DoTask(CancelJobTask(job.id)) if job.can_be_cancelled else None
+    return ProgressRow(f"job {job.id}", job_text(job), job.done, cancel)
+
+
+def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
+    progress, downloading = state.progress, state.downloading
+    is_working = not progress.is_complete and state.stopped != state.generation and bool(progress_text(progress))
+    if is_working and state.source is not None and state.source.filled_grid is not None:
+        yield ProgressRow("views", f"Making views between: {progress_text(progress)}", progress.share, StopWork())
+    if state.free_progress is not None:
+        yield ProgressRow("looking", "Drawing what the photo hides", state.free_progress, LeaveCamera())
+    if downloading is not None:
+        words = f"Downloading {downloading.title}: {downloading.done:,} of {downloading.total:,} MB"
+        share = downloading.done / max(downloading.total, 1)
+        yield ProgressRow("download", words, share, DoTask(CancelGetTask()))
