@@ -48,4 +48,4 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
 
 def _export(write: Write, path: Path, options: ExportOptions, source: ExportSource) -> list[Action]:
     said = write(path, source, options)
-    return [Notify(Notice(f"Exported {path}. {said}" if said else f"Exported {path}"))]
+    return [Notify(Notice(f"Exported {path}. {said}" if said else f"Exported {path}", stays=True))]

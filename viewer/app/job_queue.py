@@ -158,7 +158,7 @@ class JobQueue:
             actions: list[Action] = result.value
             return actions
         lost = f"{running.path}: writing it stopped unexpectedly"
-        return [Notify(Notice(lost if result is None else result.message, is_error=True))]
+        return [Notify(Notice(lost if result is None else result.message, is_error=True, stays=True))]
 
     def _end(self, job: Job) -> None:
         self._jobs.remove(job)

@@ -109,7 +109,7 @@ def _save(shot: _Shot, source: ExportSource) -> list[Action]:
     pixels = _drawn(shot, saved, source)
     source.report_progress(1, 1, WRITING)
     path = export_picture(shot.path, pixels, saved)
-    return [Notify(Notice(f"Saved {path}")), EditsSaved(saved.settings.depth_edits)]
+    return [Notify(Notice(f"Saved {path}", stays=True)), EditsSaved(saved.settings.depth_edits)]
 
 
 def _copy(shot: _Shot, source: ExportSource) -> list[Action]:

@@ -53,7 +53,7 @@ def test_the_picture_is_copied_as_it_is_drawn_and_pasted_again(viewer: Driver) -
     data = subprocess.run([*CLIPBOARD, "-t", "image/png", "-o"], capture_output=True, check=True).stdout
     copied = np.asarray(Image.open(BytesIO(data)).convert("RGB"))
     assert copied.shape == (64, 96, 3)
-    assert not viewer.app.state.saving
+    assert not viewer.app.state.jobs
     viewer.until_idle()
     viewer.send("key", "ctrl+v")
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name.startswith("pasted-"))

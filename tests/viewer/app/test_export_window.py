@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,16 +12,31 @@ import pytest
 from imgui_bundle import imgui
 from PIL import Image, ImageSequence
 
+from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
+from viewer.app.exports.source import ExportSource
 from viewer.app.main_loop import App
 from viewer.gpu.refocus.render_settings import RenderSettings
-from viewer.model.actions import DismissNotice, DoTask, ShowPrompt
+from viewer.model.actions import (
+    Action,
+    DismissNotice,
+    DismissNotices,
+    DoTask,
+    EndGesture,
+    OpenPath,
+    Quit,
+    SetDepthStrength,
+    ShowPrompt,
+)
 from viewer.model.layout import ScreenSize
+from viewer.model.state.depth_editing import Paint, SetTone
 from viewer.model.state.exporting import ExportOptions, ExportPrompt, ExportTask
-from viewer.model.state.jobs import CancelJobTask
-from viewer.model.state.optics import MoveEye
+from viewer.model.state.jobs import WAITING_FOR_VIEWS, CancelJobTask
+from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss, SetTilt
 from viewer.model.state.scene import Source
+from viewer.model.state.tasks import SaveTask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)
 LARGE = ExportOptions(size=ScreenSize(600, 400), frames=200)
@@ -72,6 +89,174 @@ def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: 
     shown = viewer.app.scene_view.picture(RenderSettings(viewer.app.state.optics, ScreenSize(96, 64))).astype(int)
     view = np.asarray(Image.open(tmp_path / "field" / "v01_u01.png")).astype(int)
     assert np.abs(view - shown).max() <= 2
+
+
+def other_photo(folder: Path) -> Action:
+    """Opens a photo of another folder."""
+    (folder / "elsewhere").mkdir(exist_ok=True)
+    return OpenPath(Source(str(write_scene(folder / "elsewhere", "other", seed=1)), grid=GridShape(3, 3)))
+
+
+def ten_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
+    """Of everything that a picture depends on; the last one opens another photo."""
+    source = viewer.app.state.source
+    assert source is not None
+    return [
+        (MoveEye(ViewOffset(0.7, -0.4)),),
+        (SetFocus(1.5), SetAperture(1.2)),
+        (SetTilt((0.5, 0.2)),),
+        (SetGloss(Gloss()),),
+        (SetDepthStrength(0.6, is_finished=True),),
+        (Paint((0.5, 0.5)), Paint((0.7, 0.5)), EndGesture()),
+        (SetTone(DepthEdits(gamma=1.7), is_finished=True),),
+        (OpenPath(replace(source, grid=GridShape(5, 5))),),
+        (OpenPath(replace(source, quality="exact")),),
+        (other_photo(folder),),
+    ]
+
+
+def bytes_of(path: Path) -> dict[str, bytes]:
+    """Of a file, or of each in a folder."""
+    files = sorted(path.rglob("*")) if path.is_dir() else [path]
+    return {file.name: file.read_bytes() for file in files if file.is_file()}
+
+
+@pytest.fixture
+def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """What counts its pictures or views goes no farther than the second while this is not set."""
+    gate, watched = threading.Event(), ExportSource.watched
+
+    def held(self: ExportSource, items: Iterable[object], total: int, doing: str) -> Iterator[object]:
+        for number, item in enumerate(watched(self, items, total, doing)):
+            if number == 1:
+                gate.wait()
+            yield item
+
+    monkeypatch.setattr(ExportSource, "watched", held)
+    gate.set()
+    yield gate
+    gate.set()
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One small step of a picture a turn, so that there are many turns however fast the machine is."""
+    monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        ExportTask("gif", "a.gif", SMALL),
+        ExportTask("numbered-grid", "a"),
+        SaveTask("a.png", ScreenSize(1800, 1200)),
+        SaveTask("a.exr", ScreenSize(1800, 1200)),
+    ],
+    ids=lambda task: f"{type(task).__name__} {task.path}",
+)
+def test_what_is_under_way_stays_as_it_was_asked_for_whatever_is_changed(
+    viewer: Driver, tmp_path: Path, task: ExportTask | SaveTask, slow: None, gate: threading.Event
+) -> None:
+    """Ten changes, each seen by the window: the bytes are those of the same without them."""
+    app, name = viewer.app, task.path
+    app.do(SetAperture(2.0), MoveEye(ViewOffset(0.3, -0.2)), SetFocus(0.5))
+    viewer.until_idle()
+    for folder in ("alone", "disturbed"):
+        (tmp_path / folder).mkdir()
+    app.do(DoTask(replace(task, path=str(tmp_path / "alone" / name))))
+    viewer.until(lambda app: bool(texts(app)) and not app.state.jobs)
+    gate.clear()
+    app.do(DismissNotices(), DoTask(replace(task, path=str(tmp_path / "disturbed" / name))))
+    viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
+    for actions in ten_changes(viewer, tmp_path):
+        app.do(*actions)
+        app.step()
+        assert app.state.jobs, "it was done too soon to be disturbed"
+    gate.set()
+    viewer.until(lambda app: not app.state.jobs and app.state.progress.is_complete)
+    assert next(text for text in texts(app) if name in text).split()[0] in ("Exported", "Saved")
+    assert app.state.scene is not None
+    assert app.state.scene.name == "other"
+    alone, disturbed = (bytes_of(tmp_path / folder) for folder in ("alone", "disturbed"))
+    assert alone
+    assert alone == disturbed
+
+
+@pytest.mark.parametrize("kind", ["gif", "numbered-grid"])
+def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo(
+    open_window: Opener, photo_path: Path, tmp_path: Path, kind: str
+) -> None:
+    viewer = open_window(photo_path, grid=GridShape(5, 5))
+    app = viewer.app
+    viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
+    options = SMALL if kind == "gif" else ExportOptions()
+    app.do(SetAperture(2.0), DoTask(ExportTask(kind, str(tmp_path / f"early.{kind}"), options)))
+    app.step()
+    assert [job.doing for job in app.state.jobs] == [WAITING_FOR_VIEWS]
+    app.do(other_photo(tmp_path))
+    viewer.until(lambda app: not app.state.jobs)
+    assert f"Exported {tmp_path / f'early.{kind}'}" in texts(app)
+    viewer.until_idle()
+    app.do(OpenPath(Source(str(photo_path), grid=GridShape(5, 5))))
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "scene")
+    viewer.until_idle()
+    app.do(DismissNotices(), SetAperture(2.0), DoTask(ExportTask(kind, str(tmp_path / f"late.{kind}"), options)))
+    viewer.until(lambda app: f"Exported {tmp_path / f'late.{kind}'}" in texts(app))
+    early, late = (bytes_of(tmp_path / f"{when}.{kind}") for when in ("early", "late"))
+    assert list(early.values()) == list(late.values())
+
+
+def test_waiting_jobs_do_not_hold_the_views_of_scenes_that_were_left(
+    viewer: Driver, tmp_path: Path, slow: None
+) -> None:
+    """One set of views beside those on the screen at most; and none once all is done."""
+    app = viewer.app
+    jobs = app._side_effects._jobs._jobs
+    start(viewer, tmp_path / "a.gif")
+    for seed in range(3):
+        (tmp_path / str(seed)).mkdir()
+        app.do(OpenPath(Source(str(write_scene(tmp_path / str(seed), f"photo{seed}", seed)), grid=GridShape(3, 3))))
+        name = f"photo{seed}"
+        viewer.until(lambda app, name=name: app.state.scene.name == name and app.state.progress.is_complete)  # type: ignore[misc]
+        app.do(DoTask(ExportTask("gif", str(tmp_path / f"{seed}.gif"), SMALL)))
+        app.step()
+        held = {job.snapshot.field.colors for job in jobs if job.snapshot is not None}
+        shown = app.scene_view.renderer.field
+        assert shown is not None
+        assert len(held - {shown.colors}) <= 1
+    app.do(DoTask(CancelJobTask(app.state.jobs[0].id)))
+    viewer.until(lambda app: not app.state.jobs)
+    assert {f"Exported {tmp_path / f'{seed}.gif'}" for seed in range(3)} <= set(texts(app))
+    field = app.scene_view.renderer.field
+    assert field is not None
+    assert not field.is_shared
+
+
+def test_any_job_of_the_queue_can_be_given_up(viewer: Driver, tmp_path: Path, slow: None) -> None:
+    app = viewer.app
+    start(viewer, tmp_path / "a.gif")
+    for name in "bc":
+        app.do(DoTask(ExportTask("gif", str(tmp_path / f"{name}.gif"), SMALL)))
+    viewer.until(lambda app: len(app.state.jobs) == 3)
+    viewer.press(f"Cancel##job {app.state.jobs[1].id}", "notices")
+    viewer.until(lambda app: [job.name for job in app.state.jobs] == ["a.gif", "c.gif"])
+    viewer.press(f"Cancel##job {app.state.jobs[0].id}", "notices")
+    viewer.until(lambda app: not app.state.jobs)
+    assert sorted(path.name for path in tmp_path.glob("*.gif")) == ["c.gif"]
+
+
+def test_closing_asks_while_something_is_exported(viewer: Driver, tmp_path: Path) -> None:
+    app, out = viewer.app, tmp_path / "a.gif"
+    start(viewer, out)
+    app.do(Quit())
+    assert app.state.prompt == "quit"
+    viewer.press("Cancel", "prompt str")
+    viewer.until(lambda app: app.state.prompt is None)
+    app.do(Quit())
+    viewer.press("Wait, then quit", "prompt str")
+    viewer.until(lambda app: app.state.should_quit)
+    with Image.open(out) as image:
+        assert image.n_frames == LARGE.frames  # type: ignore[attr-defined]
 
 
 def test_closing_gives_up_and_leaves_nothing(viewer: Driver, tmp_path: Path) -> None:

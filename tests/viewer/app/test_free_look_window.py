@@ -59,7 +59,7 @@ def test_the_lens_blurs_what_it_sees_and_a_saved_picture_shows_that(viewer: Driv
     assert np.abs(blurred - sharp).mean() > 1.0
     path = tmp_path / "seen.png"
     viewer.app.do(DoTask(SaveTask(str(path), (blurred.shape[1], blurred.shape[0]))))
-    viewer.until(lambda app: path.exists() and app.state.saving is None)
+    viewer.until(lambda app: path.exists() and not app.state.jobs)
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.free_camera is None and app.free_look.shown is None)
     viewer.until_idle()

@@ -19,12 +19,11 @@ from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.full_picture import FullPicture
 from viewer.gpu.refocus.render_settings import RenderSettings
-from viewer.model.actions import Action, AskToSave, DismissNotice, DoTask, OpenPath, SetDepthStrength
+from viewer.model.actions import AskToSave, DismissNotice, DoTask
 from viewer.model.saved_settings import read_settings
+from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING, CancelJobTask, JobProgress
 from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.state.prompts import Saved, SavePrompt
-from viewer.model.state.saving import CancelSaveTask
-from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
 SIZE = 300, 200
@@ -47,7 +46,12 @@ def viewer(open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatc
 def start(viewer: Driver, path: Path, size_px: tuple[int, int] = LARGE) -> None:
     """Ask for a picture, and wait until some of it is drawn."""
     viewer.app.do(DoTask(SaveTask(str(path), size_px)))
-    viewer.until(lambda app: app.state.saving is not None and app.state.saving.drawn > 0)
+    viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
+
+
+def job_of(viewer: Driver) -> JobProgress:
+    """The one that was asked for first."""
+    return viewer.app.state.jobs[0]
 
 
 def texts(viewer: Driver) -> list[str]:
@@ -67,11 +71,11 @@ def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: 
         app.do(MoveEye(ViewOffset(0.01 * (turns % 50), 0.2)))
         app.step()
         turns += 1
-        if app.state.saving is not None:
-            shares.append(app.state.saving.drawn)
-            assert app.state.saving.drawn == 1 or app.wait_s == 0.0
+        if app.state.jobs:
+            shares.append(job_of(viewer).done)
+            assert job_of(viewer).done in (0, 1) or app.wait_s == 0.0
     assert texts(viewer) == [f"Saved {out}"]
-    assert app.state.saving is None
+    assert not app.state.jobs
     assert shares == sorted(shares)
     assert len(set(shares)) > 5
     assert min(app.frames_shown - frames, app.scene_view.pictures_drawn - drawn) > len(set(shares))
@@ -85,7 +89,6 @@ def test_views_that_come_again_wait_until_the_picture_is_drawn(viewer: Driver, t
     """Else each would make it begin anew."""
     app, out = viewer.app, tmp_path / "large.png"
     start(viewer, out)
-    drawing = app.scene_view.renderer._picture
     uploaded = app.scene_view.views_uploaded
     again = ViewUpdate(0, 0, np.zeros((HEIGHT, WIDTH, 3), np.uint8), np.zeros((HEIGHT, WIDTH), np.float32))
     app.scene_view.add(again)
@@ -93,8 +96,6 @@ def test_views_that_come_again_wait_until_the_picture_is_drawn(viewer: Driver, t
     assert app.scene_view.views_uploaded == uploaded
     assert app.wait_s == 0.0
     viewer.until(lambda app: bool(texts(viewer)))
-    assert drawing is not None
-    assert drawing.is_done
     viewer.until(lambda app: app.scene_view.views_uploaded == uploaded + 1)
 
 
@@ -102,13 +103,13 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_
     before = set(tmp_path.iterdir())
     start(viewer, tmp_path / "large.png")
     viewer.app.do(DoTask(SaveTask(str(tmp_path / "next.png"), (48, 32))))
-    viewer.until(lambda app: app.state.saving is not None and app.state.saving.waiting == 1)
-    viewer.press("Cancel##saving", "notices")
-    viewer.until(lambda app: app.state.saving is None or app.state.saving.name == "next.png")
-    viewer.until(lambda app: app.state.saving is None)
+    viewer.until(lambda app: len(app.state.jobs) == 2)
+    viewer.press(f"Cancel##job {job_of(viewer).id}", "notices")
+    viewer.until(lambda app: [job.name for job in app.state.jobs] in ([], ["next.png"]))
+    viewer.until(lambda app: not app.state.jobs)
     assert texts(viewer) == [f"Saved {tmp_path / 'next.png'}"]
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
-    viewer.app.do(DoTask(CancelSaveTask()))
+    viewer.app.do(DoTask(CancelJobTask(1)))
     viewer.until_idle()
 
 
@@ -117,7 +118,7 @@ def test_pictures_are_saved_in_the_order_in_which_they_were_asked_for(viewer: Dr
     for i, eye in enumerate(eyes):
         viewer.app.do(MoveEye(eye), DoTask(SaveTask(str(tmp_path / f"{i}.png"), (48, 32))))
         viewer.app.step()
-    viewer.until(lambda app: len(app.state.notices) == 3 and app.state.saving is None)
+    viewer.until(lambda app: len(app.state.notices) == 3 and not app.state.jobs)
     assert texts(viewer) == [f"Saved {tmp_path / f'{i}.png'}" for i in range(3)]
     assert [read_settings(tmp_path / f"{i}.png").optics.eye for i in range(3)] == eyes
 
@@ -159,21 +160,18 @@ def test_a_map_that_was_saved_may_be_saved_again(viewer: Driver, tmp_path: Path)
     viewer.until(lambda app: app.state.prompt == SavePrompt(str(path), (48, 32), already_there=True, what="map"))
 
 
-@pytest.mark.parametrize("change", ["scene", "depth"])
-def test_a_picture_whose_views_go_is_given_up(viewer: Driver, tmp_path: Path, change: str) -> None:
-    other = write_scene(tmp_path, "other", seed=1)
-    action: Action = SetDepthStrength(1.5, is_finished=True)
-    if change == "scene":
-        action = OpenPath(Source(str(other), grid=GridShape(3, 3)))
-    before = set(tmp_path.iterdir())
-    start(viewer, tmp_path / "large.png")
-    viewer.app.do(action)
-    viewer.until(lambda app: app.state.saving is None)
-    assert any("large.png: not saved" in text for text in texts(viewer))
-    viewer.until_idle()
-    assert set(tmp_path.iterdir()) == before
-    viewer.app.do(DoTask(SaveTask(str(tmp_path / "small.png"), (48, 32))))
-    viewer.until(lambda app: any("Saved" in text for text in texts(viewer)))
+def test_a_picture_waits_for_the_views(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    viewer = open_window(photo_path, grid=GridShape(9, 9))
+    app, out = viewer.app, tmp_path / "out.png"
+    viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
+    app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0), DoTask(SaveTask(str(out), SIZE)))
+    app.step()
+    assert job_of(viewer).doing == WAITING_FOR_VIEWS
+    asked = app.state.optics
+    viewer.until(lambda app: not app.state.jobs)
+    assert app.state.progress.is_complete
+    expected = app.scene_view.picture(RenderSettings(asked, SIZE))
+    np.testing.assert_array_equal(np.rint(read_photo(out).pixels * 255), expected)
 
 
 def test_closing_the_window_gives_up_what_is_being_drawn(viewer: Driver, tmp_path: Path) -> None:
@@ -186,7 +184,7 @@ def test_closing_the_window_gives_up_what_is_being_drawn(viewer: Driver, tmp_pat
 def test_closing_the_window_waits_for_what_is_being_written(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     viewer.app.do(DoTask(SaveTask(str(out), SIZE)))
-    viewer.until(lambda app: app.state.saving is not None and app.state.saving.drawn == 1)
+    viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].doing == WRITING)
     viewer.close()
     assert read_photo(out).pixels.shape == (200, 300, 3)
     assert not list(tmp_path.glob(".iibr-*"))
@@ -254,8 +252,7 @@ def test_a_picture_at_the_photos_own_size_can_be_given_up(
         endless.setattr(FullPicture, "draw", draw)
         large.app.do(DoTask(SaveTask(str(tmp_path / "out.png"), (WIDTH, HEIGHT))))
         large.until(lambda app: begun.is_set())
-        assert large.app.state.saving is not None
-        large.app.do(DoTask(CancelSaveTask()), DoTask(SaveTask(str(tmp_path / "next.png"), (16, 12))))
+        large.app.do(DoTask(CancelJobTask(job_of(large).id)), DoTask(SaveTask(str(tmp_path / "next.png"), (16, 12))))
         large.until(lambda app: f"Saved {tmp_path / 'next.png'}" in texts(large))
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
 

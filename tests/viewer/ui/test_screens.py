@@ -32,6 +32,7 @@ from viewer.model.actions import (
 from viewer.model.layout import PANEL_WIDTH, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
+from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
     APERTURE_KINDS,
@@ -43,9 +44,9 @@ from viewer.model.state.optics import (
 )
 from viewer.model.state.preferences import SECTIONS, Section
 from viewer.model.state.prompts import PalettePrompt
-from viewer.model.state.saving import SavedSettings, Saving, SavingChanged
+from viewer.model.state.saving import SavedSettings
 from viewer.model.state.scene import Progress, Source
-from viewer.ui.overlays.notices import saving_text
+from viewer.ui.overlays.progress_rows import job_text
 from viewer.ui.style import DARK, LIGHT
 
 SIZE = 640, 880
@@ -88,7 +89,7 @@ def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section
         AskToSave(),
         AskForPath("photo"),
         Notify(Notice("damaged.png: cut off", is_error=True)),
-        SavingChanged(Saving("large.png", 0.4, waiting=1)),
+        JobsChanged((JobProgress(1, "picture", "large.png", "drawing", 0.4), JobProgress(2, "export", "a.mp4"))),
         ShowTiltHandles(True),
         SetHover(Hover(48.0, 32.0, 1.5)),
     ],
@@ -168,10 +169,12 @@ def test_settings_on_offer_have_a_button(viewer: HeadlessViewer) -> None:
     assert changed_after(viewer, DismissNotice(plain), Notify(offer)).sum() > 5 * ENOUGH_PIXELS
 
 
-def test_what_is_being_saved_in_words() -> None:
-    assert saving_text(Saving("a.png", 0.234)) == "Drawing a.png, 23 %"
-    assert saving_text(Saving("a.png", 0.0, 2)) == "Drawing a.png, 0 %, 2 more to save"
-    assert saving_text(Saving("a.exr", 1.0)) == "Writing a.exr"
+def test_what_is_under_way_in_words() -> None:
+    drawing = JobProgress(1, "picture", "a.png", "drawing", 0.23)
+    assert job_text(drawing) == "Saving a.png: drawing, 23 %"
+    assert job_text(replace(drawing, left_s=8.0)) == "Saving a.png: drawing, 23 %, about 8 s left"
+    assert job_text(replace(drawing, doing=WRITING, done=1.0)) == "Saving a.png: writing the file"
+    assert job_text(JobProgress(2, "export", "a.mp4")) == "Exporting a.mp4: waiting for its turn"
 
 
 def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(

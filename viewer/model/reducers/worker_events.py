@@ -97,7 +97,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         opened = replace(opened, tasks=(*opened.tasks, *beside))
     return replace(
         opened,
-        notices=notices,
+        notices=(*(notice for notice in state.notices if notice.stays), *notices)[-NOTICES_KEPT:],
         history=History(),
         motion=motion,
         recent=recent,

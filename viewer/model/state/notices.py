@@ -13,13 +13,14 @@ SHORT_NOTICE_S, LONG_NOTICE_S = 12.0, 30.0
 class Notice:
     """A message the user can dismiss, or wait for it to go. offer: settings that a button beside it takes over.
 
-    commands: names of commands that do what it advises, a button each.
+    commands: names of commands that do what it advises, a button each. stays: when another photo is opened.
     """
 
     text: str
     is_error: bool = False
     offer: SavedSettings | None = None
     commands: tuple[str, ...] = ()
+    stays: bool = False
 
     @property
     def seconds(self) -> float:
