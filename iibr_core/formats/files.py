@@ -11,7 +11,7 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import BinaryIO
 
 from iibr_core.types import InputError
@@ -31,6 +31,7 @@ SPECIAL_FILES = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
+MOST_SHOWN_CHARACTERS = 80
 
 
 def reason_of(failure: Exception | str) -> str:
@@ -47,6 +48,12 @@ def reason_of(failure: Exception | str) -> str:
 def shown_name(name: str) -> str:
     """A file's name for people and for files of UTF-8: bytes in it that are no text become the sign for that."""
     return os.fsencode(name).decode("utf-8", "replace")
+
+
+def printable(text: str) -> str:
+    """The start of a text that came out of a file, for a message: one line, without control characters."""
+    line = "".join(character if character.isprintable() else "?" for character in text)
+    return line if len(line) <= MOST_SHOWN_CHARACTERS else f"{line[: MOST_SHOWN_CHARACTERS - 3]}..."
 
 
 def status_of(path: Path) -> os.stat_result | None:
@@ -76,6 +83,34 @@ def is_folder(path: Path) -> bool:
     """Whether there is a folder. Raises InputError as `status_of` does."""
     status = status_of(path)
     return status is not None and stat.S_ISDIR(status.st_mode)
+
+
+def ordinary_file(path: Path) -> Path | None:
+    """The path where an ordinary file is, None where nothing is. It is not opened.
+
+    Raises InputError where a link, a folder, a device or the like is.
+    """
+    try:
+        status = os.lstat(path)
+    except (OSError, ValueError) as error:  # ValueError: no name of a file
+        if isinstance(error, ValueError) or error.errno in NOTHING_THERE:
+            return None
+        raise InputError(f"{path}: cannot be looked at ({error.strerror or error})") from error
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(f"{path}: is a link, a folder or a device; put an ordinary file there, or nothing")
+    return path
+
+
+def file_within(folder: Path, name: str) -> Path | None:
+    """The ordinary file of a plain name in a folder; None where the name leads elsewhere or no such file is. For names
+    that come out of a file.
+    """
+    if name in ("", ".", "..") or not name == PurePosixPath(name).name == PureWindowsPath(name).name:
+        return None
+    try:
+        return ordinary_file(folder / name)
+    except InputError:
+        return None
 
 
 def entries_of(folder: Path) -> list[Path]:

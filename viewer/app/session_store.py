@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.formats.files import is_folder
+from iibr_core.formats.files import is_folder, ordinary_file
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
@@ -32,8 +32,8 @@ QUIET_S = 2.0
 """So long nothing must have changed before it is written."""
 HASHED_AT_ONCE = 1 << 20
 MOST_KEPT = 1000
-MOST_BYTES = 2_000_000
-"""Of one: as much as settings may have."""
+MOST_BYTES = 20_000_000
+"""Of one: more than settings may have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,12 @@ class SessionStore:
         if found.problem:
             return [Notify(Notice(found.problem))]
         is_open = state.scene is not None and state.scene.source is found.scene.source
-        return [RestoreSession(found.settings)] if is_open and found.settings is not None else []
+        if not is_open or found.settings is None:
+            return []
+        from viewer.model.saved_settings import left_out_note
+
+        note = left_out_note(found.settings)
+        return [RestoreSession(found.settings), *([Notify(Notice(note))] if note else [])]
 
 
 def sidecar_of(path: Path) -> Path:
@@ -136,24 +141,32 @@ def sidecar_of(path: Path) -> Path:
 
 def write_sidecar(path: Path, settings: SavedSettings) -> Path:
     """Write them beside a photo; where that is. Raises InputError."""
-    _write(sidecar_of(path), settings)
+    _write(sidecar_of(path), settings, path.parent)
     return sidecar_of(path)
 
 
 def _find(folder: Path, scene: Scene) -> SessionFound:
-    """What was kept in the folder, else beside the photo."""
+    """What was kept in the folder, else beside the photo: a stranger may have put that there."""
     from viewer.model.saved_settings import settings_from_text
 
-    for path in (folder / f"{_key_of(scene.source)}.json", sidecar_of(Path(scene.source.path))):
-        try:
-            with path.open("rb") as file:
-                text = file.read(MOST_BYTES).decode("utf-8", "replace")
-            return SessionFound(scene, settings_from_text(text, str(path)))
-        except OSError:
-            continue
-        except InputError as error:
-            return SessionFound(scene, None, str(error))
+    sidecar = sidecar_of(Path(scene.source.path))
+    kept = folder / f"{_key_of(scene.source)}.json"
+    try:
+        if ordinary_file(kept) is not None:
+            return SessionFound(scene, settings_from_text(_read_text(kept), str(kept), is_own=True))
+        if ordinary_file(sidecar) is not None:
+            return SessionFound(scene, settings_from_text(_read_text(sidecar), str(sidecar), sidecar.parent))
+    except InputError as error:
+        return SessionFound(scene, None, str(error))
     return SessionFound(scene, None)
+
+
+def _read_text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return file.read(MOST_BYTES).decode("utf-8-sig", "replace")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); change its permissions") from error
 
 
 def _can_write(folder: Path) -> bool:
@@ -171,11 +184,11 @@ def _keep(folder: Path, source: Source, settings: SavedSettings) -> None:
     _forget_oldest(folder)
 
 
-def _write(path: Path, settings: SavedSettings) -> None:
+def _write(path: Path, settings: SavedSettings, names_files_in: Path | None = None) -> None:
     from viewer.model.saved_settings import settings_text
 
     with atomic_write(path) as temporary:
-        temporary.write_text(settings_text(settings), "utf-8")
+        temporary.write_text(settings_text(settings, names_files_in), "utf-8")
 
 
 def _forget_oldest(folder: Path) -> None:

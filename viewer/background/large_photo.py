@@ -79,7 +79,7 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
         values = refine(photo.pixels, values, settings.refine, unknown, should_stop)
     if file is None or settings.edits == UNEDITED:
         return values
-    return apply_edits(photo.pixels, values / enlarged, settings.edits) * enlarged
+    return apply_edits(photo.pixels, values / enlarged, settings.edits, should_stop) * enlarged
 
 
 def _larger_map(loaded: LoadedPhoto) -> Path | None:

@@ -166,7 +166,7 @@ def apply_depth_settings(
         return loaded
     if loaded.depth_settings.refine != depth_settings.refine:
         loaded = _refine(loaded, depth_settings.refine, should_stop)
-    values = loaded.canvas.apply(depth_settings.edits)
+    values = loaded.canvas.apply(depth_settings.edits, should_stop)
     return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
 
 

@@ -148,7 +148,7 @@ def screenshot(
 def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Shot:
     """With the settings of a picture saved before, except for the options given."""
     from viewer.model.actions import TakeSettings
-    from viewer.model.saved_settings import read_settings, require_saved_size, source_like, unknown_note
+    from viewer.model.saved_settings import left_out_note, read_settings, require_saved_size, source_like
 
     saved = read_settings(like)
     if shot.size is None and not ui:
@@ -159,7 +159,7 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
         shot.size or (None if ui else ScreenSize(*saved.size_px)),
         saved.depth_edits,
         (TakeSettings(saved),),
-        tuple(filter(None, [unknown_note(saved)])),
+        tuple(filter(None, [left_out_note(saved)])),
     )
 
 

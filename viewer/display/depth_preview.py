@@ -19,6 +19,9 @@ from viewer.model.state.scene import Scene
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas
 
+MOST_STROKES = 8
+"""That the drawing thread paints for one frame."""
+
 
 class DepthPreview:
     """Keeps a canvas of its own, of the scene on the stage; called from the one GL thread."""
@@ -26,6 +29,7 @@ class DepthPreview:
     def __init__(self, scene_view: SceneView) -> None:
         self._scene_view = scene_view
         self._loaded: LoadedPhoto | None = None
+        self._resumed: LoadedPhoto | None = None
         self._canvas: DepthCanvas | None = None
         self._shown: DepthEdits | None = None
         self._still: tuple[DepthEdits, float] | None = None
@@ -44,16 +48,24 @@ class DepthPreview:
                 self._canvas = self._still = None
             self._loaded, self._shown = loaded, loaded.depth_settings.edits
         wanted = current_depth_settings(state).edits
-        if wanted != self._shown and scene.source is state.source:
+        if wanted != self._shown and scene.source is state.source and self._is_quick(wanted, loaded):
             self._scene_view.show_disparity(self._field_disparity(wanted, scene, loaded))
             self._shown = wanted
 
-    def _field_disparity(self, edits: DepthEdits, scene: Scene, loaded: LoadedPhoto) -> np.ndarray:
-        """In px per view step of the plan that the views before were made with."""
+    def _is_quick(self, edits: DepthEdits, loaded: LoadedPhoto) -> bool:
+        """Whether a frame may wait for them; else they are seen when the worker has painted them."""
         from iibr_core.depth.editing.canvas import DepthCanvas
 
-        assert scene.plan is not None
         self._canvas = self._canvas or DepthCanvas(loaded.photo.pixels, loaded.refined.values)
+        if self._canvas.strokes_ahead(edits) > MOST_STROKES and self._resumed is not loaded:
+            self._canvas.resume(loaded.depth_settings.edits, loaded.disparity.values)
+            self._resumed = loaded
+        return self._canvas.strokes_ahead(edits) <= MOST_STROKES
+
+    def _field_disparity(self, edits: DepthEdits, scene: Scene, loaded: LoadedPhoto) -> np.ndarray:
+        """In px per view step of the plan that the views before were made with."""
+        assert self._canvas is not None
+        assert scene.plan is not None
         values = self._canvas.apply(edits)
         if self._still is None or self._still[0] != edits.tone:
             self._still = edits.tone, still_disparity(scene.source, self._canvas.before_strokes(edits))

@@ -1,5 +1,7 @@
 """Settings inside a saved picture, as JSON in its metadata: enough to take the same picture of the same photo again.
 
+A stranger may have written such a text: no path in it is opened, except a plain name that lies beside a sidecar.
+
 Whoever needs this module imports it late: msgspec would cost the window 10 to 40 ms before its first frame.
 """
 
@@ -15,18 +17,23 @@ from typing import Annotated, Any
 import msgspec
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
+from iibr_core.formats.files import file_within, printable
 from iibr_core.rendering.gloss.settings import require_sound as require_sound_gloss
 from iibr_core.types import GridShape, InputError, Quality
 from viewer.model.layout import ScreenSize
 from viewer.model.lens.limits import BLADES_LIMITS
+from viewer.model.painting_work import require_bounded
 from viewer.model.state.optics import ApertureShape, Optics
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.scene import Source
 
 ATTRIBUTE = "iibr:settings"
 FORMAT = 1
-MOST_CHARACTERS = 1_000_000
+MOST_CHARACTERS = 16_000_000
+"""A thousand strokes take 1.3 million."""
 MASK_LIMITS = (1, 4096)
+OF_THE_MACHINE = ("source.max_pixels", "source.memory_bytes")
+"""Written by earlier programs; a picture does not decide them."""
 UNKNOWN_TOLD = 3
 
 MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
@@ -34,7 +41,6 @@ MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
 
 SidePx = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
-Amount = Annotated[int, msgspec.Meta(ge=1, le=2**62)]
 
 
 class SourceText(msgspec.Struct, frozen=True, kw_only=True):
@@ -43,8 +49,6 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
     disparity_scale: float
     grid: tuple[Views, Views] | None = None
     focus_disparity: float | None = None
-    max_pixels: Amount | None = None
-    memory_bytes: Amount | None = None
     quality: Quality | None
     refine: float = 1.0
 
@@ -65,11 +69,11 @@ class SettingsText(FormatText, frozen=True, kw_only=True):
     depth_edits: DepthEdits = UNEDITED
 
 
-def settings_text(settings: SavedSettings) -> str:
-    """The settings as JSON."""
+def settings_text(settings: SavedSettings, folder: Path | None = None) -> str:
+    """The settings as JSON. folder: of a sidecar, which may name a file that lies in it; None: no file is named."""
     whole = {
         "format": FORMAT,
-        "optics": _text_of_optics(settings.optics),
+        "optics": _text_of_optics(settings.optics, folder),
         "depth_strength": settings.depth_strength,
         "source": _text_of_source(settings.source),
         "size_px": settings.size_px,
@@ -80,11 +84,14 @@ def settings_text(settings: SavedSettings) -> str:
     return json.dumps(whole, separators=(",", ":"), allow_nan=False, default=_json_value)
 
 
-def settings_from_text(text: str, name: str) -> SavedSettings:
+def settings_from_text(text: str, name: str, folder: Path | None = None, is_own: bool = False) -> SavedSettings:
     """The inverse of `settings_text`. name: of the picture, for the message.
 
-    What this program does not know is left out and named in the result. Raises InputError, which names the field, where
-    the text is damaged, of a newer program, or means nothing: a picture like another but for one value is not like it.
+    folder: of a sidecar, which may name a file that lies in it; None: no file is taken. is_own: kept by this program
+    for its user, who may have painted for as long as they liked. What this program does not know
+    is left out and named in the result, as is a file that may not be opened. Raises InputError, which names the field,
+    where the text is damaged, of a newer program, or means nothing: a picture like another but for one value is not
+    like it.
     """
     try:
         whole = msgspec.json.decode(text if len(text) <= MOST_CHARACTERS else "")
@@ -96,14 +103,19 @@ def settings_from_text(text: str, name: str) -> SavedSettings:
         require_sound(read.depth_edits)
         if read.optics.gloss is not None:
             require_sound_gloss(read.optics.gloss)
+        if not is_own:
+            require_bounded(read.depth_edits.strokes, read.optics.gloss.surface.strokes if read.optics.gloss else ())
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
         raise InputError(
             f"{name}: its settings are damaged or of another program ({reason}); set them by hand"
         ) from error
-    unknown = tuple(dict.fromkeys(_unknown_fields(whole, msgspec.to_builtins(read))))
+    named = dict.fromkeys(_unknown_fields(whole, msgspec.to_builtins(read)))
+    unknown = tuple(field for field in named if field not in OF_THE_MACHINE)
+    optics, refused = _with_own_files(read.optics, folder)
     source = _source_from_text(Source(""), read.source)
-    return SavedSettings(read.optics, read.depth_strength, source, ScreenSize(*read.size_px), read.depth_edits, unknown)
+    size = ScreenSize(*read.size_px)
+    return SavedSettings(optics, read.depth_strength, source, size, read.depth_edits, unknown, refused)
 
 
 def read_settings(path: Path) -> SavedSettings:
@@ -159,20 +171,40 @@ def source_like(source: Source, saved: SavedSettings, given: Collection[str]) ->
     return _source_from_text(source, msgspec.structs.replace(_text_of_source(source), **taken))
 
 
-def unknown_note(settings: SavedSettings) -> str:
-    """One sentence about what was left out; empty where all was understood."""
-    names = settings.unknown_fields
-    if not names:
-        return ""
-    more = f" and {len(names) - UNKNOWN_TOLD} more" if len(names) > UNKNOWN_TOLD else ""
-    return f"Its settings hold what this program does not know and leaves out: {', '.join(names[:UNKNOWN_TOLD])}{more}."
+def left_out_note(settings: SavedSettings) -> str:
+    """What of the settings was left out, for people; empty where all was taken."""
+    names, sentences = settings.unknown_fields, []
+    if names:
+        more = f" and {len(names) - UNKNOWN_TOLD} more" if len(names) > UNKNOWN_TOLD else ""
+        told = ", ".join(names[:UNKNOWN_TOLD])
+        sentences.append(f"Its settings hold what this program does not know and leaves out: {told}{more}.")
+    if settings.refused_file:
+        sentences.append(
+            f"Its settings name a file, {printable(settings.refused_file)}, which was not opened:"
+            " choose the environment map yourself."
+        )
+    return " ".join(sentences)
 
 
-def _text_of_optics(optics: Optics) -> dict[str, Any]:
-    """By field; a gloss only where there is one, without the path of its surroundings: that is on one machine only."""
+def _with_own_files(optics: Optics, folder: Path | None) -> tuple[Optics, str]:
+    """The optics with the path of a file in the folder, else without; the name that was refused, "" where none was."""
+    gloss = optics.gloss
+    if gloss is None or not gloss.environment:
+        return optics, ""
+    found = None if folder is None else file_within(folder, gloss.environment)
+    environment, refused = ("", gloss.environment) if found is None else (str(found), "")
+    return dataclasses.replace(optics, gloss=dataclasses.replace(gloss, environment=environment)), refused
+
+
+def _text_of_optics(optics: Optics, folder: Path | None) -> dict[str, Any]:
+    """By field; a gloss only where there is one. Its environment map only by name, and where it lies in the folder."""
     fields = {field.name: getattr(optics, field.name) for field in dataclasses.fields(optics)}
     gloss = fields.pop("gloss")
-    return fields if gloss is None else {**fields, "gloss": dataclasses.replace(gloss, environment="")}
+    if gloss is None:
+        return fields
+    environment = Path(gloss.environment)
+    name = environment.name if folder is not None and environment.parent.absolute() == folder.absolute() else ""
+    return {**fields, "gloss": dataclasses.replace(gloss, environment=name)}
 
 
 def _json_value(value: Any) -> Any:
@@ -186,23 +218,18 @@ def _text_of_source(source: Source) -> SourceText:
         disparity_scale=source.depth.file_scale,
         grid=source.grid,
         focus_disparity=source.focus_disparity,
-        max_pixels=source.max_pixels,
-        memory_bytes=source.depth.memory_bytes,
         quality=source.quality,
         refine=source.depth.refine,
     )
 
 
 def _source_from_text(source: Source, text: SourceText) -> Source:
-    """The source with what the text says; its paths and where depth is looked for stay."""
+    """The source with what the text says; its paths, where depth is looked for, and the machine's limits stay."""
     return dataclasses.replace(
         source,
-        depth=dataclasses.replace(
-            source.depth, file_scale=text.disparity_scale, refine=text.refine, memory_bytes=text.memory_bytes
-        ),
+        depth=dataclasses.replace(source.depth, file_scale=text.disparity_scale, refine=text.refine),
         grid=None if text.grid is None else GridShape(*text.grid),
         focus_disparity=text.focus_disparity,
-        max_pixels=text.max_pixels,
         quality=text.quality,
     )
 
@@ -232,7 +259,7 @@ def _unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:
             if name in known:
                 yield from _unknown_fields(value, known[name], f"{within}{name}.")
             else:
-                yield within + " ".join(name.split())[:40]
+                yield within + printable(" ".join(name.split())[:40])
     elif isinstance(raw, list) and isinstance(known, list | tuple):
         for value, known_value in zip(raw, known):
             yield from _unknown_fields(value, known_value, within)

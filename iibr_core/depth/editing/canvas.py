@@ -21,6 +21,7 @@ from iibr_core.depth.editing.stroke_distance import Window, falloff, measure_fro
 from iibr_core.depth.editing.surface import surface_at
 from iibr_core.depth.editing.touched_colors import Guide, guide_of
 from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage
 
 MAPS_KEPT = 8
@@ -29,13 +30,16 @@ SIGNS: dict[BrushTool, float] = {"nearer": 1.0, "farther": -1.0}
 MOST = float(np.finfo(np.float32).max)
 
 
-def apply_edits(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
+def apply_edits(
+    photo: FloatImage, disparity: FloatImage, edits: DepthEdits, should_stop: ShouldStop = never
+) -> FloatImage:
     """The map with all its edits: (H, W) float32, finite; the map itself where nothing is edited.
 
     photo: (H, W, 3), sRGB-encoded, guides the strokes. disparity: (H, W), any unit in which larger is closer.
-    Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known.
+    Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known, Cancelled once
+    should_stop is true.
     """
-    return DepthCanvas(photo, disparity).apply(edits)
+    return DepthCanvas(photo, disparity).apply(edits, should_stop)
 
 
 class DepthCanvas:
@@ -50,6 +54,7 @@ class DepthCanvas:
             raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
         self._photo, self._given = photo, np.asarray(disparity, np.float32)
         self._guide: Guide | None = None
+        self._texture: float | None = None
         self._is_known = bool(np.isfinite(self._given).all())
         self._extent: tuple[float, float] | None = None
         self._edits = UNEDITED.tone
@@ -58,8 +63,10 @@ class DepthCanvas:
         self._open: _OpenStroke | None = None
         self._trail: list[tuple[int, FloatImage]] = []  # (strokes, map) before the last ones, to go back to
 
-    def apply(self, edits: DepthEdits) -> FloatImage:
-        """The map with these edits, (H, W) float32; not to be written to. Raises InputError as `apply_edits` does."""
+    def apply(self, edits: DepthEdits, should_stop: ShouldStop = never) -> FloatImage:
+        """The map with these edits, (H, W) float32; not to be written to. Raises as `apply_edits` does; what was
+        painted until then is kept.
+        """
         if edits == UNEDITED and self._is_known:
             return self._given
         require_sound(edits)
@@ -69,8 +76,27 @@ class DepthCanvas:
             self._forget(edits)
         self._return_to(edits)
         for stroke in edits.strokes[len(self._edits.strokes) :]:
+            raise_if_stopped(should_stop)
             self._begin(stroke)
         return self._values
+
+    def resume(self, edits: DepthEdits, values: FloatImage) -> None:
+        """Go on from the map that these edits made of the same photo and disparity elsewhere."""
+        self._extent = self._extent or extent_of(self._given)
+        self._toned = apply_tone(self._given, edits, self._extent)
+        self._edits, self._values, self._open = edits, values, None
+        self._trail = [(len(edits.strokes), values)]
+
+    def strokes_ahead(self, edits: DepthEdits) -> int:
+        """How many strokes `apply` would paint."""
+        done, wanted = self._edits.strokes, edits.strokes
+        if self._toned is None or self._edits.tone != edits.tone:
+            return len(wanted)
+        alike = _alike(done, wanted)
+        kept = (
+            len(done) if alike == len(done) else max((count for count, _ in self._trail if count <= alike), default=0)
+        )
+        return len(wanted) - kept
 
     def before_strokes(self, edits: DepthEdits) -> FloatImage:
         """The map without the strokes of these edits: what stays as it is where the brush does not go."""
@@ -90,7 +116,7 @@ class DepthCanvas:
         done, wanted = self._edits.strokes, edits.strokes
         if wanted[: len(done)] == done:
             return
-        alike = next((i for i, (a, b) in enumerate(zip(done, wanted)) if a != b), min(len(done), len(wanted)))
+        alike = _alike(done, wanted)
         is_last = self._open is not None and alike == len(done) - 1 < len(wanted)
         if is_last and _goes_on(done[-1], wanted[alike]):
             self._go_on(wanted[alike], first=len(done[-1].points))
@@ -118,7 +144,8 @@ class DepthCanvas:
         """The map that a stroke leads to, None where it moves what is there."""
         if stroke.tool == "smooth":
             radius = stroke.radius_px(under.shape[1])
-            return smooth_within_contours(self._photo, under, radius, texture_contrast(self._photo))
+            self._texture = texture_contrast(self._photo) if self._texture is None else self._texture
+            return smooth_within_contours(self._photo, under, radius, self._texture)
         if stroke.tool in DEPTH_TOOLS:
             return np.full_like(under, _value_at(under, stroke.taken_from or stroke.points[0]))
         return None
@@ -168,6 +195,11 @@ def _value_at(values: FloatImage, place: tuple[float, float]) -> float:
     height, width = values.shape
     x, y = (min(max(share, 0.0), 1.0) for share in place)
     return float(values[min(int(y * height), height - 1), min(int(x * width), width - 1)])
+
+
+def _alike(done: tuple[Stroke, ...], wanted: tuple[Stroke, ...]) -> int:
+    """How many strokes both begin with."""
+    return next((i for i, (a, b) in enumerate(zip(done, wanted)) if a != b), min(len(done), len(wanted)))
 
 
 def _goes_on(old: Stroke, new: Stroke) -> bool:

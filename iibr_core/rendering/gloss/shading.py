@@ -66,7 +66,7 @@ def make_gloss_maps(
     require_sound(gloss)
     if normals is None:
         normals = fit_normals(disparity, geometry, should_stop)
-    mask = surface_mask(gloss.surface, photo, disparity)
+    mask = surface_mask(gloss.surface, photo, disparity, should_stop)
     around = None if environment is None else prefilter_environment(environment, gloss.roughness, should_stop)
     maps = GlossMaps(gloss, geometry, normals, disparity, mask, None, None, around)
     if not gloss.photo_shines:

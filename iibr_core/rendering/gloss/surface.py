@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.rendering.gloss.settings import GlossStroke, GlossSurface
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 
 TAPS = 4
@@ -47,8 +47,13 @@ def fit_normals(disparity: FloatImage, geometry: SceneGeometry, should_stop: Sho
     return normals
 
 
-def surface_mask(surface: GlossSurface, photo: FloatImage, disparity: FloatImage) -> FloatImage:
-    """How far each pixel (H, W) belongs to the surface, 0..1. photo: (H, W, 3) sRGB-encoded; disparity: (H, W)."""
+def surface_mask(
+    surface: GlossSurface, photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never
+) -> FloatImage:
+    """How far each pixel (H, W) belongs to the surface, 0..1. photo: (H, W, 3) sRGB-encoded; disparity: (H, W).
+
+    Raises Cancelled once should_stop is true.
+    """
     if surface.strokes_only:
         mask = np.zeros(disparity.shape, np.float32)
     else:
@@ -57,6 +62,7 @@ def surface_mask(surface: GlossSurface, photo: FloatImage, disparity: FloatImage
             apart = np.linalg.norm(photo - np.array(surface.color, np.float32), axis=2)
             mask *= np.clip(1 + (np.float32(surface.tolerance) - apart) / np.float32(SOFT_COLOR), 0, 1)
     for stroke in surface.strokes:
+        raise_if_stopped(should_stop)
         np.putmask(mask, _touched(stroke, mask), np.float32(not stroke.erases))
     return mask
 

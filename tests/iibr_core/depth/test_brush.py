@@ -33,6 +33,7 @@ from iibr_core.depth.editing.touched_colors import (
     stroke_colours,
     unlikeness,
 )
+from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import InputError
 
 HEIGHT, WIDTH = 30, 40
@@ -94,6 +95,30 @@ def slow_step(photo: np.ndarray, stroke: Stroke, index: int, distance: np.ndarra
                 if way < distance[other]:
                     distance[other] = way
                     heapq.heappush(waiting, (way, *other))
+
+
+def test_painting_stops_between_strokes_and_goes_on_there() -> None:
+    photo, disparity = np.zeros((HEIGHT, WIDTH, 3), np.float32), np.zeros((HEIGHT, WIDTH), np.float32)
+    strokes = tuple(replace(dab(), points=((0.1 * k, 0.5),)) for k in range(1, 9))
+    edits, asked = DepthEdits(strokes=strokes), iter([False] * 3 + [True])
+    canvas = DepthCanvas(photo, disparity)
+    with pytest.raises(Cancelled):
+        canvas.apply(edits, lambda: next(asked))
+    assert canvas.strokes_ahead(edits) == 5
+    assert np.array_equal(canvas.apply(edits), apply_edits(photo, disparity, edits))
+    assert canvas.strokes_ahead(edits) == 0
+
+
+def test_a_canvas_goes_on_from_a_map_that_another_painted() -> None:
+    photo, disparity = np.zeros((HEIGHT, WIDTH, 3), np.float32), np.zeros((HEIGHT, WIDTH), np.float32)
+    strokes = tuple(replace(dab(), points=((0.1 * k, 0.5),)) for k in range(1, 9))
+    whole, part, other = (DepthEdits(gamma=2.0, strokes=those) for those in (strokes, strokes[:6], strokes[:5]))
+    canvas = DepthCanvas(photo, disparity)
+    canvas.resume(part, apply_edits(photo, disparity, part))
+    assert [canvas.strokes_ahead(edits) for edits in (whole, part, other)] == [2, 0, 5]
+    assert canvas.strokes_ahead(replace(whole, gamma=1.0)) == 8
+    for edits in (whole, other):
+        assert np.array_equal(canvas.apply(edits), apply_edits(photo, disparity, edits))
 
 
 @settings(max_examples=30)

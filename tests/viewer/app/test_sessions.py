@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -9,14 +11,19 @@ from pathlib import Path
 import pytest
 
 from iibr_core.depth.editing.edits import UNEDITED, Stroke
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, Opener
+from tests.opened_files import watch
+from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.session_store import sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
+from viewer.model.layout import ScreenSize
 from viewer.model.reducers.root import EDITS_KEPT
+from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
-from viewer.model.state.saving import WriteSidecarTask
+from viewer.model.state.optics import MoveEye, Optics, SetAperture, SetFocus, SetGloss
+from viewer.model.state.saving import SavedSettings, WriteSidecarTask
+from viewer.model.state.scene import Source
 
 ONE = GridShape(1, 1)
 AS_LEFT = "As you left it"
@@ -120,6 +127,67 @@ def test_damaged_ones_are_told(open_window: Opener, photo_path: Path, tmp_path: 
     driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
     driver.until(lambda app: any("damaged" in notice.text for notice in app.state.notices))
     driver.until_idle()
+    change(driver)
+    driver.until(lambda app: bool(kept_files(tmp_path / "kept")))
+
+
+def hostile_text(environment: str) -> str:
+    settings = SavedSettings(Optics(gloss=Gloss(reflectance=0.5)), 1.0, Source(""), ScreenSize(96, 64))
+    whole = json.loads(settings_text(settings))
+    whole["optics"]["gloss"]["environment"] = environment
+    return json.dumps(whole)
+
+
+@pytest.mark.parametrize("name", ["{secret}", "../elsewhere/secret.png", "link"])
+def test_a_sidecar_makes_no_file_be_opened(open_window: Opener, photo_path: Path, tmp_path: Path, name: str) -> None:
+    elsewhere = photo_path.parent.parent / "elsewhere"
+    elsewhere.mkdir(exist_ok=True)
+    secret = write_scene(elsewhere, "secret")
+    photo_path.with_name("link").symlink_to(secret)  # no picture's name: the filmstrip leaves it alone
+    sidecar_of(photo_path).write_text(hostile_text(name.format(secret=secret)))
+    with watch(secret) as watched:
+        driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+        driver.until(lambda app: told(driver))
+        driver.until_idle()
+        assert not watched.was_opened()
+    assert driver.app.state.optics.gloss is not None
+    assert any("was not opened" in notice.text for notice in driver.app.state.notices)
+
+
+def test_a_picture_beside_the_photo_goes_with_its_sidecar(
+    open_window: Opener, photo_path: Path, tmp_path: Path
+) -> None:
+    room = write_scene(photo_path.parent, "room")
+    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    first.until_idle()
+    first.app.do(SetGloss(Gloss(reflectance=0.5, environment=str(room))))
+    first.app.do(DoTask(WriteSidecarTask()))
+    first.until(lambda app: sidecar_of(photo_path).is_file())
+    first.app.close()
+    assert str(room) not in sidecar_of(photo_path).read_text()
+    second = open_window(photo_path, kept_in=tmp_path / "another machine", grid=ONE)
+    second.until(lambda app: told(second))
+    assert second.app.state.optics.gloss == Gloss(reflectance=0.5, environment=str(room))
+
+
+@pytest.mark.parametrize("kind", ["fifo", "folder", "link", "device", "huge"])
+def test_a_sidecar_that_is_no_file_is_not_read(
+    open_window: Opener, photo_path: Path, tmp_path: Path, kind: str
+) -> None:
+    path = sidecar_of(photo_path)
+    if kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "huge":
+        path.touch()
+        os.truncate(path, 2**40)
+    else:
+        path.symlink_to({"link": photo_path, "device": "/dev/zero"}[kind])
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    driver.until(lambda app: any(path.name in notice.text for notice in app.state.notices))
+    driver.until_idle()
+    assert not told(driver)
     change(driver)
     driver.until(lambda app: bool(kept_files(tmp_path / "kept")))
 

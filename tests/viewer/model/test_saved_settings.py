@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.editing.edits import DepthEdits, Stroke
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 from iibr_core.formats.images.photo import write_image
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.types import GridShape, InputError, ViewOffset
@@ -22,6 +23,8 @@ from viewer.model.actions import SceneOpened
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import (
     ATTRIBUTE,
+    MOST_CHARACTERS,
+    left_out_note,
     read_settings,
     settings_from_text,
     settings_text,
@@ -53,16 +56,10 @@ optics = st.builds(
 sources = st.builds(
     Source,
     st.just(""),
-    st.builds(
-        DepthChoice,
-        file_scale=numbers,
-        refine=st.floats(0, 1),
-        memory_bytes=st.none() | st.integers(1, 10**12),
-    ),
+    st.builds(DepthChoice, file_scale=numbers, refine=st.floats(0, 1)),
     st.none() | st.builds(GridShape, st.integers(1, 99), st.integers(1, 99)),
     st.none() | numbers,
-    st.none() | st.integers(1, 10**9),
-    st.sampled_from(("fast", "balanced", "exact")),
+    quality=st.sampled_from(("fast", "balanced", "exact")),
 )
 settings = st.builds(SavedSettings, optics, numbers, sources, st.tuples(st.integers(1, 9999), st.integers(1, 9999)))
 ONE = SavedSettings(Optics(eye=ViewOffset(1, 2)), 1.5, Source("", grid=GridShape(3, 5)), (60, 40))
@@ -100,6 +97,9 @@ def changed(**changes: Any) -> str:
     return json.dumps(whole)
 
 
+SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 1.0}
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -111,7 +111,9 @@ def changed(**changes: Any) -> str:
         '{"format": 1}',
         settings_text(ONE)[:-20],
         "[" * 100_000,
-        " " * 2_000_000,
+        " " * (MOST_CHARACTERS + 1),
+        changed(depth_edits={"strokes": [SMOOTH] * 11_000}),
+        changed(optics__gloss={"surface": {"strokes": [{"points": [[0, 0], [1, 1]] * 5_000, "radius": 0.5}]}}),
         changed(format=2),
         changed(depth_strength=float("nan")),
         changed(depth_strength=True),
@@ -129,15 +131,15 @@ def changed(**changes: Any) -> str:
         changed(optics__aperture_shape__mask={"name": "a", "rows": 10**9, "columns": 1, "values": ""}),
         changed(source__grid=[0, 3]),
         changed(source__quality="best"),
-        changed(source__max_pixels=-1),
         changed(size_px=[0, 10]),
     ],
-    ids=range(28),
+    ids=range(29),
 )
 def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
     with pytest.raises(InputError, match=r"a\.png") as error:
         settings_from_text(text, "a.png")
     assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300
     before = state_with(None)
     state = reduce(before, SceneOpened(1, scene_of(settings=text or "x")))
     assert state.optics == Optics()
@@ -151,9 +153,11 @@ FIRST_TEXT = (
     '"exposure_stops":-1.0},"depth_strength":1.5,"source":{"disparity_scale":2.0,"grid":[3,5],"focus_disparity":null,'
     '"max_pixels":400000,"memory_bytes":1073741824,"quality":"balanced"},"size_px":[741,500]}'
 )
-"""As the first version wrote it: `refine` and depth edits came later."""
+"""As the first version wrote it: `refine` and depth edits came later, and the machine's two limits went."""
 
-LATER_TEXT = FIRST_TEXT.replace('"balanced"}', '"balanced","refine":0.5}')[:-1] + (
+LATER_TEXT = FIRST_TEXT.replace('"balanced"}', '"balanced","refine":0.5}')[:-1].replace(
+    '"max_pixels":400000,"memory_bytes":1073741824,', ""
+) + (
     ',"depth_edits":{"is_inverted":true,"far_clip":0.125,"near_clip":1.0,"gamma":2.0,"strokes":[{"tool":"nearer",'
     '"points":[[0.5,0.25],[0.75,0.25]],"radius":0.03,"strength":0.25}]}}'
 )
@@ -169,9 +173,7 @@ SAVED = SavedSettings(
         exposure_stops=-1.0,
     ),
     1.5,
-    Source(
-        "", DepthChoice(file_scale=2.0, memory_bytes=2**30), GridShape(3, 5), max_pixels=400_000, quality="balanced"
-    ),
+    Source("", DepthChoice(file_scale=2.0), GridShape(3, 5), quality="balanced"),
     (741, 500),
 )
 STROKE = Stroke("nearer", ((0.5, 0.25), (0.75, 0.25)), 0.03, 0.25)
@@ -249,6 +251,84 @@ def test_pictures_without_settings_and_other_files(tmp_path: Path) -> None:
             read_settings(tmp_path / name)
         assert "\n" not in str(error.value)
         assert name in str(error.value)
+
+
+def test_a_long_day_of_painting_is_no_attack() -> None:
+    """What is kept for its user has no limit; elsewhere there is room for far more than a thousand strokes."""
+    rng = np.random.default_rng(0)
+    path = tuple(map(tuple, (0.5 + 0.1 * rng.standard_normal((30, 2))).tolist()))
+    strokes = tuple(Stroke(BRUSH_TOOLS[k % 3], path, 0.03, 0.25) for k in range(2000))
+    saved = replace(SAVED, depth_edits=DepthEdits(strokes=strokes))
+    assert settings_from_text(settings_text(saved), "a.png") == saved
+    longer = replace(SAVED, depth_edits=DepthEdits(strokes=strokes * 5))
+    with pytest.raises(InputError, match=r"10,000 strokes take .* times as long"):
+        settings_from_text(settings_text(longer), "a.png")
+    assert settings_from_text(settings_text(longer), "a.png", is_own=True) == longer
+
+
+@pytest.mark.parametrize("value", [400_000, -1, 2**70, "all", None])
+def test_limits_of_the_machine_in_old_texts_are_left_out_without_a_word(value: object) -> None:
+    saved = settings_from_text(changed(source__max_pixels=value, source__memory_bytes=value), "a.png")
+    assert saved == ONE
+    assert left_out_note(saved) == ""
+    here = Source("photo.png", DepthChoice(memory_bytes=2**30), max_pixels=10_000)
+    taken = source_like(here, saved, ())
+    assert (taken.max_pixels, taken.depth.memory_bytes) == (10_000, 2**30)
+
+
+OUTSIDE = (
+    "../secret.png",
+    "/etc/passwd",
+    "//host/share/a.png",
+    "\\\\host\\share\\a.png",
+    "C:\\a.png",
+    "C:a.png",
+    "sub/a.png",
+    "sub\\a.png",
+    "..",
+    ".",
+    "link.png",
+    "folder",
+    "fifo.png",
+    "gone.png",
+    "a\0.png",
+    "n" * 300,
+)
+
+
+@pytest.fixture
+def beside(tmp_path: Path) -> Path:
+    """A folder with a picture, and things that are none."""
+    (tmp_path / "secret.png").touch()
+    folder = tmp_path / "photos"
+    (folder / "sub").mkdir(parents=True)
+    (folder / "folder").mkdir()
+    for name in ("a.png", "sub/a.png"):
+        (folder / name).touch()
+    (folder / "link.png").symlink_to(tmp_path / "secret.png")
+    os.mkfifo(folder / "fifo.png")
+    return folder
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_a_path_in_settings_is_never_taken(beside: Path, name: str) -> None:
+    text = changed(optics__gloss={"environment": name})
+    for folder in (None, beside):
+        saved = settings_from_text(text, "a.png", folder)
+        assert saved.optics.gloss == Gloss()
+        assert "was not opened" in left_out_note(saved)
+        assert left_out_note(saved).isprintable()
+
+
+def test_a_sidecar_may_name_a_picture_beside_it(beside: Path) -> None:
+    text = changed(optics__gloss={"environment": "a.png"})
+    assert settings_from_text(text, "a.png").refused_file == "a.png"
+    saved = settings_from_text(text, "a.png", beside)
+    assert saved.optics.gloss == Gloss(environment=str(beside / "a.png"))
+    assert left_out_note(saved) == ""
+    assert settings_from_text(settings_text(saved, beside), "a.png", beside) == saved
+    for folder in (None, beside.parent):
+        assert settings_from_text(settings_text(saved, folder), "a.png").optics.gloss == Gloss()
 
 
 def test_options_given_beat_the_saved_ones() -> None:

@@ -131,13 +131,13 @@ def _offers(scene: Scene) -> tuple[Notice, ...]:
     """A picture saved by this program brings its settings."""
     if not scene.settings:
         return ()
-    from viewer.model.saved_settings import settings_from_text, unknown_note
+    from viewer.model.saved_settings import left_out_note, settings_from_text
 
     try:
         settings = settings_from_text(scene.settings, scene.name)
     except InputError as error:
         return (Notice(str(error), is_error=True),)
-    words = f"This picture was saved by iibr, with its settings. {unknown_note(settings)}"
+    words = f"This picture was saved by iibr, with its settings. {left_out_note(settings)}"
     return (Notice(words.strip(), offer=settings),)
 
 

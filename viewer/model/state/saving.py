@@ -29,6 +29,7 @@ class SavedSettings:
     """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
 
     depth_edits: of the photo's disparity. unknown_fields: names of what was saved too, but is not known here.
+    refused_file: a file that they named and that is not opened, "" without.
     """
 
     optics: Optics
@@ -37,6 +38,7 @@ class SavedSettings:
     size_px: ScreenSize
     depth_edits: DepthEdits = UNEDITED
     unknown_fields: tuple[str, ...] = ()
+    refused_file: str = ""
 
 
 @dataclass(frozen=True)
