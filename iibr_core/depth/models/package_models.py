@@ -1,4 +1,4 @@
-"""Depth models that come as packages of their own (Depth Anything 3, UniDepth, MoGe): thin adapters over their
+"""Depth models that come as packages of their own (Depth Anything 3, UniDepth): thin adapters over their
 documented calls. They are not part of this project's environment; a package that is not installed is told in one line.
 """
 
@@ -24,7 +24,6 @@ def run_package(model: LocalModel, photo: Photo) -> Estimate:
     runs: dict[str, Callable[[LocalModel, Photo], Estimate]] = {
         "depth_anything_3": _depth_anything_3,
         "unidepth": _unidepth,
-        "moge": _moge,
     }
     try:
         return runs[model.package](model, photo)
@@ -49,15 +48,6 @@ def _unidepth(model: LocalModel, photo: Photo) -> MetricDepth:
     with torch.inference_mode():
         said = network.infer(torch.from_numpy(bytes_from_encoded(photo.pixels)).permute(2, 0, 1))
     return MetricDepth(_positive(_array(said["depth"]).squeeze()))
-
-
-def _moge(model: LocalModel, photo: Photo) -> MetricDepth:
-    import torch
-
-    network = importlib.import_module("moge.model.v2").MoGeModel.from_pretrained(str(model.folder)).eval()
-    with torch.inference_mode():
-        said = network.infer(torch.from_numpy(np.clip(photo.pixels, 0, 1)).permute(2, 0, 1))
-    return MetricDepth(_positive(_array(said["depth"])))
 
 
 def _array(said: Any) -> FloatImage:

@@ -17,8 +17,9 @@ from safetensors import SafetensorError
 from iibr_core.color import photo_in_srgb
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
-from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, require_unchanged, weight_files
+from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
 from iibr_core.depth.models.config import Preparation, read_config, read_preparation
+from iibr_core.depth.models.download import require_unchanged
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.runtime.machine import core_count, usual_budget_bytes

@@ -20,6 +20,7 @@ from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, Relat
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import KNOWN_MODELS, LocalModel, cached_folder, fetch, known_model, model_to_use
 from iibr_core.depth.models.config import Preparation, read_preparation
+from iibr_core.depth.models.download import VERIFIED
 from iibr_core.depth.models.transformers_models import estimate_with, input_size
 from iibr_core.depth.search import estimator_of, open_with_depth
 from iibr_core.formats.images.photo import write_image
@@ -417,12 +418,11 @@ def test_models_are_found_by_folder_by_name_and_by_default(monkeypatch: pytest.M
     with pytest.raises(InputError, match="iibr models get depth-pro"):
         model_to_use(DepthChoice(model="depth-pro"))
     usual = known_model("depth-anything-v2-small")
-    snapshot = tmp_path / "hub" / f"models--{usual.repository.replace('/', '--')}" / "snapshots" / "abc"
+    snapshot = tmp_path / "hub" / f"models--{usual.repository.replace('/', '--')}" / "snapshots" / usual.commit
     snapshot.parent.mkdir(parents=True)
     folder.rename(snapshot)
-    (snapshot.parent.parent / "refs").mkdir()
-    (snapshot.parent.parent / "refs" / "main").write_text("abc")
-    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
+    assert cached_folder(usual) is None  # nobody verified it
+    (snapshot / VERIFIED).write_text("{}")
     for wanted in (None, usual.name):
         found = model_to_use(DepthChoice(model=wanted))
         assert found is not None
@@ -445,7 +445,7 @@ def test_a_file_is_no_model(tmp_path: Path) -> None:
         model_to_use(DepthChoice(model=str(tmp_path / "a.safetensors")))
 
 
-@pytest.mark.parametrize("package", ["depth_anything_3", "unidepth", "moge"])
+@pytest.mark.parametrize("package", ["depth_anything_3"])
 def test_models_of_packages_that_are_not_installed(package: str) -> None:
     model = next(model for model in KNOWN_MODELS if model.package == package)
     with pytest.raises(InputError, match=f"package {package}.*not installed"):
@@ -495,7 +495,11 @@ def test_no_network_is_one_line(tmp_path: Path) -> None:
     )
     environment = {**os.environ, "HF_ENDPOINT": "http://127.0.0.1:9", "HF_HOME": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
-    assert done.stderr.strip().splitlines()[-1].startswith("iibr_core.types.InputError: depth-anything-v2-small cannot")
+    assert (
+        done.stderr.strip()
+        .splitlines()[-1]
+        .startswith("iibr_core.types.InputError: depth-anything/Depth-Anything-V2-Small-hf cannot be downloaded")
+    )
     assert fetch is not None
 
 

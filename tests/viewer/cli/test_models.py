@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
 
-from iibr_core.depth.models.catalog import KNOWN_MODELS, LOCK, require_unchanged
+from iibr_core.depth.models.catalog import KNOWN_MODELS, known_model
+from iibr_core.depth.models.download import VERIFIED, require_unchanged
 from iibr_core.types import GridShape, InputError
+from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import write_scene
 from viewer.background.jobs import ProgressReport
 from viewer.background.scene_worker import SceneReady, SceneRequest, SceneWorker, results_of
@@ -59,7 +59,7 @@ def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
     about, error = done.stderr.splitlines()
     assert "99 MB" in about
     assert "Apache-2.0" in about
-    assert error.startswith("iibr: depth-anything-v2-small cannot be downloaded")
+    assert error.startswith("iibr: depth-anything/Depth-Anything-V2-Small-hf cannot be downloaded")
     assert "network" in error
     assert not list(tmp_path.rglob("*.safetensors"))
 
@@ -79,7 +79,7 @@ def test_where_nobody_answers_get_names_the_option(tmp_path: Path) -> None:
     assert "--yes" in line
 
 
-COMMIT = "0123456789abcdef" * 2 + "01234567"
+MODEL = known_model("depth-pro")
 PUBLISHED = {
     "config.json": b'{"model_type": "dpt"}',
     "model.safetensors": bytes(100),
@@ -87,63 +87,83 @@ PUBLISHED = {
 }
 
 
-class Hub(BaseHTTPRequestHandler):
-    """As much of the hub as a download asks for."""
-
-    def do_HEAD(self) -> None:
-        self.do_GET()
-
-    def do_GET(self) -> None:
-        path = self.path.partition("?")[0]
-        name = path.rpartition("/")[2]
-        files = [{"type": "file", "path": name, "size": len(data), "oid": name} for name, data in PUBLISHED.items()]
-        about = {"id": "a/b", "sha": COMMIT, "siblings": [{"rfilename": name} for name in PUBLISHED]}
-        if not path.startswith("/api/"):
-            body = PUBLISHED[name]
-        else:
-            body = json.dumps(files if "/tree/" in path else about).encode()
-        self.send_response(200)
-        for header in (("ETag", f'"{name}"'), ("X-Repo-Commit", COMMIT), ("Content-Length", str(len(body)))):
-            self.send_header(*header)
-        self.end_headers()
-        if self.command == "GET":
-            self.wfile.write(body)
-
-    def log_message(self, *_: object) -> None:
-        pass
-
-
 @pytest.fixture
-def hub() -> Iterator[str]:
-    with ThreadingHTTPServer(("127.0.0.1", 0), Hub) as server:
-        threading.Thread(target=server.serve_forever).start()
-        yield f"http://127.0.0.1:{server.server_address[1]}"
-        server.shutdown()
+def hub() -> Iterator[Hub]:
+    with local_hub(MODEL.commit, PUBLISHED) as hub:
+        yield hub
 
 
-def test_a_download_is_one_commit_without_pickles_and_is_known_again(tmp_path: Path, hub: str) -> None:
-    done = run_models(tmp_path, "get", "depth-pro", "--yes", endpoint=hub)
+def test_a_download_is_one_commit_without_pickles_and_is_known_again(tmp_path: Path, hub: Hub) -> None:
+    done = run_models(tmp_path, "get", MODEL.name, "--yes", endpoint=hub.address)
     assert done.returncode == 0, done.stderr
-    assert COMMIT in done.stdout
-    folder = next(path for path in tmp_path.rglob(COMMIT) if path.parent.name == "snapshots")
-    assert {path.name for path in folder.iterdir()} == {"config.json", "model.safetensors", LOCK}
-    assert json.loads((folder / LOCK).read_text())["commit"] == COMMIT
+    assert MODEL.commit in done.stdout
+    folder = next(path for path in tmp_path.rglob(MODEL.commit) if path.parent.name == "snapshots")
+    assert {path.name for path in folder.iterdir()} == {"config.json", "model.safetensors", VERIFIED}
     require_unchanged(folder)
-    (known,) = (line for line in run_models(tmp_path).stdout.splitlines() if line.startswith("depth-pro"))
+    (known,) = (line for line in run_models(tmp_path).stdout.splitlines() if line.startswith(MODEL.name))
     assert "not here" not in known
     (folder / "model.safetensors").resolve().write_bytes(bytes(99) + b"x")
     with pytest.raises(InputError, match=r"model\.safetensors changed since it was downloaded"):
         require_unchanged(folder)
 
 
+@pytest.mark.parametrize("name", ["model.safetensors", "config.json"])
+def test_a_file_with_another_hash_is_removed(tmp_path: Path, hub: Hub, name: str) -> None:
+    right = hub.files[name]
+    hub.files[name] = bytes(reversed(b"x" + right[1:]))
+    done = run_models(tmp_path, "get", MODEL.name, "--yes", endpoint=hub.address)
+    assert done.returncode == 2
+    line = done.stderr.splitlines()[-1]
+    assert line.startswith("iibr: ")
+    assert f"{name} is not what the hub states" in line
+    wrong = hub.files[name]
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.read_bytes() == wrong]
+    (known,) = (line for line in run_models(tmp_path).stdout.splitlines() if line.startswith(MODEL.name))
+    assert "not here" in known
+    hub.files[name] = right
+    again = run_models(tmp_path, "get", MODEL.name, "--yes", endpoint=hub.address)
+    assert again.returncode == 0, again.stderr
+
+
+def test_what_another_program_downloaded_is_verified_before_it_is_used(tmp_path: Path, hub: Hub) -> None:
+    assert run_models(tmp_path, "get", MODEL.name, "--yes", endpoint=hub.address).returncode == 0
+    (folder,) = (path for path in tmp_path.rglob(MODEL.commit) if path.parent.name == "snapshots")
+    (folder / VERIFIED).unlink()
+    (folder / "model.safetensors").resolve().write_bytes(bytes(99) + b"x")
+    assert run_models(tmp_path, "get", MODEL.name, "--yes", endpoint=hub.address).returncode == 2
+    assert not (folder / "model.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("commit", "stated", "says"),
+    [
+        ("f" * 40, PUBLISHED, "answers with commit f"),
+        (MODEL.commit, {"../../../mine.json": b"{}"}, "no hash of ../../../mine.json"),
+        (MODEL.commit, {"/mine.json": b"{}"}, "no hash of /mine.json"),
+        (MODEL.commit, {"pytorch_model.bin": b"runs code"}, "states no files like"),
+    ],
+)
+def test_a_hub_that_lies_gets_nothing_done(
+    tmp_path: Path, hub: Hub, commit: str, stated: dict[str, bytes], says: str
+) -> None:
+    (tmp_path / "mine.json").write_text("mine")
+    hub.commit, hub.stated = commit, stated
+    done = run_models(tmp_path, "get", MODEL.name, "--yes", endpoint=hub.address)
+    assert done.returncode == 2
+    assert says in done.stderr.splitlines()[-1]
+    assert not list(tmp_path.rglob("*.safetensors"))
+    assert (tmp_path / "mine.json").read_text() == "mine"
+
+
 def test_models_are_pinned_to_whole_commits() -> None:
-    assert all(model.revision is None or re.fullmatch("[0-9a-f]{40}", model.revision) for model in KNOWN_MODELS)
+    assert all(re.fullmatch("[0-9a-f]{40}", model.commit) for model in KNOWN_MODELS)
+    assert len({model.commit for model in KNOWN_MODELS}) == len(KNOWN_MODELS)
 
 
-@pytest.mark.parametrize("text", ["", "[", "[]", "{}", '{"sha256": 3}', '{"sha256": []}', "\xff"])
-def test_a_damaged_lock_is_one_line(tmp_path: Path, text: str) -> None:
-    (tmp_path / LOCK).write_text(text, "latin-1")
-    with pytest.raises(InputError, match=LOCK):
+@pytest.mark.parametrize("text", ["", "[", "[]", '{"a": 3}', '{"a": []}', '{"a": "sha256:0"}', "\xff", "[" * 100_000])
+def test_a_damaged_list_of_verified_files_is_one_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / VERIFIED).write_text(text, "latin-1")
+    with pytest.raises(InputError, match=VERIFIED):
         require_unchanged(tmp_path)
 
 
