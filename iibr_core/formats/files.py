@@ -113,6 +113,12 @@ def file_within(folder: Path, name: str) -> Path | None:
         return None
 
 
+def stays_within(name: str) -> bool:
+    """Whether a path that comes out of a file, joined to a folder, cannot lead out of it by its words."""
+    windows = PureWindowsPath(name)
+    return not (PurePosixPath(name).is_absolute() or windows.drive or windows.root or ".." in windows.parts)
+
+
 def entries_of(folder: Path) -> list[Path]:
     """What lies in a folder, by name. Raises InputError where it cannot be listed."""
     try:

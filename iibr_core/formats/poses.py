@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import is_file, is_folder, read_text, reason_of
+from iibr_core.formats.files import is_file, is_folder, printable, read_text, reason_of, stays_within
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.types import Camera, ImageSize, InputError
@@ -131,7 +131,10 @@ def _frame_size(frame: dict[str, Any], path: Path, source: str) -> ImageSize:
     """As stated, else of the frame's picture."""
     if "w" in frame and "h" in frame:
         return _size(float(frame["h"]), float(frame["w"]), source)
-    picture = path.parent / str(frame["file_path"])
+    name = str(frame["file_path"])
+    if not stays_within(name):
+        raise InputError(f"{source}: its picture {printable(name)} does not lie beside the file; state w and h")
+    picture = path.parent / name
     try:
         return read_size(picture if picture.suffix else picture.with_suffix(".png"))
     except InputError as error:

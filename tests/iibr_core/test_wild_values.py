@@ -552,8 +552,8 @@ READS_OR_TELLS = {
     "depth.models.estimate_cache": "cache_folder key_of load",
     "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
     "depth.models.config": "read_config package_for read_preparation",
-    "depth.models.catalog": "known_model model_to_use lacking_package cached_folder weight_files bytes_of fetch "
-    "require_unchanged",
+    "depth.models.catalog": "known_model model_to_use lacking_package cached_folder weight_files bytes_of fetch",
+    "depth.models.download": "verified_folder download require_unchanged",
     "depth.models.package_models": "run_package",
     "depth.multi_view.estimate": "sweep_bytes",
     "depth.multi_view.every_view": "matched_views",
@@ -569,7 +569,8 @@ READS_OR_TELLS = {
     "formats.images.spatial_photo": "write_spatial_photo",
     "formats.quilts": "Quilt quilt_named quilt_for lay_out tagged",
     "formats.stereo": "anaglyph",
-    "formats.files": "reason_of shown_name status_of is_file is_folder entries_of require_file open_binary refuse_bomb",
+    "formats.files": "reason_of shown_name printable status_of is_file is_folder ordinary_file file_within "
+    "stays_within entries_of require_file open_binary refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
     "atomic_write UnfinishedFolder remove_leftovers require_own_folder",
     "formats.poses": "read_poses read_llff_poses",

@@ -283,12 +283,12 @@ def write_rendered(folder: Path, config: str = "", focal_mm: float = 50.0) -> Pa
     }
     write_numbered(folder, names, (HEIGHT, WIDTH))
     if config:
-        (folder / "config.cfg").write_text(config)
+        (folder / "config.cfg").write_text(config, "utf-8")
     return folder
 
 
 def test_light_field_renderers_names_and_config(tmp_path: Path) -> None:
-    config = "focal-length 50 10 100\nfocus-distance 2 1.0 8.0\n"
+    config = "\ufefffocus-distance 2 1.0 8.0\nfocal-length 50 10 100\n"
     scene = open_light_field(write_rendered(tmp_path / "shop", config))
     assert (scene.layout, scene.grid) == ("light-field-renderer, 3x3", GridShape(3, 3))
     focal_px = 50 / 36 * WIDTH

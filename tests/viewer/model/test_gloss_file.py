@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from iibr_core.formats.images.photo import write_image
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
 from iibr_core.types import InputError
 from viewer.model.gloss_file import read_gloss, require_environment
@@ -29,6 +32,7 @@ radius_deg = 1
 def test_a_file_says_everything(tmp_path: Path) -> None:
     path = tmp_path / "gloss.toml"
     path.write_text(WHOLE)
+    write_image(tmp_path / "room.exr", np.zeros((2, 4, 3), np.float32))
     stroke = GlossStroke(((0.5, 0.5), (0.6, 0.5)), 0.1, erases=True)
     surface = GlossSurface(0.25, 1.0, (1, 0, 0), strokes=(stroke,))
     light = GlossLight((0, -1, -1), (2, 1.5, 1), 1)
@@ -39,6 +43,12 @@ def test_what_a_file_leaves_out_is_as_usual(tmp_path: Path) -> None:
     path = tmp_path / "gloss.toml"
     path.write_text("# nothing")
     assert read_gloss(path) == Gloss()
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "gloss.toml"
+    path.write_text("\ufeffroughness = 0.5", "utf-8")
+    assert read_gloss(path) == Gloss(roughness=0.5)
 
 
 @pytest.mark.parametrize(
@@ -75,17 +85,12 @@ def test_files_that_are_no_text_or_too_large(tmp_path: Path, content: bytes, say
         read_gloss(path)
 
 
-def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
-    path = tmp_path / "gloss.toml"
-    path.write_bytes(b"\xef\xbb\xbfroughness = 0.25")
-    assert read_gloss(path).roughness == 0.25
-
-
-@pytest.mark.parametrize("name", ["gone.exr", "gloss.toml", "folder"])
+@pytest.mark.parametrize("name", ["gone.exr", "gloss.toml", "folder", "fifo"])
 def test_an_environment_that_is_no_picture_is_named_with_the_file_that_names_it(tmp_path: Path, name: str) -> None:
     path = tmp_path / "gloss.toml"
     path.write_text(f'environment = "{name}"')
     (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "fifo")
     with pytest.raises(InputError, match=rf"gloss\.toml: its environment .*{name}") as refused:
         require_environment(path, read_gloss(path))
     assert "\n" not in str(refused.value)

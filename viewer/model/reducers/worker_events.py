@@ -117,7 +117,7 @@ def _widened(range_px: tuple[float, float], disparity: float) -> tuple[float, fl
 
 def _progress_of(state: AppState, scene: Scene) -> Progress:
     """What is shown until more is heard: of a light field, which is shown more than once, how far its job was."""
-    if scene.plan is None and 0 < state.progress.share and not state.progress.is_complete:
+    if scene.plan is None and state.progress.share > 0 and not state.progress.is_complete:
         return state.progress
     return Progress(doing=f"reading {scene.name}" if scene.is_sketch else "making views")
 

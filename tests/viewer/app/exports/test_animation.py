@@ -94,7 +94,7 @@ def test_paths_are_closed_and_move(source: ExportSource, motion: str) -> None:
 
 def test_a_path_of_ones_own_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> None:
     keys = tmp_path / "keys.txt"
-    keys.write_text("\ufeff# s t focus aperture\n-1 0 0.5 1\n1, 0.5, -0.1, 2\n\n0 -1\n")
+    keys.write_text("\ufeff# s t focus aperture\n-1 0 0.5 1\n1, 0.5, -0.1, 2\n\n0 -1\n", "utf-8")
     path = path_of(replace(source, optics=replace(source.optics, aperture_diameter=1.5)), keys=keys, frames=6)
     assert path[0].eye == ViewOffset(0, -1)
     assert (path[2].eye, path[2].focus_disparity, path[2].aperture_diameter) == (ViewOffset(0.5, 1), -0.1, 2)
