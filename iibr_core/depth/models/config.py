@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import is_file, read_text
+from iibr_core.formats.files import is_file, printable, read_text
 from iibr_core.types import ImageSize, InputError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
@@ -38,8 +38,17 @@ class Preparation:
 
 
 def read_config(folder: Path) -> dict[str, Any]:
-    """A model folder's config.json. Raises InputError where it is missing or damaged."""
-    return _json_object(folder, CONFIG)
+    """A model folder's config.json. Raises InputError where it is missing, damaged, or names a model elsewhere, which
+    would be fetched.
+    """
+    config = _json_object(folder, CONFIG)
+    elsewhere = _backbone_elsewhere(config)
+    if elsewhere:
+        raise InputError(
+            f"{folder / CONFIG}: needs another model, {printable(elsewhere)}, which is not fetched; get a folder that"
+            " holds all of it"
+        )
+    return config
 
 
 def package_for(config: dict[str, Any]) -> str:
@@ -80,6 +89,15 @@ def read_preparation(folder: Path, kind: str) -> Preparation:
             f"{folder / PREPROCESSOR}: size {size}, multiple {multiple}, std {preparation.std} make no sense"
         )
     return preparation
+
+
+def _backbone_elsewhere(config: dict[str, Any]) -> str:
+    """The name of a backbone that is not described in the config itself, "" without."""
+    inner = config.get("backbone_config")
+    if isinstance(inner, dict):
+        return _backbone_elsewhere(inner)
+    name = config.get("backbone")
+    return name if isinstance(name, str) else ""
 
 
 def _json_object(folder: Path, name: str) -> dict[str, Any]:

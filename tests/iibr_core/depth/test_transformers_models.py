@@ -439,6 +439,21 @@ def test_models_that_are_none(wanted: str) -> None:
         model_to_use(DepthChoice(model=wanted))
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"backbone": "somebody/model", "backbone_config": None, "use_pretrained_backbone": True},
+        {"backbone_config": {"model_type": "timm_backbone", "backbone": "somebody/model"}},
+    ],
+)
+def test_a_config_cannot_have_another_model_fetched(tmp_path: Path, changes: dict[str, object]) -> None:
+    model = depth_anything(tmp_path / "model")
+    path = model.folder / "config.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+    with pytest.raises(InputError, match="needs another model, somebody/model, which is not fetched"):
+        estimate_with(model, PHOTO)
+
+
 def test_a_file_is_no_model(tmp_path: Path) -> None:
     (tmp_path / "a.safetensors").touch()
     with pytest.raises(InputError, match="takes the model's folder"):
