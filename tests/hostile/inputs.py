@@ -165,4 +165,28 @@ _saved = [
     ),
 ]
 
-INPUT_CASES = (*_view_files, *_photos, *_odd_paths, *_permissions, *_maps, *_fields, *_saved)
+_naming_files = [
+    *(
+        Case(f"screenshot --like {name}", _opening("screenshot", "photo.png", "--like", name), 0, makes=("new.png",))
+        for name in ("saved-link.png", "saved-device.png", "saved-host.png")
+    ),
+    Case(
+        "screenshot --like saved-busy.png",
+        _opening("screenshot", "photo.png", "--like", "saved-busy.png"),
+        says="11,000 strokes",
+    ),
+    Case(
+        "generate --poses outside.json",
+        ("generate", "photo.png", "--poses", "outside.json", "--out", "new"),
+        says="outside.json",
+    ),
+    *(
+        Case(f"generate --gloss {name}", _opening("generate", "photo.png", "--gloss", name), says=name)
+        for name in ("gone.toml", "device.toml")
+    ),
+    Case(
+        "generate --gloss marked.toml", _opening("generate", "photo.png", "--gloss", "marked.toml"), 0, makes=("new",)
+    ),
+]
+
+INPUT_CASES = (*_view_files, *_photos, *_odd_paths, *_permissions, *_maps, *_fields, *_saved, *_naming_files)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 import zlib
 from dataclasses import replace
@@ -10,14 +11,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import SRGB, GridShape, ViewUpdate
 from viewer.app.image_export import SavedShot, export_picture
 from viewer.model.layout import ScreenSize
+from viewer.model.saved_settings import ATTRIBUTE, settings_text
 from viewer.model.state.optics import Optics
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.scene import Source
@@ -53,6 +57,7 @@ def make_template(folder: Path) -> None:
     _make_bad_pictures(folder, pixels)
     _make_bad_maps(folder)
     _make_bad_view_files(folder, pixels)
+    _make_texts_that_name_files(folder, pixels)
     (folder / "folder").mkdir()
     (folder / "text.txt").write_text("some words")
 
@@ -111,6 +116,22 @@ def _make_bad_view_files(folder: Path, pixels: np.ndarray) -> None:
     (folder / "uneven_qs2x2a1.png").write_bytes((folder / "uneven_qs2x2a1.png").read_bytes()[:-200])
     (folder / "raw.lfp").write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(1000))
     Image.fromarray(pixels[:, :1]).save(folder / "thin_SBS.png")
+
+
+def _make_texts_that_name_files(folder: Path, pixels: np.ndarray) -> None:
+    """Saved pictures whose settings name files, or ask for days of painting; texts that name what is not theirs."""
+    plain = SavedSettings(Optics(gloss=Gloss(reflectance=0.5)), 1.0, Source(""), ScreenSize(WIDTH, HEIGHT))
+    for name, path in (("saved-link.png", "photo.png"), ("saved-device.png", "/dev/zero"), ("saved-host.png", "//a/b")):
+        text = settings_text(plain).replace('"environment":""', f'"environment":"{path}"')
+        write_image(folder / name, pixels, {ATTRIBUTE: text})
+    strokes = (Stroke("smooth", ((0.5, 0.5),), 0.25, 1.0),) * 11_000
+    busy = replace(plain, depth_edits=DepthEdits(strokes=strokes))
+    write_image(folder / "saved-busy.png", pixels, {ATTRIBUTE: settings_text(busy)})
+    frame = {"file_path": "../../etc/passwd", "transform_matrix": np.eye(4).tolist()}
+    (folder / "outside.json").write_text(json.dumps({"fl_x": 40.0, "frames": [frame]}))
+    (folder / "gone.toml").write_text('environment = "missing.png"')
+    (folder / "device.toml").write_text('environment = "/dev/zero"')
+    (folder / "marked.toml").write_text("\ufeffroughness = 0.5", "utf-8")
 
 
 def _make_bad_maps(folder: Path) -> None:
