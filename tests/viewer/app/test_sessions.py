@@ -7,10 +7,13 @@ import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from threading import current_thread, main_thread
 
+import numpy as np
 import pytest
 
-from iibr_core.depth.editing.edits import UNEDITED, Stroke
+from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
 from tests.opened_files import watch
@@ -190,6 +193,36 @@ def test_a_sidecar_that_is_no_file_is_not_read(
     assert not told(driver)
     change(driver)
     driver.until(lambda app: bool(kept_files(tmp_path / "kept")))
+
+
+def test_many_strokes_are_painted_beside_the_window(
+    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The drawing thread paints what is new, and no more: it would stand still for a minute."""
+    begin, painted_here = DepthCanvas._begin, []
+
+    def watched(canvas: DepthCanvas, stroke: Stroke) -> None:
+        painted_here.extend([stroke] if current_thread() is main_thread() else [])
+        begin(canvas, stroke)
+
+    monkeypatch.setattr(DepthCanvas, "_begin", watched)
+    strokes = tuple(Stroke("nearer", ((k / 40, 0.5),), 0.03, 0.25) for k in range(40))
+    settings = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(96, 64), DepthEdits(strokes=strokes))
+    sidecar_of(photo_path).write_text(settings_text(settings))
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    driver.until(lambda app: told(driver))
+    driver.until_idle()
+    assert painted_here == []
+    app = driver.app
+    app.do(SetBrush(replace(app.state.brush, is_on=True)), Paint((0.5, 0.5)))
+    driver.until(lambda app: len(painted_here) > 0)
+    app.do(*_end())
+    driver.until_idle()
+    assert len(set(painted_here)) == 1
+    loaded = app.scene_view.loaded
+    assert len(loaded.depth_settings.edits.strokes) == 41
+    wanted = apply_edits(loaded.photo.pixels, loaded.refined.values, loaded.depth_settings.edits)
+    assert np.array_equal(loaded.disparity.values, wanted)
 
 
 def test_a_folder_that_cannot_be_written_is_told_once(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
