@@ -75,6 +75,7 @@ class DepthCanvas:
             self._toned = apply_tone(self._given, edits, self._extent)
             self._forget(edits)
         self._return_to(edits)
+        self._paint_through(edits.strokes[len(self._edits.strokes) : -MAPS_KEPT], should_stop)
         for stroke in edits.strokes[len(self._edits.strokes) :]:
             raise_if_stopped(should_stop)
             self._begin(stroke)
@@ -129,6 +130,21 @@ class DepthCanvas:
         count, self._values = self._trail.pop()
         self._open, self._edits = None, replace(self._edits, strokes=done[:count])
 
+    def _paint_through(self, strokes: tuple[Stroke, ...], should_stop: ShouldStop) -> None:
+        """Paint strokes of which none is taken back by itself: no map between them is kept, so only what they cover is
+        worked on.
+        """
+        if not strokes:
+            return
+        self._open, self._values = None, self._values.copy()
+        under, distance = self._values.copy(), np.ones(self._values.shape, np.float32)
+        for stroke in strokes:
+            raise_if_stopped(should_stop)
+            covered = self._lay(self._values, stroke, 0, _OpenStroke(under, distance, self._target(stroke, under)))
+            for window in covered:
+                under[window], distance[window] = self._values[window], 1
+            self._edits = replace(self._edits, strokes=(*self._edits.strokes, stroke))
+
     def _begin(self, stroke: Stroke) -> None:
         under = self._values
         self._trail = [*self._trail, (len(self._edits.strokes), under)][-MAPS_KEPT:]
@@ -153,17 +169,23 @@ class DepthCanvas:
     def _paint(self, stroke: Stroke, first: int) -> None:
         """Lay the stroke on the map, from its point of this index on. Maps handed out before stay as they are."""
         assert self._open is not None
+        self._values = self._values.copy()
+        self._lay(self._values, stroke, first, self._open)
+
+    def _lay(self, values: FloatImage, stroke: Stroke, first: int, opened: _OpenStroke) -> list[Window]:
+        """Lay the stroke on this map, from its point of this index on. Returns the windows that it changed."""
         assert self._extent is not None
-        under, distance, target = self._open.under, self._open.distance, self._open.target
-        values = self._values.copy()
+        under, distance, target = opened.under, opened.distance, opened.target
+        windows: list[Window] = []
         for i in range(first, len(stroke.points)):
-            rows, columns = self._reach(stroke, i, self._open)
+            rows, columns = self._reach(stroke, i, opened)
+            windows.append((rows, columns))
             if target is None:
                 amount = stroke.strength * (self._extent[1] - self._extent[0]) * SIGNS[stroke.tool]
                 _move(values, under, distance, rows, columns, amount)
             else:
                 _blend(values, under, target, distance, rows, columns, stroke.strength)
-        self._values = values
+        return windows
 
     def _reach(self, stroke: Stroke, index: int, open_stroke: _OpenStroke) -> Window:
         """Bring the distances up to the stroke's point of this index. Returns the window in which they changed."""
@@ -171,9 +193,10 @@ class DepthCanvas:
         self._guide = guide_of(self._photo) if self._guide is None else self._guide
         if stroke.tool != "fill":
             return measure_from(self._guide, stroke, index, open_stroke.distance)
-        if _value_at(open_stroke.distance, stroke.points[index]) > 0:  # else it is filled already
-            surface = surface_at(self._guide, open_stroke.under, stroke, index, self._extent)
-            open_stroke.distance[surface] = 0
+        if not _value_at(open_stroke.distance, stroke.points[index]) > 0:  # it is filled already
+            return slice(0, 0), slice(0, 0)
+        surface = surface_at(self._guide, open_stroke.under, stroke, index, self._extent)
+        open_stroke.distance[surface] = 0
         height, width = open_stroke.distance.shape
         return slice(0, height), slice(0, width)
 

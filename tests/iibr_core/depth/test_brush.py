@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from iibr_core.depth.editing.canvas import DepthCanvas, _blend, _move, apply_edits
+from iibr_core.depth.editing.canvas import MAPS_KEPT, DepthCanvas, _blend, _move, apply_edits
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
 from iibr_core.depth.editing.smoothing import smooth_within_contours
 from iibr_core.depth.editing.stroke_distance import (
@@ -99,14 +99,35 @@ def slow_step(photo: np.ndarray, stroke: Stroke, index: int, distance: np.ndarra
 
 def test_painting_stops_between_strokes_and_goes_on_there() -> None:
     photo, disparity = np.zeros((HEIGHT, WIDTH, 3), np.float32), np.zeros((HEIGHT, WIDTH), np.float32)
-    strokes = tuple(replace(dab(), points=((0.1 * k, 0.5),)) for k in range(1, 9))
+    strokes = tuple(replace(dab(), points=((0.05 * k, 0.5),)) for k in range(20))
     edits, asked = DepthEdits(strokes=strokes), iter([False] * 3 + [True])
     canvas = DepthCanvas(photo, disparity)
     with pytest.raises(Cancelled):
         canvas.apply(edits, lambda: next(asked))
-    assert canvas.strokes_ahead(edits) == 5
+    assert canvas.strokes_ahead(edits) == 17
     assert np.array_equal(canvas.apply(edits), apply_edits(photo, disparity, edits))
     assert canvas.strokes_ahead(edits) == 0
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=10)
+def test_many_strokes_at_once_are_the_same_as_one_by_one(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    photo = rng.uniform(0, 1, (HEIGHT // 5, WIDTH // 5, 3)).repeat(5, 0).repeat(5, 1).astype(np.float32)
+    disparity = rng.uniform(-1, 1, (HEIGHT, WIDTH)).astype(np.float32)
+    strokes = tuple(
+        Stroke(BRUSH_TOOLS[rng.integers(5)], tuple(map(tuple, rng.uniform(-0.1, 1.1, (2, 2)).tolist())), 0.15, 0.5)
+        for _ in range(3 * MAPS_KEPT)
+    )
+    canvas = DepthCanvas(photo, disparity)
+    for count in range(len(strokes) + 1):
+        before = canvas.apply(DepthEdits(strokes=strokes[:count]))
+    kept = before.copy()
+    at_once = DepthCanvas(photo, disparity)
+    at_once.apply(DepthEdits(strokes=strokes[:3]))
+    assert np.array_equal(at_once.apply(DepthEdits(strokes=strokes)), before)
+    canvas.apply(DepthEdits(strokes=strokes * 2))
+    assert np.array_equal(before, kept)
 
 
 def test_a_canvas_goes_on_from_a_map_that_another_painted() -> None:
