@@ -157,24 +157,6 @@ _generate += [
          prepare=_write_poses),
 ]  # fmt: skip
 
-_batch = [
-    Case(f"batch {' '.join(words)}", ("batch", *words), says=says)
-    for words, says in (
-        (("folder", "--to", "depth", "-o", "new"), "no photos"),
-        (("missing", "--to", "depth", "-o", "new"), "missing"),
-        (("photo.png", "--to", "depth", "-o", "new"), "photo.png"),
-        ((".", "--to", "hologram", "-o", "../new"), "hologram"),
-        ((".", "--to", "depth", "-o", "new"), "new"),
-        ((".", "--to", "depth", "-o", "photo.png"), "photo.png"),
-        ((".", "--to", "depth", "-o", "../new", "--frames", "3"), "--frames"),
-        ((".", "--to", "depth", "-o", "../new", "--workers", "0"), "--workers"),
-        ((".", "--to", "depth", "-o", "../new", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "--scheduler"),
-        ((".", "--to", "depth", "-o", "../new", "--literal"), "--grid"),
-        ((".", "--to", "depth", "-o", "../new", "--gloss", "missing"), "missing"),
-        ((".", "--to", "hci", "-o", "../new", "--gloss", "photo.png"), "photo.png"),
-    )
-]
-
 _clamped = [
     Case(
         f"screenshot {option} {value}", ("screenshot", "photo.png", "-o", "new.png", option, value), 0, "", ("new.png",)
@@ -310,7 +292,6 @@ OPTION_CASES = (
     *_screenshot,
     *_export,
     *_generate,
-    *_batch,
     *_clamped,
     *_inpainters,
     *_models,

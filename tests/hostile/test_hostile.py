@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.hostile.batches import BATCH_CASES
 from tests.hostile.case import Case, Ended, run_case
 from tests.hostile.environments import ENVIRONMENT_CASES
 from tests.hostile.inputs import INPUT_CASES
@@ -17,7 +18,7 @@ from tests.hostile.options import OPTION_CASES
 from tests.hostile.outputs import OUTPUT_CASES
 from tests.hostile.sandbox import make_template
 
-CASES = (*INPUT_CASES, *OUTPUT_CASES, *OPTION_CASES, *ENVIRONMENT_CASES)
+CASES = (*INPUT_CASES, *OUTPUT_CASES, *OPTION_CASES, *BATCH_CASES, *ENVIRONMENT_CASES)
 LEAST_CASES = 300
 
 

@@ -51,7 +51,7 @@ def remote_workers(address: str, tls: TlsFiles | None) -> Iterator[Workers]:
         try:
             client.wait_for_workers(1, timeout=CONNECT_S)
         except TimeoutError as error:
-            raise InputError(f"{address}: the scheduler has no workers; start some: dask worker {address}") from error
+            raise InputError(f"--scheduler {address}: it has no workers; start some: dask worker {address}") from error
         client.register_plugin(ThreadsOfWorker())
         executor = client.get_executor(pure=False)
         try:
@@ -73,7 +73,7 @@ def _connect(address: str, tls: TlsFiles | None) -> Client:
     except (OSError, ValueError, TypeError, RuntimeError) as error:  # SSL's errors are OSErrors
         way = "with --tls-ca, --tls-cert and --tls-key" if address.startswith("tls:") or tls else "with: dask scheduler"
         said = str(error).strip().partition("\n")[0]
-        raise InputError(f"{address}: no Dask scheduler answers there ({said}); start one {way}") from error
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers ({said}); start one {way}") from error
 
 
 @contextmanager
