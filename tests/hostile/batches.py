@@ -136,8 +136,6 @@ _working = [
         ("in peace", 0, "", {}, _with_exports(), ()),
         ("after a deep line", 0, "", {}, _with_exports(_written("manifest.jsonl", b"[" * 200_000)), ()),
         ("after a huge line", 0, "", {}, _with_exports(_written("manifest.jsonl", b"9" * 20_000_000)), ()),
-        ("without numba's threads", 0, "", {"NUMBA_NUM_THREADS": "0"}, _make_album, ()),
-        ("with nonsense for numba's threads", 0, "", {"NUMBA_NUM_THREADS": "abc"}, _make_album, ()),
         ("with few open files", 0, "", {}, _make_album, ("--nofile=64",)),
         ("with hardly any open files", 2, "", {}, _make_album, ("--nofile=16",)),
     )

@@ -25,6 +25,8 @@ SPAWN = multiprocessing.get_context("spawn")
 FILES_OF_WORKER = 10
 """Pipes that a worker needs here, each with two ends."""
 FILES_ELSE = 128
+THREADS_OF_WORKER = 8
+"""Three wait here; its own are a process, too, where the system counts them."""
 
 Result = TypeVar("Result")
 
@@ -41,7 +43,7 @@ def local_workers(count: int, threads: int) -> Iterator[Workers]:
     executor = _ProcessExecutor(count)
     with set_environment(thread_variables(threads)):
         try:
-            _require_start(executor)
+            _require_start(executor, count)
             yield Workers(executor, lambda: count, BrokenProcessPool)
         finally:
             executor.stop()
@@ -50,8 +52,9 @@ def local_workers(count: int, threads: int) -> Iterator[Workers]:
             executor.shutdown()
 
 
-def _require_start(executor: Executor) -> None:
+def _require_start(executor: Executor, count: int) -> None:
     try:
+        _require_threads(THREADS_OF_WORKER * count)
         _start_resource_tracker()
         executor.submit(os.getpid).result()
     except (OSError, RuntimeError) as error:  # too many files, processes or threads; or it ended at once
@@ -59,6 +62,21 @@ def _require_start(executor: Executor) -> None:
             f"no worker can be started ({getattr(error, 'strerror', '') or reason_of(error)}); lower --workers, or"
             " raise the limits of memory, files (ulimit -n) and processes (ulimit -u)"
         ) from error
+
+
+def _require_threads(count: int) -> None:
+    """Raise RuntimeError where the system does not let so many start: pools hang where one of theirs is missing."""
+    is_enough = threading.Event()
+    threads = [threading.Thread(target=is_enough.wait, daemon=True) for _ in range(count)]
+    started = []
+    try:
+        for thread in threads:
+            thread.start()
+            started.append(thread)
+    finally:
+        is_enough.set()
+        for thread in started:
+            thread.join()
 
 
 class _Process:

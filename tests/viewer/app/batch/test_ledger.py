@@ -50,6 +50,7 @@ DAMAGE = {
     "deep and ended": b'{"a":' * 100_000 + b"\n",
     "huge": b'{"name": "a.pfm", "output": "a.pfm", "key": "' + b"9" * 2 * MOST_LINE_BYTES + b'"}\n',
     "huge and torn": b"x" * MOST_LINE_BYTES,
+    "huge with an entry at its end": b" " * MOST_LINE_BYTES + b'{"name": "a.pfm", "output": "z", "key": "9"}\n',
     "a huge number": b'{"name": ' + b"9" * 5000 + b"}\n",
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -95,6 +96,22 @@ def test_workers_are_reached_by_no_port_and_no_socket(workers: Workers) -> None:
     pids = {int(outcome.output) for _, outcome in outcomes_of(workers, [task("a"), task("b")], process_of_worker)}
     assert pids
     assert [psutil.Process(pid).net_connections(kind="all") for pid in pids] == [[]] * len(pids)
+
+
+def wait_long(folder: Path) -> None:
+    """Much longer than any test takes to leave."""
+    (folder / "begun").touch()
+    time.sleep(20)
+    (folder / "done").touch()
+
+
+def test_a_worker_in_the_midst_of_a_photo_ends_with_the_block(tmp_path: Path) -> None:
+    with local_workers(1, 1) as workers:
+        future = workers.executor.submit(wait_long, tmp_path)
+        while not (tmp_path / "begun").exists():
+            assert not future.done()
+    assert isinstance(future.exception(), workers.death)
+    assert not (tmp_path / "done").exists()
 
 
 def test_no_worker_is_left_behind() -> None:

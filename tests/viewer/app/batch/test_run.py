@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,6 +20,8 @@ from viewer.app.batch.ledger import FAILURES, MANIFEST, Ledger
 from viewer.app.batch.run import BatchCount, run_batch, workers_here
 from viewer.app.batch.task import CLAIM_PREFIX, BatchSettings
 from viewer.app.batch.workers import Workers, WorkerSource
+from viewer.app.exports.registry import writer_of
+from viewer.model.export_kinds import ExportKind
 from viewer.model.state.scene import Source
 
 DEPTH = BatchSettings("depth", Source(""))
@@ -143,6 +145,30 @@ def test_what_was_written_and_not_reported_is_ours_afterwards(archive: Path, tmp
         run_batch(ledger, DEPTH, photos_in([archive]), source_of(Lossy()), ignore_progress)
     assert (out / "a_depth.pfm").is_file()
     assert not list(out.glob(f"{CLAIM_PREFIX}*"))
+    assert export(archive, out) == BatchCount(2, written=2)
+
+
+class Died(BaseException):
+    """As a worker that is killed."""
+
+
+def test_what_a_worker_wrote_that_died_of_it_is_ours_afterwards(
+    monkeypatch: pytest.MonkeyPatch, archive: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+
+    def write_and_die(kind: ExportKind) -> Callable[..., None]:
+        def write(*arguments: Any) -> None:
+            writer_of(kind)(*arguments)
+            raise Died
+
+        return write
+
+    with monkeypatch.context() as patch, Ledger(out) as ledger:
+        patch.setattr("viewer.app.exports.registry.writer_of", write_and_die)
+        with pytest.raises(Died):
+            run_batch(ledger, DEPTH, photos_in([archive]), source_of(Lossy()), ignore_progress)
+    assert (out / "a_depth.pfm").is_file()
     assert export(archive, out) == BatchCount(2, written=2)
 
 
