@@ -130,8 +130,8 @@ def _colors(palette: Palette) -> dict[int, Color]:
         c.button_hovered: palette.frame_hovered,
         c.button_active: palette.accent_dim,
         c.header: palette.selected,
-        c.header_hovered: palette.frame,
-        c.header_active: palette.frame_hovered,
+        c.header_hovered: palette.accent_dim,  # lists lie on the frame's colour: another must say where the pointer is
+        c.header_active: palette.accent_dim,
         c.separator: palette.frame,
         c.scrollbar_bg: clear,
         c.scrollbar_grab: palette.frame_hovered,

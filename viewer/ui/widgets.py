@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
@@ -101,6 +102,22 @@ def choice(text: str, is_chosen: bool, layout: Layout, size: tuple[float, float]
         imgui.pop_style_color(2)
     tooltip(tip, layout)
     return bool(pressed)
+
+
+def combo(name: str, shown: str, entries: Sequence[tuple[str, str]], layout: Layout, tip: str = "") -> int | None:
+    """A list that opens: (words, what they mean) of each entry; the index of the one that was picked. While the
+    pointer rests on an entry, what it means stands beside it. shown: words of the chosen entry.
+    """
+    picked = None
+    if imgui.begin_combo(f"##{name}", shown, imgui.ComboFlags_.height_large):
+        for i, (words, meaning) in enumerate(entries):
+            if imgui.selectable(words, words == shown)[0]:
+                picked = i
+            tooltip(meaning, layout)
+        imgui.end_combo()
+    else:
+        tooltip(tip, layout)
+    return picked
 
 
 def heading(text: str, is_open: bool, layout: Layout) -> bool:

@@ -11,12 +11,13 @@ from typing import Any
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.inpainting.registry import INPAINTERS
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.background.model_download import list_models
 from viewer.model.actions import SetFontScale, SetUnits, ShowPrompt
 from viewer.model.layout import PANEL_WIDTH, ScreenSize
-from viewer.model.state.exporting import ExportPrompt
+from viewer.model.state.exporting import ANIMATIONS, ExportPrompt
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     ApertureShape,
@@ -27,11 +28,15 @@ from viewer.model.state.optics import (
 )
 from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
-from viewer.ui.style import Color, palette_of
+from viewer.ui.overlays.export_prompt import MOTION_TIPS
+from viewer.ui.sections.depth import START_TIPS, START_WORDS
+from viewer.ui.sections.scene import INPAINTER_TIPS
+from viewer.ui.style import Color, Look, apply_style, palette_of
 from viewer.ui.widgets import GRIP_HEIGHT
 
 WINDOW = ScreenSize(1280, 800)
 LEAST_CONTRAST = 4.5
+LEAST_HOVER_CONTRAST = 1.5
 SCALES = (0.6, 0.8, 1.0, 1.33, 2.0)
 SLACK_PX = 1.0
 WIDGETS = ("text", "text_disabled", "button", "small_button", "checkbox", "slider_float", "slider_int", "begin_combo")
@@ -201,3 +206,21 @@ def test_words_stand_out_from_what_they_stand_on(theme: Theme) -> None:
         ]
     }
     assert not {pair: round(value, 2) for pair, value in pairs.items() if value < LEAST_CONTRAST}
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_an_entry_under_the_pointer_stands_out_from_its_list(theme: Theme) -> None:
+    context = imgui.create_context()
+    try:
+        apply_style(Look(theme=theme))
+        color, c = imgui.get_style().color_, imgui.Col_
+        hovered, ground = (tuple(color(which)) for which in (c.header_hovered, c.popup_bg))
+    finally:
+        imgui.destroy_context(context)
+    assert contrast(hovered, ground) > LEAST_HOVER_CONTRAST
+
+
+def test_every_entry_of_a_list_says_what_it_means() -> None:
+    assert set(START_TIPS) == set(START_WORDS)
+    assert set(INPAINTER_TIPS) == set(INPAINTERS)
+    assert set(MOTION_TIPS) == set(ANIMATIONS)

@@ -16,7 +16,7 @@ from viewer.model.layout import Layout
 from viewer.model.lens.limits import clamp
 from viewer.model.reducers.exporting import export_path_beside
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import ANIMATIONS, ExportOptions, ExportPrompt, ExportTask
+from viewer.model.state.exporting import ANIMATIONS, AnimationKind, ExportOptions, ExportPrompt, ExportTask
 from viewer.model.state.scene import Scene
 from viewer.ui.overlays.prompt_rows import (
     choice_row,
@@ -31,6 +31,13 @@ from viewer.ui.overlays.prompt_rows import (
 from viewer.ui.widgets import checkbox, gap, label, slider, whole_slider
 
 ANY_DISPLAY = "any"
+MOTION_TIPS: dict[AnimationKind, str] = {
+    "circle": "The viewpoint goes round.",
+    "eight": "The viewpoint goes along a lying eight.",
+    "swing": "The viewpoint goes from left to right and back.",
+    "focus": "What is sharp goes from near to far and back.",
+    "aperture": "The aperture closes and opens again.",
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +56,8 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
     imgui.text("Export")
     gap(layout, 2)
     label("As", layout)
-    chosen = choice_row("kind", prompt.kind, {name: kind.words for name, kind in EXPORTS.items()})
+    kinds = {name: (kind.words, _files_of(kind)) for name, kind in EXPORTS.items()}
+    chosen = choice_row("kind", prompt.kind, kinds, layout)
     if chosen != prompt.kind:
         return [ShowPrompt(ExportPrompt(chosen, export_path_beside(state, chosen)))]
     kind, options = EXPORTS[chosen], prompt.options
@@ -70,16 +78,28 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
     return prompt_actions(closed, edited, prompt)
 
 
+def _files_of(kind: ExportKind) -> str:
+    return f"One file: {', '.join(kind.endings)}" if kind.endings else "A folder of files."
+
+
+def _shape_of(device: str) -> str:
+    quilt = DEVICES[device]
+    return f"{quilt.columns} x {quilt.rows} views in a picture of {quilt.size.width} x {quilt.size.height}."
+
+
 def _device(options: ExportOptions, asked: _Asked) -> ExportOptions:
     label("Made for", asked.layout, "A display; without one, the photo's own shape.")
     shown = asked.settings.device or ANY_DISPLAY
-    device = choice_row("device", shown, {name: name for name in (ANY_DISPLAY, *DEVICES)})
+    entries = {ANY_DISPLAY: (ANY_DISPLAY, "The photo's own shape.")} | {
+        name: (name, _shape_of(name)) for name in DEVICES
+    }
+    device = choice_row("device", shown, entries, asked.layout)
     return replace(options, device=None if device == ANY_DISPLAY else device)
 
 
 def _motion(options: ExportOptions, asked: _Asked) -> ExportOptions:
     label("Motion", asked.layout, "What moves; the end leads to the beginning.")
-    motion = choice_row("motion", asked.settings.motion, {name: name for name in ANIMATIONS})
+    motion = choice_row("motion", asked.settings.motion, {n: (n, MOTION_TIPS[n]) for n in ANIMATIONS}, asked.layout)
     return options if motion == asked.settings.motion else replace(options, motion=motion)
 
 

@@ -13,7 +13,7 @@ from viewer.model.lens.limits import LARGEST_SIDE_PX
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import Prompt
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import button, gap, label, tooltip
+from viewer.ui.widgets import button, combo, gap, label, tooltip
 
 Choice = TypeVar("Choice", bound=str)
 
@@ -66,14 +66,10 @@ def focus_on_appearing() -> None:
         imgui.set_keyboard_focus_here(0)
 
 
-def choice_row(name: str, chosen: Choice, words: Mapping[Choice, str]) -> Choice:
-    """One of these, by its words."""
-    if imgui.begin_combo(f"##{name}", words[chosen], imgui.ComboFlags_.height_large):
-        for choice, text in words.items():
-            if imgui.selectable(text, choice == chosen)[0]:
-                chosen = choice
-        imgui.end_combo()
-    return chosen
+def choice_row(name: str, chosen: Choice, entries: Mapping[Choice, tuple[str, str]], layout: Layout) -> Choice:
+    """One of these: words, and what they mean."""
+    picked = combo(name, entries[chosen][0], tuple(entries.values()), layout)
+    return chosen if picked is None else tuple(entries)[picked]
 
 
 def size_rows(size_px: tuple[int, int], layout: Layout) -> int | None:

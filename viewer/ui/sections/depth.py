@@ -19,7 +19,7 @@ from viewer.model.state.scene import Scene, source_with_depth
 from viewer.model.state.tasks import ChooseTask
 from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
-from viewer.ui.widgets import button, checkbox, choice, gap, label, last_part, quiet, slider, tooltip
+from viewer.ui.widgets import button, checkbox, choice, combo, gap, label, last_part, quiet, slider, tooltip
 
 START_WORDS: dict[DepthStart, str] = {
     "auto": "The best there is",
@@ -28,6 +28,14 @@ START_WORDS: dict[DepthStart, str] = {
     "rough": "A rough guess",
     "flat": "None: flat",
 }
+START_TIPS: dict[DepthStart, str] = {
+    "auto": "A map beside the photo, what the camera stored in it, a depth model, a rough guess: the first there is.",
+    "embedded": "What the camera stored in the file, as phones do with portraits.",
+    "model": "A network on this machine works it out from the picture.",
+    "rough": "Guessed from height in the picture and contours: it moves, it is not true.",
+    "flat": "Everything is equally far away: one view.",
+}
+FROM_TIP = "Where depth is looked for. The photo is opened anew."
 STRENGTH_TIP = "Multiplies the parallax the plan chose. The views are made anew when you let go."
 REFINE_TIP = "How far soft edges of the depth are drawn to the photo's edges. Exact maps stay as they are."
 FAR_TIP = "What is farther than this is put here. Drag the left handle above, too."
@@ -96,16 +104,10 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     wanted = _choice_text(source.depth.start, source.depth.model, source.depth.file)
     ways: list[tuple[DepthStart, str | None]] = [("auto", None), ("embedded", None)]
     ways += [("model", name) for name in _models(scene, source.depth.model)] + [("rough", None), ("flat", None)]
-    actions: list[Action] = []
-    label("From", layout, "Where depth is looked for. The photo is opened anew.")
-    if imgui.begin_combo("##depth from", wanted):
-        for start, model in ways:
-            words = _choice_text(start, model, None)
-            if imgui.selectable(words, words == wanted)[0]:
-                actions.append(OpenPath(source_with_depth(source, start, model)))
-        imgui.end_combo()
-    tooltip("Where depth is looked for. The photo is opened anew.", layout)
-    return actions
+    label("From", layout, FROM_TIP)
+    entries = [(_choice_text(start, model, None), START_TIPS[start]) for start, model in ways]
+    picked = combo("depth from", wanted, entries, layout, FROM_TIP)
+    return [] if picked is None else [OpenPath(source_with_depth(source, *ways[picked]))]
 
 
 def _models(scene: Scene, chosen: str | None) -> list[str]:

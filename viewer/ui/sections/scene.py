@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
-
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import GridShape
 from viewer.model.actions import Action, OpenPath, SetInpainter
@@ -11,14 +9,17 @@ from viewer.model.dense_field import denser_grids, with_views_between
 from viewer.model.layout import Layout
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.scene import Scene, Source
-from viewer.ui.widgets import gap, label, last_part, quiet, tooltip
+from viewer.ui.widgets import combo, gap, label, last_part, quiet
 
 HOLES_TIP = (
     "What fills the places that the photo never saw: background goes on smoothly from what lies behind, patch gives it"
     " texture from around. The views are made anew."
 )
-
-
+INPAINTER_TIPS = {
+    "background": "Background goes on smoothly from what lies behind: quick, and nearest to true views.",
+    "patch": "Background with texture from around: slower, and less smooth.",
+}
+MODEL_TIP = "A model of yours paints them: in seconds a view on a GPU, in minutes without one."
 BETWEEN_TIP = (
     "Makes views between those on disk, of all that these see. First their disparity is found, where the files have"
     " none: that takes longest. Exports take them along."
@@ -45,31 +46,29 @@ def scene_section(scene: Scene, asked: Source | None, facts: FactsRead, layout: 
 
 def _holes(scene: Scene, layout: Layout) -> list[Action]:
     """The ways of inpainting that need no model, and the one that the photo was opened with."""
-    actions: list[Action] = []
     chosen = scene.source.inpaint
+    names = tuple(dict.fromkeys((*INPAINTERS, chosen)))
     label("Holes", layout, HOLES_TIP)
-    if imgui.begin_combo("##holes", last_part(chosen)):
-        for name in dict.fromkeys((*INPAINTERS, chosen)):
-            if imgui.selectable(last_part(name), name == chosen)[0]:
-                actions.append(SetInpainter(name))
-        imgui.end_combo()
-    tooltip(HOLES_TIP, layout)
-    return actions
+    entries = [(last_part(name), INPAINTER_TIPS.get(name, MODEL_TIP)) for name in names]
+    picked = combo("holes", last_part(chosen), entries, layout, HOLES_TIP)
+    return [] if picked is None else [SetInpainter(names[picked])]
 
 
 def _views_between(scene: Scene, asked: Source | None, given: GridShape, layout: Layout) -> list[Action]:
     """The views on disk alone, or one of the denser grids; what was chosen is shown at once."""
-    actions: list[Action] = []
     is_asked = asked is not None and asked.path == scene.source.path
     chosen = (asked.filled_grid or given) if asked is not None and is_asked else scene.grid
     label("Views", layout, BETWEEN_TIP)
-    if imgui.begin_combo("##views", _grid_words(chosen, given)):
-        for grid in (given, *denser_grids(given)):
-            if imgui.selectable(_grid_words(grid, given), grid == chosen)[0] and grid != chosen:
-                actions.append(OpenPath(with_views_between(scene, grid)))
-        imgui.end_combo()
-    tooltip(BETWEEN_TIP, layout)
-    return actions
+    grids = (given, *denser_grids(given))
+    entries = [(_grid_words(grid, given), _grid_tip(grid, given)) for grid in grids]
+    picked = combo("views", _grid_words(chosen, given), entries, layout, BETWEEN_TIP)
+    is_new = picked is not None and grids[picked] != chosen
+    return [OpenPath(with_views_between(scene, grids[picked or 0]))] if is_new else []
+
+
+def _grid_tip(grid: GridShape, given: GridShape) -> str:
+    new = grid.rows * grid.columns - given.rows * given.columns
+    return f"{new} views between those on disk are made." if new else "No views are made."
 
 
 def _grid_words(grid: GridShape, given: GridShape) -> str:
