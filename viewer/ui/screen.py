@@ -13,6 +13,7 @@ from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
 from viewer.ui.overlays.filmstrip import filmstrip
+from viewer.ui.overlays.free_camera import free_camera_chip
 from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
 from viewer.ui.overlays.minimap import draw_minimap
 from viewer.ui.overlays.notices import notices
@@ -46,7 +47,8 @@ def build_screen(
             if textures.minimap is not None:
                 draw_minimap(layout, textures.minimap)
     actions = filmstrip(state, layout, thumbnails)
-    return actions + panel(state, layout) + notices(state, layout) + prompts(state, layout)
+    actions += free_camera_chip(state, layout) + panel(state, layout)
+    return actions + notices(state, layout) + prompts(state, layout)
 
 
 def _picture(layout: Layout, texture: int) -> None:

@@ -15,6 +15,7 @@ from viewer.model.actions import DoTask
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.state.optics import SetAperture, SetFocus
 from viewer.model.state.tasks import SaveTask
+from viewer.ui.overlays.free_camera import CHIP
 
 
 def seen(viewer: Driver) -> np.ndarray:
@@ -37,10 +38,19 @@ def test_a_step_forward_makes_what_is_near_larger_and_c_goes_back(viewer: Driver
     pixels = seen(viewer)
     width = np.ptp(red_places(pixels)[:, 0])
     assert width == pytest.approx(1 / 3 / 0.9, abs=0.02)
+    viewer.find("###leave", CHIP)
     viewer.send("key", "c")
     viewer.until(lambda app: app.state.free_camera is None and app.free_look.shown is None)
     viewer.until_idle()
     np.testing.assert_array_equal(viewer.image(), before)
+
+
+def test_the_chip_says_that_it_is_off_the_plane_and_goes_back(viewer: Driver) -> None:
+    viewer.send("key", "w")
+    seen(viewer)
+    viewer.press("###leave", CHIP)
+    viewer.until(lambda app: app.state.free_camera is None)
+    assert viewer.app.state.optics.focus_disparity == 0, "nothing behind it was clicked"
 
 
 def test_looking_right_moves_everything_to_the_left(viewer: Driver) -> None:

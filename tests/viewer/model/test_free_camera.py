@@ -15,6 +15,7 @@ from viewer.app.keys import Keys, actions_from_keys
 from viewer.model.actions import Action, AskToSave, OpenPath, ReturnHome
 from viewer.model.free_camera import (
     FORWARD_LIMITS,
+    LEAST_SEEN,
     MOST_ASIDE,
     CameraProgress,
     FreeCamera,
@@ -22,6 +23,9 @@ from viewer.model.free_camera import (
     MoveCamera,
     Poses,
     StepPose,
+    is_at_end,
+    mean_depth,
+    seen_share,
 )
 from viewer.model.layout import ScreenSize
 from viewer.model.reducers.root import reduce
@@ -52,6 +56,41 @@ def test_it_stays_within_its_limits(value: float) -> None:
     assert camera is not None
     assert max(abs(camera.right), abs(camera.down)) <= MOST_ASIDE
     assert FORWARD_LIMITS[0] <= camera.forward <= FORWARD_LIMITS[1]
+
+
+def test_it_stops_where_the_photo_ends() -> None:
+    """However it comes there: less than LEAST_SEEN of its picture would be the photo's."""
+    for step in (MoveCamera(right=0.05, down=0.05), MoveCamera(right=-0.05, forward=-0.05), MoveCamera(down=0.2)):
+        state = opened()
+        assert state.scene is not None
+        depth = mean_depth(state.scene)
+        for _ in range(40):
+            state = reduce(state, step)
+            assert state.free_camera is not None
+            assert seen_share(state.free_camera, depth) >= LEAST_SEEN - 1e-6
+        assert is_at_end(state.free_camera, depth)
+        back = reduce(state, MoveCamera(-step.right, -step.down, -step.forward)).free_camera
+        assert back is not None
+        assert not is_at_end(back, depth)
+
+
+def test_nearer_it_may_look_farther_aside() -> None:
+    """As its picture is a smaller part of the photo's."""
+    asides = []
+    for forward in (-0.2, 0.0, 0.5):
+        camera = reduce(reduce(opened(), MoveCamera(forward=forward)), MoveCamera(0.6, 0.6)).free_camera
+        assert camera is not None
+        asides.append(camera.right)
+    assert asides == sorted(asides)
+    assert asides[0] < asides[1] < asides[2]
+
+
+def test_how_much_of_its_picture_is_the_photos() -> None:
+    assert seen_share(FreeCamera(), 2.0) == 1.0
+    assert seen_share(FreeCamera(right=0.5), 2.0) == pytest.approx(0.75)
+    assert seen_share(FreeCamera(right=0.5, down=-0.5), 2.0) == pytest.approx(0.75**2)
+    assert seen_share(FreeCamera(forward=-0.4), 2.0) == pytest.approx(1 / 1.2**2)
+    assert seen_share(FreeCamera(right=0.2, forward=0.5), 2.0) == 1.0
 
 
 def test_poses_follow_the_photos_own_in_a_circle() -> None:

@@ -11,6 +11,7 @@ from viewer.model.free_camera import (
     LeaveCamera,
     MoveCamera,
     StepPose,
+    mean_depth,
     moved,
     stepped,
 )
@@ -35,7 +36,7 @@ def reduce_free_camera(state: AppState, action: FreeCameraAction) -> AppState:
     camera = state.free_camera or FreeCamera()
     match action:
         case MoveCamera():
-            return replace(state, free_camera=moved(camera, action))
+            return replace(state, free_camera=moved(camera, action, mean_depth(state.scene)))
         case StepPose(steps) if state.poses is not None:
             return replace(state, free_camera=stepped(camera, state.poses, steps))
     return add_notice(state, Notice(NO_POSES))
