@@ -12,7 +12,7 @@ MOST_ASIDE = 0.6
 """Of half the picture."""
 FORWARD_LIMITS = -0.4, 0.6
 """In distances of the nearest."""
-LEAST_SEEN = 0.7
+LEAST_SEEN = 0.85
 """Of the camera's picture must lie within the photo's frame: it stops where more would be synthesised."""
 END_SLACK = 1e-3
 STOP_STEPS = 20
