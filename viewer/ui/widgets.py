@@ -32,13 +32,16 @@ def slider(
     layout: Layout,
     tip: str = "",
     is_logarithmic: bool = False,
+    is_enabled: bool = True,
 ) -> float | None:
     """A row with a slider; the new value where the user changed it. form: printf-like. Ctrl+click types a value."""
+    imgui.begin_disabled(not is_enabled)
     label(text, layout, tip)
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if is_logarithmic else 0)
     changed, new = imgui.slider_float(f"##{text}", value, *limits, form, flags)
     ends = tuple(map(math.log, (new, *limits))) if is_logarithmic else (new, *limits)
     _draw_grip(ends, layout)
+    imgui.end_disabled()
     tooltip(tip, layout)
     return new if changed else None
 
@@ -53,11 +56,15 @@ def end_words(left: str, right: str, layout: Layout) -> None:
     draw.add_text(imgui.ImVec2(x, corner.y + padding.y), color, right)
 
 
-def whole_slider(text: str, value: int, limits: tuple[int, int], layout: Layout, tip: str = "") -> int | None:
+def whole_slider(
+    text: str, value: int, limits: tuple[int, int], layout: Layout, tip: str = "", is_enabled: bool = True
+) -> int | None:
     """A row with a slider over whole numbers."""
+    imgui.begin_disabled(not is_enabled)
     label(text, layout, tip)
     changed, new = imgui.slider_int(f"##{text}", value, *limits, "%d", imgui.SliderFlags_.always_clamp)
     _draw_grip((new, *limits), layout)
+    imgui.end_disabled()
     tooltip(tip, layout)
     return new if changed else None
 

@@ -49,6 +49,10 @@ BRUSH_TIPS: dict[BrushTool, str] = {
     "level": "Drag over the picture to give it one depth, up to the photo's edges (B puts the brush away).",
     "fill": "Click a surface to give it one depth, up to edges of the photo and of depth (B puts the bucket away).",
 }
+STROKE_TIP = "Of one stroke. Level and bucket always give the whole depth."
+SAMPLE_TIP = (
+    "Level and bucket give the depth where you press. Ctrl+click in the picture picks another, this forgets it."
+)
 BETTER_DEPTH = (("Open a map…", "Open a depth map…"), ("Get a model…", "Get a depth model…"))
 """Words on a button, and the command they stand for."""
 TOOLS_A_ROW = 3
@@ -174,12 +178,11 @@ def _brush(state: AppState, layout: Layout) -> list[Action]:
         is_in_hand = brush.is_on and brush.tool == tool
         if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), BRUSH_TIPS[tool]):
             actions.append(SetBrush(replace(brush, tool=tool, is_on=not is_in_hand)))
-    if brush.is_on:
-        limits = (100 * RADIUS_LIMITS[0], 100 * RADIUS_LIMITS[1])
-        tip = "Radius, of the photo's width (wheel over the picture)."
-        size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, tip, is_logarithmic=True)
-        actions += [] if size is None else [SetBrush(replace(brush, radius=size / 100))]
-        actions += _sample(brush, layout) if brush.tool in DEPTH_TOOLS else _strength(brush, layout)
+    limits = (100 * RADIUS_LIMITS[0], 100 * RADIUS_LIMITS[1])
+    tip = "Radius, of the photo's width (wheel over the picture)."
+    size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)
+    actions += [] if size is None else [SetBrush(replace(brush, radius=size / 100))]
+    actions += _strength(brush, layout) + _sample(brush, layout)
     _scroll_here_when_taken(brush.is_on)
     return actions
 
@@ -193,17 +196,16 @@ def _scroll_here_when_taken(is_in_hand: bool) -> None:
 
 
 def _strength(brush: Brush, layout: Layout) -> list[Action]:
-    percent = slider("Strength", 100 * brush.strength, (0.0, 100.0), "%.0f %%", layout, "Of one stroke.")
+    is_heeded = brush.is_on and brush.tool not in DEPTH_TOOLS
+    limits = (0.0, 100.0)
+    percent = slider("Strength", 100 * brush.strength, limits, "%.0f %%", layout, STROKE_TIP, is_enabled=is_heeded)
     return [] if percent is None else [SetBrush(replace(brush, strength=percent / 100))]
 
 
 def _sample(brush: Brush, layout: Layout) -> list[Action]:
-    """Which depth the tool gives, and how to take another."""
-    if brush.sample is None:
-        quiet("Gives the depth where you press; Ctrl+click picks another.")
-        return []
-    quiet("Gives the depth of the marked place; Ctrl+click picks another.")
-    is_dropped = button("Forget it", layout, "Give the depth where you press, again.")
+    """Level and bucket give the depth where one presses, or that of the place that was picked."""
+    is_picked = brush.is_on and brush.tool in DEPTH_TOOLS and brush.sample is not None
+    is_dropped = button("Forget the picked depth", layout, SAMPLE_TIP, is_picked)
     return [SetBrush(replace(brush, sample=None))] if is_dropped else []
 
 

@@ -26,6 +26,7 @@ from viewer.ui.style import Palette, pack_color
 from viewer.ui.widgets import button, checkbox, choice, gap, quiet, slider, tooltip
 
 BALL_SIDE = 96.0
+FIRST_COLOR: Triple = (0.5, 0.5, 0.5)
 BALL_RINGS = 24
 LEAST_TOWARDS = 0.05
 """How far the light stays before the ball's rim."""
@@ -47,24 +48,22 @@ ONLY_TIP = "Nothing is glossy but what the brush marks."
 
 
 def gloss_section(state: AppState, layout: Layout, palette: Palette) -> list[Action]:
-    """Build the section."""
-    gloss = state.optics.gloss
-    is_on = checkbox("Glossy surface", gloss is not None, layout, GLOSS_TIP)
+    """Build the section: every row always, grey where it means nothing, so that none moves another under a click."""
+    is_glossy, gloss = state.optics.gloss is not None, state.optics.gloss or FIRST_GLOSS
+    is_on = checkbox("Glossy surface", is_glossy, layout, GLOSS_TIP)
+    imgui.begin_disabled(not is_glossy)
+    edited = _reflection(replace(gloss, light=_light(gloss.light, layout, palette)), layout)
+    actions = _surroundings(gloss, layout)
+    edited = replace(edited, surface=_surface(gloss.surface, layout))
+    actions += [] if edited == gloss else [SetGloss(edited)]
+    actions += _brush(state.gloss_brush, gloss, layout)
+    imgui.end_disabled()
     if is_on is not None:
         return [SetGloss(FIRST_GLOSS if is_on else None)]
-    if gloss is None:
-        return []
-    light = _light(gloss.light, layout, palette)
-    edited = replace(gloss, light=light) if light is not None else _reflection(gloss, layout)
-    actions = _surroundings(gloss, layout)
-    surface = _surface(gloss.surface, layout)
-    if surface is not None:
-        edited = replace(edited, surface=surface)
-    actions += [] if edited == gloss else [SetGloss(edited)]
-    return actions + _brush(state.gloss_brush, gloss, layout)
+    return actions if is_glossy else []
 
 
-def _light(light: GlossLight, layout: Layout, palette: Palette) -> GlossLight | None:
+def _light(light: GlossLight, layout: Layout, palette: Palette) -> GlossLight:
     """The ball, and how bright and large the light is."""
     direction = _ball(light, layout, palette)
     if direction is not None:
@@ -73,11 +72,9 @@ def _light(light: GlossLight, layout: Layout, palette: Palette) -> GlossLight | 
     new = slider("Brightness", level, (0.0, BRIGHTEST), "× %.2f", layout, BRIGHT_TIP)
     if new is not None:
         red, green, blue = (value / level * new if level > 0 else new for value in light.color)
-        return replace(light, color=(red, green, blue))
+        light = replace(light, color=(red, green, blue))
     radius = slider("Light size", light.radius_deg, LIGHT_RADIUS_LIMITS_DEG, "%.1f°", layout, is_logarithmic=True)
-    if radius is not None:
-        return replace(light, radius_deg=radius)
-    return light if direction is not None else None
+    return light if radius is None else replace(light, radius_deg=radius)
 
 
 def _ball(light: GlossLight, layout: Layout, palette: Palette) -> Triple | None:
@@ -121,56 +118,53 @@ def _draw_ball(middle: tuple[float, float], radius: float, lit: tuple[float, flo
 def _reflection(gloss: Gloss, layout: Layout) -> Gloss:
     percent = slider("Roughness", 100 * gloss.roughness, (0.0, 100.0), "%.0f %%", layout, ROUGH_TIP)
     if percent is not None:
-        return replace(gloss, roughness=percent / 100)
+        gloss = replace(gloss, roughness=percent / 100)
     percent = slider("Reflects", 100 * gloss.reflectance, (0.0, 100.0), "%.0f %%", layout, REFLECTS_TIP)
     if percent is not None:
-        return replace(gloss, reflectance=percent / 100)
+        gloss = replace(gloss, reflectance=percent / 100)
     shines = checkbox("The photo shows it already", gloss.photo_shines, layout, SHOWN_TIP)
     return gloss if shines is None else replace(gloss, photo_shines=shines)
 
 
 def _surroundings(gloss: Gloss, layout: Layout) -> list[Action]:
-    """What is reflected beside the light: a picture's name, and the way to another or to none."""
-    if button("Surroundings…", layout, AROUND_TIP):
-        return [DoTask(ChooseTask("surroundings"))]
-    if not gloss.environment:
-        return []
+    """What is reflected beside the light: the way to a picture or to none, and its name."""
+    is_asked = button("Surroundings…", layout, AROUND_TIP)
     imgui.same_line()
-    if button("None", layout, "Reflect the light alone."):
-        return [SetGloss(replace(gloss, environment=""))]
-    quiet(PurePath(gloss.environment).name)
-    return []
+    is_dropped = button("None", layout, "Reflect the light alone.", bool(gloss.environment))
+    quiet(PurePath(gloss.environment).name or "Nothing around it")
+    if is_asked:
+        return [DoTask(ChooseTask("surroundings"))]
+    return [SetGloss(replace(gloss, environment=""))] if is_dropped else []
 
 
-def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface | None:
+def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface:
     """The range of depth and the colour that belong to it."""
     gap(layout, 2)
     only = checkbox("Only what is painted", surface.strokes_only, layout, ONLY_TIP)
-    if only is not None:
-        return replace(surface, strokes_only=only)
-    if surface.strokes_only:
-        return None
+    imgui.begin_disabled(surface.strokes_only)
     far = slider("From far", 100 * surface.farthest, (0.0, 100.0), "%.0f %%", layout, FAR_TIP)
     if far is not None:
-        return replace(surface, farthest=far / 100, nearest=max(surface.nearest, far / 100))
+        surface = replace(surface, farthest=far / 100, nearest=max(surface.nearest, far / 100))
     near = slider("To near", 100 * surface.nearest, (0.0, 100.0), "%.0f %%", layout, NEAR_TIP)
     if near is not None:
-        return replace(surface, nearest=near / 100, farthest=min(surface.farthest, near / 100))
-    return _color(surface, layout)
+        surface = replace(surface, nearest=near / 100, farthest=min(surface.farthest, near / 100))
+    surface = _color(surface, layout)
+    imgui.end_disabled()
+    return surface if only is None else replace(surface, strokes_only=only)
 
 
-def _color(surface: GlossSurface, layout: Layout) -> GlossSurface | None:
-    has_color = checkbox("Only one colour", surface.color is not None, layout, "And what is like it.")
-    if has_color is not None:
-        return replace(surface, color=(0.5, 0.5, 0.5) if has_color else None)
-    if surface.color is None:
-        return None
-    changed, values = imgui.color_edit3("##gloss colour", list(surface.color))
+def _color(surface: GlossSurface, layout: Layout) -> GlossSurface:
+    is_one, color = surface.color is not None, surface.color or FIRST_COLOR
+    has_color = checkbox("Only one colour", is_one, layout, "And what is like it.")
+    imgui.begin_disabled(not is_one)
+    changed, values = imgui.color_edit3("##gloss colour", list(color))
+    new = slider("Tolerance", surface.tolerance, (0.0, MOST_TOLERANCE), "%.2f", layout)
+    imgui.end_disabled()
     if changed:
         red, green, blue = (min(max(float(value), 0.0), 1.0) for value in values)
-        return replace(surface, color=(red, green, blue))
-    new = slider("Tolerance", surface.tolerance, (0.0, MOST_TOLERANCE), "%.2f", layout)
-    return None if new is None else replace(surface, tolerance=new)
+        surface = replace(surface, color=(red, green, blue))
+    surface = surface if new is None else replace(surface, tolerance=new)
+    return surface if has_color is None else replace(surface, color=FIRST_COLOR if has_color else None)
 
 
 def _brush(brush: GlossBrush, gloss: Gloss, layout: Layout) -> list[Action]:
@@ -185,9 +179,7 @@ def _brush(brush: GlossBrush, gloss: Gloss, layout: Layout) -> list[Action]:
         imgui.same_line(0, spacing)
     if button("Wipe", layout, "Take all strokes away.", bool(gloss.surface.strokes), width):
         actions.append(SetGloss(replace(gloss, surface=replace(gloss.surface, strokes=()))))
-    if brush.is_on:
-        limits = (100 * STROKE_RADIUS_LIMITS[0], 100 * STROKE_RADIUS_LIMITS[1])
-        tip = "Radius, of the photo's width (wheel over the picture)."
-        size = slider("Brush size", 100 * brush.radius, limits, "%.1f %%", layout, tip, is_logarithmic=True)
-        actions += [] if size is None else [SetGlossBrush(replace(brush, radius=size / 100))]
-    return actions
+    limits = (100 * STROKE_RADIUS_LIMITS[0], 100 * STROKE_RADIUS_LIMITS[1])
+    tip = "Radius, of the photo's width (wheel over the picture)."
+    size = slider("Brush size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)
+    return actions + ([] if size is None else [SetGlossBrush(replace(brush, radius=size / 100))])

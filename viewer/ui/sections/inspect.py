@@ -28,12 +28,17 @@ from viewer.model.state.tasks import ChooseTask
 from viewer.ui.widgets import button, checkbox, choice, quiet, slider
 
 OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "Disparity", "entropy": "Entropy", "inpainted": "Inpainted"}
-EPI_SENTENCE = "Epipolar plane images: one line of the picture from every view, a surface slopes the more the nearer."
+EPI_TIP = (
+    "Epipolar plane images through the pointer (E): one line of the picture from every view, a surface slopes the more"
+    " the nearer."
+)
 OVERLAY_TIPS: dict[OverlayKind, str] = {
     "disparity": "How near everything is, as colours.",
     "entropy": "How undecided the weights of the rays are: 1 where no ray of the photo shows anything.",
     "inpainted": "What the photo never saw and had to be made up.",
 }
+OPACITY_TIP = "Of what lies over the picture."
+TRUTH_TIP = "A light field on disk to compare with."
 COMPARISON_WORDS: dict[Comparison, str] = {
     "photo": "Photo",
     "quality": "Exact",
@@ -83,13 +88,11 @@ def _units(state: AppState, layout: Layout) -> list[Action]:
 def _toggles(state: AppState, layout: Layout) -> list[Action]:
     inspection = state.inspection
     row = (
-        ("EPIs", inspection.shows_epis, ShowEpis, "Epipolar plane images through the pointer (E)"),
+        ("EPIs", inspection.shows_epis, ShowEpis, EPI_TIP),
         ("Views", inspection.shows_grid, ShowGrid, "All views; click one to go there (G)"),
         ("Values", inspection.shows_values, ShowValues, "What is under the pointer, in a line below (V)"),
     )
     pressed = _choices([(word, is_on, tip, "") for word, is_on, _, tip in row], layout)
-    if inspection.shows_epis:
-        quiet(EPI_SENTENCE)
     return [] if pressed is None else [row[pressed][2](not row[pressed][1])]
 
 
@@ -101,11 +104,9 @@ def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     if pressed is not None:
         actions.append(SetOverlay(None if chosen == OVERLAYS[pressed] else OVERLAYS[pressed]))
-    if chosen is not None:
-        quiet(OVERLAY_TIPS[chosen])
-        percent = slider("Opacity", 100 * state.inspection.opacity, (0.0, 100.0), "%.0f %%", layout)
-        actions += [] if percent is None else [SetOpacity(percent / 100)]
-    return actions
+    opacity, is_on = 100 * state.inspection.opacity, chosen is not None
+    percent = slider("Opacity", opacity, (0.0, 100.0), "%.0f %%", layout, OPACITY_TIP, is_enabled=is_on)
+    return actions + ([] if percent is None else [SetOpacity(percent / 100)])
 
 
 def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -127,16 +128,14 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     if pressed is not None:
         actions.append(Compare(None if chosen == COMPARISONS[pressed] else COMPARISONS[pressed]))
-    if chosen is not None:
-        quiet(COMPARISON_TIPS[chosen])
-    if inspection.truth is not None:
-        if button("Folder…", layout, inspection.truth.path):
-            actions.append(DoTask(ChooseTask("truth")))
+    truth = inspection.truth
+    if button("Truth…", layout, TRUTH_TIP if truth is None else truth.path):
+        actions.append(DoTask(ChooseTask("truth")))
+    if truth is not None:
         imgui.same_line()
         imgui.align_text_to_frame_padding()
-        quiet(inspection.truth.name)
-    if chosen in ("quality", "truth"):
-        quiet(pair_text(state, scene, chosen))
+        quiet(truth.name)
+    quiet(pair_text(state, scene, chosen) if chosen in ("quality", "truth") else " ")
     return actions
 
 

@@ -76,14 +76,14 @@ def focus_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     shown = checkbox("Tilt", state.tilt_handles is not None or any(optics.focus_tilt), layout, TILT_TIP)
     if shown is not None:
         actions += [ShowTiltHandles(shown)] if shown else [ShowTiltHandles(False), SetTilt((0.0, 0.0))]
-    if state.tilt_handles is not None or any(optics.focus_tilt):
-        right, down = optics.focus_tilt
-        limits = (-span / unit.size, span / unit.size)
-        form = unit.form.replace("%", "%+", 1)
-        new = slider("to the right", right / unit.size, limits, form, layout)
-        _add(actions, lambda value: SetTilt((value * unit.size, down)), new)
-        new = slider("downward", down / unit.size, limits, form, layout)
-        _add(actions, lambda value: SetTilt((right, value * unit.size)), new)
+    is_tilted = state.tilt_handles is not None or any(optics.focus_tilt)
+    right, down = optics.focus_tilt
+    limits = (-span / unit.size, span / unit.size)
+    form = unit.form.replace("%", "%+", 1)
+    new = slider("to the right", right / unit.size, limits, form, layout, is_enabled=is_tilted)
+    _add(actions, lambda value: SetTilt((value * unit.size, down)), new)
+    new = slider("downward", down / unit.size, limits, form, layout, is_enabled=is_tilted)
+    _add(actions, lambda value: SetTilt((right, value * unit.size)), new)
     return actions
 
 
@@ -143,10 +143,9 @@ def aperture_section(state: AppState, scene: Scene, layout: Layout, palette: Pal
         actions += _stops(diameter, widest, f_number_text(scene, diameter), layout, tip)
     shape = state.optics.aperture_shape
     actions += _kinds(shape, layout, palette)
-    actions += [SetApertureShape(new) for new in _shape_edits(shape, layout)]
     if shape.kind == "mask":
         actions += _mask_row(shape, layout)
-    return actions
+    return actions + [SetApertureShape(new) for new in _shape_edits(shape, layout)]
 
 
 def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str) -> list[Action]:
@@ -177,19 +176,20 @@ def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Actio
 
 
 def _shape_edits(shape: ApertureShape, layout: Layout) -> list[ApertureShape]:
+    """Two rows with every shape, the mask's button among them: nothing below moves under a click."""
     edits: list[ApertureShape | None] = []
-    if shape.kind == "polygon":
-        blades = whole_slider("Blades", shape.blades, BLADES_LIMITS, layout)
+    if shape.kind in ("disc", "polygon"):
+        blades = whole_slider("Blades", shape.blades, BLADES_LIMITS, layout, is_enabled=shape.kind == "polygon")
         edits.append(None if blades is None else replace(shape, blades=blades))
-    if shape.kind in ("polygon", "mask"):
-        turned = slider("Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", layout)
-        edits.append(None if turned is None else replace(shape, rotation_deg=turned))
     if shape.kind == "ring":
         inner = slider("Blocked", shape.ring_inner, (0.0, RING_INNER_LIMIT), "%.2f of the radius", layout)
         edits.append(None if inner is None else replace(shape, ring_inner=inner))
     if shape.kind == "cat_eye":
         cut = slider("Cut off", shape.cat_eye, (0.0, 1.0), "%.2f", layout)
         edits.append(None if cut is None else replace(shape, cat_eye=cut))
+    can_turn = shape.kind in ("polygon", "mask")
+    turned = slider("Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", layout, is_enabled=can_turn)
+    edits.append(None if turned is None else replace(shape, rotation_deg=turned))
     return [edit for edit in edits if edit is not None]
 
 

@@ -29,8 +29,7 @@ def view_section(state: AppState, scene: Scene, layout: Layout, palette: Palette
     actions += _loops(state, layout)
     _place(state, scene, palette)
     imgui.end_group()
-    if state.motion.kind in LOOPS:
-        actions += _speed(state, layout)
+    actions += _speed(state, layout)
     if farthest := dolly_limit(scene.grid):
         tip = "Step into the picture or back out of it, as far as the views allow."
         dolly = slider("Dolly", state.optics.dolly, (-farthest, farthest), "%+.2f views", layout, tip)
@@ -62,11 +61,12 @@ def _place(state: AppState, scene: Scene, palette: Palette) -> None:
 
 
 def _speed(state: AppState, layout: Layout) -> list[Action]:
+    """How fast a loop goes; it can be set before, and held while one runs."""
     actions: list[Action] = []
     speed = slider("Speed", state.motion.speed, SPEED_LIMITS, "%.2f turns/s", layout, is_logarithmic=True)
     if speed is not None:
         actions.append(SetSpeed(speed))
     word = "Go on" if state.motion.is_paused else "Pause"
-    if button(word, layout, "Space", width=PAD_SIDE * layout.ui_scale):
+    if button(word, layout, "Space", state.motion.kind in LOOPS, PAD_SIDE * layout.ui_scale):
         actions.append(PauseMotion(not state.motion.is_paused))
     return actions

@@ -1,0 +1,87 @@
+"""Controls keep their places: what a click switches on moves nothing that might be clicked next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from imgui_bundle import imgui
+
+from tests.viewer.conftest import headless_with_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import Action, SetLoop, ShowTiltHandles
+from viewer.model.layout import ScreenSize
+from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
+from viewer.model.state.inspection import Compare, KeepState, SetOverlay, ShowEpis
+from viewer.model.state.optics import (
+    APERTURE_KINDS,
+    FIRST_GLOSS,
+    ApertureMask,
+    ApertureShape,
+    GlossBrush,
+    SetApertureShape,
+    SetGloss,
+    SetGlossBrush,
+)
+from viewer.model.state.preferences import SECTIONS
+
+MASK = ApertureMask("star.png", 1, 1, b"\xff")
+GLOSSY = SetGloss(FIRST_GLOSS)
+TALL = ScreenSize(900, 2600)
+SWITCHES: dict[str, tuple[Action, ...]] = {
+    "loop": (SetLoop("circle"),),
+    "tilt": (ShowTiltHandles(True),),
+    **{kind: (SetApertureShape(ApertureShape(kind, mask=MASK)),) for kind in APERTURE_KINDS},
+    "gloss": (GLOSSY,),
+    "gloss of strokes": (SetGloss(replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, strokes_only=True))),),
+    "gloss of a colour": (SetGloss(replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),),
+    "surroundings": (SetGloss(replace(FIRST_GLOSS, environment="")), SetGlossBrush(GlossBrush(is_on=True))),
+    "brush": (SetBrush(Brush("nearer", is_on=True)),),
+    "bucket": (SetBrush(Brush("fill", is_on=True)), PickDepth(DepthSample((0.5, 0.5), 1.0))),
+    "EPIs": (ShowEpis(True),),
+    "overlay": (SetOverlay("disparity"),),
+    "photo": (Compare("photo"),),
+    "kept": (KeepState(), Compare("kept")),
+    "quality": (Compare("quality"),),
+}
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+    with headless_with_scene(tmp_path_factory.mktemp("steady"), *SECTIONS) as viewer:
+        yield viewer
+
+
+@pytest.fixture
+def tops(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
+    """Where each label, button and box of the panel was laid out last, by its words."""
+    found: dict[str, float] = {}
+
+    def watch(kind: str) -> None:
+        real = getattr(imgui, kind)
+
+        def build(words: str, *others: Any) -> Any:
+            result = real(words, *others)
+            found[words] = imgui.get_item_rect_min().y
+            return result
+
+        monkeypatch.setattr(imgui, kind, build)
+
+    for kind in ("text", "button", "checkbox", "invisible_button"):
+        watch(kind)
+    return found
+
+
+@pytest.mark.parametrize("name", SWITCHES)
+def test_what_is_switched_on_moves_nothing(viewer: HeadlessViewer, tops: dict[str, float], name: str) -> None:
+    viewer.screen(TALL)
+    before = dict(tops)
+    assert len(before) > 40
+    tops.clear()
+    viewer.do(*SWITCHES[name])
+    viewer.screen(TALL)
+    moved = {words: (top, tops[words]) for words, top in before.items() if words in tops and tops[words] != top}
+    assert not moved
+    assert "Size" in tops, "the last section was built"
