@@ -140,12 +140,19 @@ def evaluate(
     lpips = None if options.lpips is None else _lpips(options.lpips)
     source: DisparityFrom = "auto" if isinstance(options.source, Path) else options.source
     results = []
-    for trial in trials_of(scene, source, options.most_views):
-        report_progress(0, 0, f"{scene.name}: disparity")
+    trials = list(trials_of(scene, source, options.most_views))
+    for number, trial in enumerate(trials):
+        report_progress(number, len(trials), f"{scene.name}: disparity")
         given = trial_input(trial, options.source, options.choice, options.max_pixels, should_stop)
-        for disparity in given.maps:
-            results.append(_Evaluator(trial, given, disparity, options, lpips, report_progress, should_stop).evaluate())
+        for which, disparity in enumerate(given.maps):
+            report = _part_of(report_progress, number + which / len(given.maps), 1 / len(given.maps), len(trials))
+            results.append(_Evaluator(trial, given, disparity, options, lpips, report, should_stop).evaluate())
     return results
+
+
+def _part_of(report_progress: ReportProgress, before: float, work: float, total: float) -> ReportProgress:
+    """Reports a part of the work as what it is of the whole."""
+    return lambda done, of_part, doing: report_progress(before + work * done / of_part, total, doing)
 
 
 def _lpips(folder: Path) -> Lpips:
@@ -302,7 +309,7 @@ class _Evaluator:
     def _consistency(self, views: PlaneViews) -> dict[str, Consistency]:
         found: dict[str, Consistency] = {}
         for quality in views.qualities:
-            self.report_progress(0, 0, f"{self.trial.scene.name}: consistency, {quality}")
+            self.report_progress(1, 1, f"{self.trial.scene.name}: consistency, {quality}")
             make = partial(views.maker.view, quality)
             found[quality] = consistency(make, views.offsets, self.given.photo, self.refined)
         if len(self.lines) + 1 >= LEAST_EPI_VIEWS:

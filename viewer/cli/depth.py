@@ -23,7 +23,7 @@ def depth(
     Example: iibr depth field -o field_disparity.pfm
     """
     require_memory(memory, keeps_views=True)
-    from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
+    from iibr_core.depth.multi_view.estimate import FINDING, estimate_coarse, estimate_disparity
     from iibr_core.formats.light_fields.registry import open_light_field
     from iibr_core.formats.light_fields.views import grid_of, read_views
     from iibr_core.formats.maps.writer import write_map
@@ -36,18 +36,13 @@ def depth(
     budget = budget_of(memory)
     require_field(budget, scene.name, size, grid)
     with show_progress("reading") as show:
-        read = []
-        for view in views:
-            read.append(view)
-            show(len(read), grid.rows * grid.columns)
-    # Of a pair it is the left one's.
-    read.sort(key=lambda view: (view.row, view.column) != scene.views[scene.centre].place)
-    colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
-    with show_progress("finding disparity") as show:
-        show(0, 0)
+        # Of a pair it is the left one's.
+        read = sorted(views, key=lambda view: (view.row, view.column) != scene.views[scene.centre].place)
+        colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
+        show(0, 0, FINDING)
         coarse = estimate_coarse(colors, offsets, 0)
         require_matching(budget, scene.name, size, coarse.range_px, offsets)
-        values = estimate_disparity(colors, offsets, 0, coarse.range_px)
+        values = estimate_disparity(colors, offsets, 0, coarse.range_px, report_progress=show)
     note = write_map(out, values)
     print(f"{scene.name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")
     print_notes((note,) if note else ())

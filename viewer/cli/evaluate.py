@@ -13,7 +13,7 @@ import typer
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.extras import require_extra
-from iibr_core.types import InputError, Quality
+from iibr_core.types import InputError, Quality, ReportProgress
 from viewer.cli.options import (
     DepthModel,
     Force,
@@ -99,14 +99,19 @@ def evaluate(
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
     results = []
     with show_progress("reading") as show:
-        for scene in scenes:
-            results += evaluate_scene(scene, options, show)
+        for number, scene in enumerate(scenes):
+            results += evaluate_scene(scene, options, _part_of(show, number, len(scenes)))
     write_report(out, results, shlex.join(["iibr", *sys.argv[1:]]))
     for result in results:
         print(summary_line(result))
     notes = dict.fromkeys(f"{result.scene}: {note}" for result in results for note in result.notes)
     print(out / "index.html")
     print_notes(tuple(notes))
+
+
+def _part_of(show: ReportProgress, before: int, total: int) -> ReportProgress:
+    """Reports the work on a scene as what it is of that on all."""
+    return lambda done, of_scene, doing: show(before + done / of_scene, total, doing)
 
 
 def _disparity_source(text: str) -> DisparityFrom | Path:

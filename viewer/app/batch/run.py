@@ -79,7 +79,8 @@ class _Batch:
         self.count.failed += 1
 
     def _tell(self, doing: str) -> None:
-        self._report_progress(self.count.done, self.count.total, doing)
+        before = self.count.there_before  # those took no work
+        self._report_progress(self.count.done - before, self.count.total - before, doing)
 
 
 def run_batch(

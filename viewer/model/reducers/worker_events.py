@@ -8,6 +8,7 @@ from pathlib import PurePath
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerEvent
+from viewer.model.lens.limits import focus_limits
 from viewer.model.reducers.folder import is_stepped_to
 from viewer.model.reducers.history import map_optics
 from viewer.model.reducers.lens import carry_optics
@@ -63,9 +64,8 @@ def stop_work(state: AppState) -> AppState:
 
 def _open_scene(state: AppState, scene: Scene) -> AppState:
     old = state.scene
-    if old is not None and old.source is scene.source and scene.plan is None and state.has_chosen_focus:
-        # More is known of its disparity now; focus stays where the user put it.
-        scene = replace(scene, disparity_range_px=_widened(scene.disparity_range_px, state.optics.focus_disparity))
+    if old is not None and old.source is scene.source and scene.plan is None:
+        scene = _with_steady_focus(state, old, scene)
     opened = replace(
         state,
         scene=scene,
@@ -110,9 +110,17 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     )
 
 
-def _widened(range_px: tuple[float, float], disparity: float) -> tuple[float, float]:
-    low, high = range_px
-    return min(low, disparity), max(high, disparity)
+def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:
+    """A light field of which more is known now: the control of its focus does not move by itself. The limits stay where
+    they hold what was found, and they hold the focus that the user chose.
+    """
+    (low, high), (least, most) = scene.disparity_range_px, focus_limits(old)
+    if old.has_view_disparity and least <= low <= high <= most:
+        return replace(scene, disparity_range_px=old.disparity_range_px)
+    if not state.has_chosen_focus:
+        return scene
+    focus = state.optics.focus_disparity
+    return replace(scene, disparity_range_px=(min(low, focus), max(high, focus)))
 
 
 def _progress_of(state: AppState, scene: Scene) -> Progress:

@@ -106,10 +106,10 @@ def _focus(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Where the focus is: from near to far, in metres where they are known; or as disparity, and distance with it."""
     actions: list[Action] = []
     disparity = state.optics.focus_disparity
-    if state.preferences.units == "light field":
+    if state.preferences.units == "light field" or not scene.has_view_disparity:  # else nothing is near or far yet
         new = slider("Focus", disparity, focus_limits(scene), "%.2f px", layout, FOCUS_DISPARITY_TIP)
         _add(actions, SetFocus, new)
-        return actions + _distance(state, scene, layout)
+        return actions + (_distance(state, scene, layout) if state.preferences.units == "light field" else [])
     distance = metres(scene, disparity)
     form = "%.0f %%" if distance is None else metres_text(distance)
     new = slider("Focus", far_percent(scene, disparity), (0.0, 100.0), form, layout, FOCUS_TIP)
