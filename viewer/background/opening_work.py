@@ -10,13 +10,7 @@ from iibr_core.runtime.time_left import TimeLeft
 from viewer.model.state.scene import Progress
 
 Stage = Literal["reading", "searching", "drafting", "matching", "carrying"]
-WORDS: dict[Stage, str] = {
-    "reading": "reading views",
-    "searching": "finding disparity",
-    "drafting": "showing disparity",
-    "matching": "finding disparity",
-    "carrying": "carrying disparity to all views",
-}
+FINDING = "finding disparity"
 READ_WORK, SEARCH_WORK, MATCH_WORK = 0.2, 3.0, 30.0
 """Of reading a view, of the small map and of the whole one, against carrying disparity to a view, as long as this run
 has not measured them.
@@ -96,7 +90,7 @@ class OpeningWork:
             round(carried) if is_last or stage == "reading" else self._views,
             self._views,
             self._clock() - self._begun,
-            "" if is_last and share >= 1 else WORDS[stage],
+            "" if is_last and share >= 1 else "reading views" if stage == "reading" else FINDING,
             0 if is_last else self._views,
             self._time_left.share,
             left_s if is_last or stage in ("drafting", "matching") else None,

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -218,3 +219,9 @@ def test_generation_follows_the_plan():
     asked = [view.colors for view in generate(photo, disparity, plan, quality="fast")]
     assert all((one == other).all() for one, other in zip(made["fast"], asked))
     assert any((one != other).any() for one, other in zip(made["exact"], asked))
+
+
+def test_no_time_is_told_before_anything_was_measured():
+    photo, disparity = square_before_wall()
+    plan = plan_literal(photo, disparity, GridShape(9, 9))
+    assert not re.search(r"\d (s|min)\b", " ".join(plan.reasons))

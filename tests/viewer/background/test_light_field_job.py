@@ -15,7 +15,7 @@ from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError
 from viewer.background.light_field_job import FROM_VIEWS
-from viewer.background.opening_work import WORDS
+from viewer.background.opening_work import FINDING
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
 from viewer.model.lens.limits import focus_limits
@@ -155,9 +155,7 @@ def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
     """Asked to stop once it has begun."""
     said: list[str] = []
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
-    results = results_of(
-        request, lambda: WORDS["searching"] in said, lambda: CENTRE, lambda progress: said.append(progress.doing)
-    )
+    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda progress: said.append(progress.doing))
     with pytest.raises(Cancelled):
         list(results)
 
@@ -181,9 +179,7 @@ def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
 def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: Path) -> None:
     said: list[str] = []
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
-    results = results_of(
-        request, lambda: WORDS["searching"] in said, lambda: CENTRE, lambda now: said.append(now.doing)
-    )
+    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda now: said.append(now.doing))
     with pytest.raises(Cancelled):
         list(results)
 
