@@ -136,6 +136,14 @@ def test_a_pass_of_the_field_is_the_slow_one():
     np.testing.assert_allclose(belief, expected.ravel()[pixels], atol=1e-5)
 
 
+def test_an_outline_costs_as_much_along_rows_as_along_diagonals():
+    """A pixel of a straight one cuts one straight pair of neighbours and two diagonal ones; a step of a slanted one is
+    longer and cuts two of each.
+    """
+    straight, slanted = 1 + 2 * rim_sides.DIAGONAL, (2 + 2 * rim_sides.DIAGONAL) / np.sqrt(2)
+    assert straight == pytest.approx(slanted, rel=0.01)
+
+
 def test_colours_that_contradict_the_map_inside_surfaces_change_nothing():
     photo, _, unknown, truth = shifted_square()
     shaded = np.roll(np.roll(photo, 3, axis=1), 3, axis=0)
