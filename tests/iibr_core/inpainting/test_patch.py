@@ -103,6 +103,21 @@ def test_matches_are_whole_never_in_front_and_as_good_as_they_say():
         assert said == pytest.approx(np.average(squares, weights=weights), rel=1e-4, abs=1e-7)
 
 
+def test_one_search_more_would_hardly_find_better():
+    """As long as neighbours do not agree yet each of them does, by a third or more."""
+    colors, disparity, hole, photo_disparity, offset = disocclusion()
+    fill_background(colors, disparity, hole, photo_disparity, offset)
+    in_front, nearest = np.float32(2.0), np.empty(SIZE, np.float32)
+    targets, number = patch._targets(disparity, hole, in_front, lambda: False)
+    patch._nearest_of_patches(disparity, hole, 0, SIZE[0], nearest)
+    match, cost, costs = np.full((len(targets), 2), -1, np.int32), np.empty(len(targets), np.float32), []
+    args = colors, disparity, hole, nearest, in_front, number, targets, 0, len(targets)
+    for step in range(patch.SEARCHES + 1):
+        patch._search(*args, step, match.copy(), match, cost)
+        costs.append(cost.mean())
+    assert costs[-1] > 0.9 * costs[-2]
+
+
 def searched(known_error, filled_error):
     """Which of two patches is found for one whose left part is known and whose larger right part was filled; errors:
     of the first and the second patch against either part.
@@ -152,6 +167,7 @@ def test_cracks_are_left_as_they_were_filled():
     colors, disparity, hole, photo_disparity, offset = disocclusion()
     hole[:] = False
     hole[15:45, 50:52] = True
+    colors[:, 52:] = weave()[:, 52:]
     plain = colors.copy(), disparity.copy()
     fill_patches(colors, disparity, hole, photo_disparity, offset)
     fill_background(*plain, hole, photo_disparity, offset)

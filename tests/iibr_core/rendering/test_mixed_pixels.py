@@ -151,6 +151,8 @@ def test_an_edge_that_resampling_has_made_a_ramp_is_not_split():
     colors, disparity = edge_photo(0.5)
     disparity[:, 4:8] = 0.0, 0.5, 1.5, 2.0
     assert split_mixed_pixels(colors, disparity, edge_step=0.3)[3][4, 5] == 0
+    assert mixed_pixels._front_beside(disparity, 4, 5, 0.3) == (0.5, 0.0)
+    assert mixed_pixels._front_beside(disparity, 4, 4, 0.3)[0] == 0.5, "before a ramp it is flat"
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2), (4, 4)])

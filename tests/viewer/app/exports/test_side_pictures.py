@@ -117,6 +117,10 @@ def test_stereo_pictures(source: ExportSource, tmp_path: Path) -> None:
     assert np.abs(pixels(half)[:, :48] - left).max() <= 1
 
 
+def test_half_of_a_picture_of_one_column_is_one(source: ExportSource, tmp_path: Path) -> None:
+    assert pixels(exported(source, "half-sbs", tmp_path / "a.png", size=ScreenSize(1, 8))).shape == (8, 2, 3)
+
+
 def test_colour_of_an_anaglyph_is_not_coarser_than_its_light(source: ExportSource, tmp_path: Path) -> None:
     """Or the eyes would mix: WebP has it so without loss only."""
     png, webp, jpeg = (exported(source, "anaglyph", tmp_path / f"a{ending}") for ending in (".png", ".webp", ".jpg"))
