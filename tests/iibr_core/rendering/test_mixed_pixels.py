@@ -26,6 +26,17 @@ def test_a_mixed_pixel_splits_into_its_surfaces(share):
     assert fringe_disparity[4, 5] == 2.0
 
 
+def test_shares_are_those_of_a_darker_photo_however_bright_an_hdr_one_is():
+    """Of greys, whose channels spread alike: what is left of their covariances after rounding is no colour."""
+    colors, disparity = edge_photo(0.35)
+    light = linear_from_srgb(colors) * np.random.default_rng(0).uniform(0.5, 1.5, (9, 12, 1)).astype(np.float32)
+    usual, bright = (
+        split_mixed_pixels(srgb_from_linear(light * np.float32(scale)), disparity, edge_step=0.5)[3]
+        for scale in (1.0, 1e7)
+    )
+    np.testing.assert_allclose(bright, usual, atol=3e-3)
+
+
 def test_a_pixel_that_is_all_foreground_goes_with_it():
     _, fringe, _, coverage = split_mixed_pixels(*edge_photo(1.0), edge_step=0.5)
     assert coverage[4, 5] == pytest.approx(1 - mixed_pixels.LEAST_SHARE)

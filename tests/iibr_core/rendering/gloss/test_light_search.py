@@ -75,6 +75,12 @@ def test_a_matt_photo_has_no_light_of_its_own(shape, seed):
     assert find_light(GLOSS, *lit(shape(), FROM_SIDE, 0.0, painted(np.random.default_rng(seed)))) is None
 
 
+@pytest.mark.parametrize(("strength", "is_seen"), [(0.015, False), (0.03, True)])
+def test_a_sheen_of_less_than_two_hundredths_of_white_is_no_highlight(strength, is_seen):
+    paint = np.full((*SIZE, 3), 0.2) * [1, 0.8, 0.6]
+    assert (find_light(GLOSS, *lit(round_thing(), FROM_SIDE, strength, paint)) is not None) == is_seen
+
+
 @pytest.mark.parametrize("seed", [0, 2])
 def test_a_bright_blotch_of_grey_paint_is_no_light(seed):
     """White light leaves its colour, too; but a lobe explains less than half of it."""

@@ -202,6 +202,18 @@ def test_a_picture_with_its_depth_beside_it(
     assert np.abs(pixels[depth] - expected[..., None]).max() <= 0.51
 
 
+@pytest.mark.parametrize("span", [4.0, 0.25, 0.0])
+def test_depth_beside_a_picture_is_even_from_the_farthest_to_the_nearest(
+    source: ExportSource, tmp_path: Path, span: float
+) -> None:
+    disparity = np.tile(np.linspace(-1, span - 1, 96, dtype=np.float32), (64, 1))
+    centre = ViewUpdate(1, 1, np.zeros((64, 96, 3), np.uint8), disparity)
+    out = exported(replace(source, loaded=None, centre=centre), "rgbd", tmp_path / "a.png")
+    depth = np.asarray(Image.open(out))[:, 96:, 0]
+    expected = np.linspace(0, 255, 96) if span else np.zeros(96)
+    assert np.abs(depth - expected).max() <= 0.51
+
+
 def test_a_light_field_is_written_with_its_focal_length(source: ExportSource, tmp_path: Path) -> None:
     scene = open_light_field(exported(source, "hci", tmp_path / "field"))
     assert source.loaded is not None
