@@ -13,7 +13,9 @@ from imgui_bundle import imgui
 from PIL import Image, ImageSequence
 
 from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.runtime.tiling import raise_if_stopped
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.exports.source import ExportSource
@@ -55,16 +57,16 @@ def texts(app: App) -> list[str]:
     return [notice.text for notice in app.state.notices]
 
 
-def start(viewer: Driver, path: Path) -> None:
-    """Ask for a long one, and wait until some of it is drawn."""
-    viewer.app.do(DoTask(ExportTask("gif", str(path), LARGE)))
+def start(viewer: Driver, path: Path, options: ExportOptions = SMALL) -> None:
+    """Ask for one, and wait until some of it is drawn."""
+    viewer.app.do(DoTask(ExportTask("gif", str(path), options)))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
 
 
 def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "a.gif"
     app = viewer.app
-    start(viewer, tmp_path / "long.gif")
+    start(viewer, tmp_path / "long.gif", LARGE)
     app.do(DoTask(ExportTask("gif", str(out), SMALL)))
     frames, turns = app.frames_shown, 0
     while turns < 10:
@@ -116,9 +118,10 @@ def ten_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
 
 
 def bytes_of(path: Path) -> dict[str, bytes]:
-    """Of a file, or of each in a folder."""
+    """Of a file, or of each in a folder; of OpenEXR its light, as the file says when it was written."""
     files = sorted(path.rglob("*")) if path.is_dir() else [path]
-    return {file.name: file.read_bytes() for file in files if file.is_file()}
+    kept = {file.name: file.read_bytes() for file in files if file.suffix != ".exr" and file.is_file()}
+    return kept | {file.name: read_photo(file).pixels.tobytes() for file in files if file.suffix == ".exr"}
 
 
 @pytest.fixture
@@ -129,7 +132,8 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     def held(self: ExportSource, items: Iterable[object], total: int, doing: str) -> Iterator[object]:
         for number, item in enumerate(watched(self, items, total, doing)):
             if number == 1:
-                gate.wait()
+                while not gate.wait(0.01):
+                    raise_if_stopped(self.should_stop)
             yield item
 
     monkeypatch.setattr(ExportSource, "watched", held)
@@ -149,8 +153,8 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ExportTask("gif", "a.gif", SMALL),
         ExportTask("numbered-grid", "a"),
-        SaveTask("a.png", ScreenSize(1800, 1200)),
-        SaveTask("a.exr", ScreenSize(1800, 1200)),
+        SaveTask("a.png", ScreenSize(900, 600)),
+        SaveTask("a.exr", ScreenSize(900, 600)),
     ],
     ids=lambda task: f"{type(task).__name__} {task.path}",
 )
@@ -207,11 +211,12 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
 
 
 def test_waiting_jobs_do_not_hold_the_views_of_scenes_that_were_left(
-    viewer: Driver, tmp_path: Path, slow: None
+    viewer: Driver, tmp_path: Path, gate: threading.Event
 ) -> None:
     """One set of views beside those on the screen at most; and none once all is done."""
     app = viewer.app
     jobs = app._side_effects._jobs._jobs
+    gate.clear()
     start(viewer, tmp_path / "a.gif")
     for seed in range(3):
         (tmp_path / str(seed)).mkdir()
@@ -224,7 +229,7 @@ def test_waiting_jobs_do_not_hold_the_views_of_scenes_that_were_left(
         shown = app.scene_view.renderer.field
         assert shown is not None
         assert len(held - {shown.colors}) <= 1
-    app.do(DoTask(CancelJobTask(app.state.jobs[0].id)))
+    gate.set()
     viewer.until(lambda app: not app.state.jobs)
     assert {f"Exported {tmp_path / f'{seed}.gif'}" for seed in range(3)} <= set(texts(app))
     field = app.scene_view.renderer.field
@@ -232,21 +237,26 @@ def test_waiting_jobs_do_not_hold_the_views_of_scenes_that_were_left(
     assert not field.is_shared
 
 
-def test_any_job_of_the_queue_can_be_given_up(viewer: Driver, tmp_path: Path, slow: None) -> None:
+def test_any_job_of_the_queue_can_be_given_up(viewer: Driver, tmp_path: Path, gate: threading.Event) -> None:
     app = viewer.app
+    gate.clear()
     start(viewer, tmp_path / "a.gif")
     for name in "bc":
         app.do(DoTask(ExportTask("gif", str(tmp_path / f"{name}.gif"), SMALL)))
     viewer.until(lambda app: len(app.state.jobs) == 3)
     viewer.press(f"Cancel##job {app.state.jobs[1].id}", "notices")
     viewer.until(lambda app: [job.name for job in app.state.jobs] == ["a.gif", "c.gif"])
+    viewer.until_idle()  # the rows have moved together
     viewer.press(f"Cancel##job {app.state.jobs[0].id}", "notices")
+    viewer.until(lambda app: [job.name for job in app.state.jobs] == ["c.gif"])
+    gate.set()
     viewer.until(lambda app: not app.state.jobs)
     assert sorted(path.name for path in tmp_path.glob("*.gif")) == ["c.gif"]
 
 
-def test_closing_asks_while_something_is_exported(viewer: Driver, tmp_path: Path) -> None:
+def test_closing_asks_while_something_is_exported(viewer: Driver, tmp_path: Path, gate: threading.Event) -> None:
     app, out = viewer.app, tmp_path / "a.gif"
+    gate.clear()
     start(viewer, out)
     app.do(Quit())
     assert app.state.prompt == "quit"
@@ -254,14 +264,18 @@ def test_closing_asks_while_something_is_exported(viewer: Driver, tmp_path: Path
     viewer.until(lambda app: app.state.prompt is None)
     app.do(Quit())
     viewer.press("Wait, then quit", "prompt str")
+    viewer.until(lambda app: app.state.quits_when_done)
+    assert not app.state.should_quit
+    gate.set()
     viewer.until(lambda app: app.state.should_quit)
     with Image.open(out) as image:
-        assert image.n_frames == LARGE.frames  # type: ignore[attr-defined]
+        assert image.n_frames == SMALL.frames  # type: ignore[attr-defined]
 
 
-def test_closing_gives_up_and_leaves_nothing(viewer: Driver, tmp_path: Path) -> None:
+def test_closing_gives_up_and_leaves_nothing(viewer: Driver, tmp_path: Path, gate: threading.Event) -> None:
     folder = tmp_path / "out"
     folder.mkdir()
+    gate.clear()
     start(viewer, folder / "a.gif")
     viewer.close()
     assert list(folder.iterdir()) == []

@@ -171,10 +171,10 @@ def test_settings_on_offer_have_a_button(viewer: HeadlessViewer) -> None:
 
 def test_what_is_under_way_in_words() -> None:
     drawing = JobProgress(1, "picture", "a.png", "drawing", 0.23)
-    assert job_text(drawing) == "Saving a.png: drawing, 23 %"
-    assert job_text(replace(drawing, left_s=8.0)) == "Saving a.png: drawing, 23 %, about 8 s left"
-    assert job_text(replace(drawing, doing=WRITING, done=1.0)) == "Saving a.png: writing the file"
-    assert job_text(JobProgress(2, "export", "a.mp4")) == "Exporting a.mp4: waiting for its turn"
+    assert job_text(drawing) == "drawing, 23 %"
+    assert job_text(replace(drawing, left_s=8.0)) == "drawing, 23 %, about 8 s left"
+    assert job_text(replace(drawing, doing=WRITING, done=1.0)) == "writing the file"
+    assert job_text(JobProgress(2, "export", "a.mp4")) == "waiting for its turn"
 
 
 def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(

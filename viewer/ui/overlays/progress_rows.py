@@ -17,15 +17,22 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING, CancelJobTask, JobKind, JobProgress
 from viewer.model.state.model_download import CancelGetTask
 from viewer.ui.panel import progress_text
+from viewer.ui.widgets import tooltip
 
 VERBS: dict[JobKind, str] = {"picture": "Saving", "map": "Saving", "copy": "Copying", "export": "Exporting"}
+
+WAITING = "waiting for its turn"
+FILLING = "Making views between those on disk"
 
 
 @dataclass(frozen=True)
 class ProgressRow:
-    """key: names its button. done: share, 0..1. cancel: None where it can no longer be given up."""
+    """key: names its button. name: what it is; words: how far it is. done: share, 0..1. cancel: None where it can no
+    longer be given up.
+    """
 
     key: str
+    name: str
     words: str
     done: float
     cancel: Action | None
@@ -37,22 +44,32 @@ def progress_rows(state: AppState) -> list[ProgressRow]:
 
 
 def build_rows(rows: list[ProgressRow], layout: Layout) -> list[Action]:
-    """A bar, a button and the words of each; what was pressed comes back."""
+    """Of each: a bar, a button, what it is, and how far it is; what was pressed comes back.
+
+    All are of the same height, whatever their words: no button moves under the pointer as those change.
+    """
     actions: list[Action] = []
     for row in rows:
         imgui.progress_bar(row.done, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
-        if row.cancel is not None:
-            if imgui.button(f"Cancel##{row.key}"):
-                actions.append(row.cancel)
-            imgui.same_line()
+        imgui.begin_disabled(row.cancel is None)
+        if imgui.button(f"Cancel##{row.key}") and row.cancel is not None:
+            actions.append(row.cancel)
+        imgui.end_disabled()
+        imgui.same_line()
         imgui.align_text_to_frame_padding()
-        imgui.text_wrapped(row.words)
+        imgui.text(row.name)
+        tooltip(row.name if imgui.get_item_rect_max().x > _right_edge() else "", layout)
+        imgui.text_disabled(row.words)
     return actions
 
 
+def _right_edge() -> float:
+    return imgui.get_window_pos().x + imgui.get_window_size().x - imgui.get_style().window_padding.x
+
+
 def job_text(job: JobProgress) -> str:
-    """What it is and how far: "Saving a.png: drawing, 23 %, about 8 s left"."""
-    words = f"{VERBS[job.kind]} {job.name}: {job.doing or 'waiting for its turn'}"
+    """How far it is: "drawing, 23 %, about 8 s left"."""
+    words = job.doing or WAITING
     if job.doing == WRITING:
         return words
     words += f", {round(100 * job.done)} %" if job.done else ""
@@ -61,17 +78,18 @@ def job_text(job: JobProgress) -> str:
 
 def _job_row(job: JobProgress) -> ProgressRow:
     cancel = DoTask(CancelJobTask(job.id)) if job.can_be_cancelled else None
-    return ProgressRow(f"job {job.id}", job_text(job), job.done, cancel)
+    return ProgressRow(f"job {job.id}", f"{VERBS[job.kind]} {job.name}", job_text(job), job.done, cancel)
 
 
 def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
     progress, downloading = state.progress, state.downloading
     is_working = not progress.is_complete and state.stopped != state.generation and bool(progress_text(progress))
     if is_working and state.source is not None and state.source.filled_grid is not None:
-        yield ProgressRow("views", f"Making views between: {progress_text(progress)}", progress.share, StopWork())
+        yield ProgressRow("views", FILLING, progress_text(progress), progress.share, StopWork())
     if state.free_progress is not None:
-        yield ProgressRow("looking", "Drawing what the photo hides", state.free_progress, LeaveCamera())
+        share = state.free_progress
+        yield ProgressRow("looking", "Drawing what the photo hides", f"{round(100 * share)} %", share, LeaveCamera())
     if downloading is not None:
-        words = f"Downloading {downloading.title}: {downloading.done:,} of {downloading.total:,} MB"
+        words = f"{downloading.done:,} of {downloading.total:,} MB"
         share = downloading.done / max(downloading.total, 1)
-        yield ProgressRow("download", words, share, DoTask(CancelGetTask()))
+        yield ProgressRow("download", f"Downloading {downloading.title}", words, share, DoTask(CancelGetTask()))
