@@ -62,6 +62,10 @@ class Job:
         """For what it does."""
         return self.is_given_up.is_set
 
+    def shows(self, scene: Scene) -> bool:
+        """Whether it was asked for while this photo was open."""
+        return self.state.scene is not None and self.state.scene.source.path == scene.source.path
+
     def report(self, done: float, total: float, doing: str) -> None:
         """In whatever thread works: how far it is with what it is doing now."""
         self._reported = (done, total, doing)

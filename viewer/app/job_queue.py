@@ -19,7 +19,7 @@ from viewer.app.window_work import WindowWork
 from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.scene_worker import SceneRequest
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, Notify
+from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import JobProgress, JobsChanged
 from viewer.model.state.notices import Notice
@@ -82,7 +82,7 @@ class JobQueue:
 
     def advance(self, state: AppState, budget_s: float) -> list[Action]:
         """Begin what can begin, draw on for about that long, and say what is done, what failed, and how far it is."""
-        actions = [action for lane, thread in self._threads.items() for action in self._take_result(lane, thread)]
+        actions = [action for lane in self._threads for action in self._take_result(lane, state)]
         for job in [job for job in self._jobs if not job.is_running]:
             if job.is_given_up.is_set():
                 self._end(job)
@@ -146,7 +146,8 @@ class JobQueue:
             ready[0].is_running = True
             self._threads[lane].submit(FileRequest(ready[0].id, partial(_carry_out, ready[0], self._scenes)))
 
-    def _take_result(self, lane: Lane, thread: FileWorker) -> list[Action]:
+    def _take_result(self, lane: Lane, state: AppState) -> list[Action]:
+        thread = self._threads[lane]
         running = next((job for job in self._jobs if job.is_running and job.lane == lane), None)
         if running is None:
             return []
@@ -155,8 +156,8 @@ class JobQueue:
             return []
         self._end(running)
         if isinstance(result, Done):
-            actions: list[Action] = result.value
-            return actions
+            is_open = state.scene is not None and running.shows(state.scene)
+            return [action for action in result.value if is_open or not isinstance(action, EditsSaved)]
         lost = f"{running.path}: writing it stopped unexpectedly"
         return [Notify(Notice(lost if result is None else result.message, is_error=True, stays=True))]
 

@@ -23,6 +23,13 @@ def with_views_between(scene: Scene, grid: GridShape) -> Source:
     return replace(scene.source, filled_grid=None if grid == scene.given_grid else grid)
 
 
+def chosen_grid(scene: Scene, asked: Source | None) -> GridShape:
+    """Of a light field that is open: the grid that was chosen last, perhaps before its views are there."""
+    if asked is None or scene.given_grid is None or asked.path != scene.source.path:
+        return scene.grid
+    return asked.filled_grid or scene.given_grid
+
+
 def next_denser(scene: Scene) -> Source | None:
     """The same with the next denser grid, None where there is none, or the scene is a photo's."""
     grids = denser_grids(scene.given_grid) if scene.given_grid is not None else ()

@@ -16,13 +16,13 @@ from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
-from viewer.app.picture_saver import PictureSaver
+from viewer.app.job_queue import JobQueue
+from viewer.app.picture_saver import add_save
 from viewer.gpu.refocus.render_settings import RenderSettings
-from viewer.model.actions import EditsSaved, Notify
+from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.notices import Notice
+from viewer.model.state.jobs import JobsChanged
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
-from viewer.model.state.saving import Saving, SavingChanged
 from viewer.model.state.scene import Source
 from viewer.model.state.tasks import SaveTask
 
@@ -107,35 +107,21 @@ def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path
         saved(opened, tmp_path / "missing-folder" / "a.png", (8, 8))
 
 
-def test_a_picture_starts_over_when_more_of_the_same_scene_is_there(tmp_path: Path) -> None:
-    """The photo alone is shown first; room for all views is made when the second comes, maybe while one is drawn."""
+def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     with headless_with_scene(tmp_path) as viewer:
-        scene_view, woken = viewer._scene_view, threading.Event()
-        saver = PictureSaver(scene_view, woken.set)
-        assert saver.add(SaveTask(str(out), (90, 60)), viewer.state, ()) == []
-        assert saver.advance(0.0) == [SavingChanged(Saving("out.png"))]
-        scene_view.renderer.upload_view(1, 1, np.full((HEIGHT, WIDTH, 3), 90, np.uint8), None)
-        expected = scene_view.picture(RenderSettings(viewer.state.optics, (90, 60)))
-        while saver.is_drawing:
-            saver.advance(0.0)
-        assert woken.wait(60)
-        saved = Notify(Notice(f"Saved {out}")), EditsSaved(viewer.state.depth.edits)
-        assert saver.advance(0.0) == [*saved, SavingChanged(None)]
-        saver.close()
+        viewer.do(MoveEye(ViewOffset(0.3, -0.7)))
+        scene_view, state, woken = viewer._scene_view, viewer.state, threading.Event()
+        expected = scene_view.picture(RenderSettings(state.optics, (90, 60)))
+        jobs = JobQueue(scene_view, woken.set)
+        actions: list[Action] = []
+        assert add_save(SaveTask(str(out), (90, 60)), state, (), jobs) == []
+        scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
+        assert not np.array_equal(scene_view.picture(RenderSettings(state.optics, (90, 60))), expected)
+        while JobsChanged(()) not in actions:
+            actions += jobs.advance(state, 0.0)
+            assert woken.wait(60)
+        jobs.close()
+    assert [action.notice.text for action in actions if isinstance(action, Notify)] == [f"Saved {out}"]
+    assert EditsSaved(state.depth.edits) in actions
     np.testing.assert_array_equal(oiio.ImageBuf(str(out)).get_pixels(oiio.UINT8), expected)
-
-
-def test_a_picture_is_given_up_when_edited_depth_is_shown(tmp_path: Path) -> None:
-    before = set(tmp_path.iterdir())
-    with headless_with_scene(tmp_path) as viewer:
-        saver = PictureSaver(viewer._scene_view, lambda: None)
-        saver.add(SaveTask(str(tmp_path / "out.png"), (90, 60)), viewer.state, ())
-        saver.advance(0.0)
-        viewer._scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
-        notified, changed = saver.advance(0.0)
-        saver.close()
-    assert isinstance(notified, Notify)
-    assert "out.png: not saved" in notified.notice.text
-    assert changed == SavingChanged(None)
-    assert {path.name for path in set(tmp_path.iterdir()) - before} == {"scene.png", "scene_disparity.npy"}

@@ -161,15 +161,32 @@ def test_views_that_come_while_a_picture_is_drawn_are_not_seen_in_it(renderer: R
     np.testing.assert_array_equal(drawing.image, expected)
 
 
-def test_another_field_stops_a_picture(renderer: Renderer) -> None:
+def test_another_field_changes_nothing_in_a_picture_that_is_being_drawn(renderer: Renderer) -> None:
+    """It holds the arrays that it is drawn from, until it is stopped."""
     SCENE.fill(renderer, GRID)
-    for change in (
-        lambda: SCENE.upload(renderer, GRID, 2, 2),
-        lambda: SCENE.fill(renderer, GRID),
-    ):
-        drawing = renderer.start_picture(RenderSettings(Optics(aperture_diameter=4.0), (160, 120)))
-        drawing.advance(budget_s=0.0)
-        change()
-        assert drawing.is_stopped
-        drawing.advance()
-        assert not drawing.is_done
+    settings = RenderSettings(Optics(aperture_diameter=4.0), (160, 120))
+    expected = renderer.converged_picture(settings)
+    drawing, field = renderer.start_picture(settings), renderer.field
+    assert field is not None
+    drawing.advance(budget_s=0.0)
+    renderer.open_field(GridShape(1, 1), 8, 8, hdr=False, with_disparity=False)
+    assert not field.is_shared, "the drawing alone holds it"
+    drawing.advance()
+    np.testing.assert_array_equal(drawing.image, expected)
+    drawing.stop()
+    assert drawing.is_done
+    assert not drawing.is_stopped
+
+
+def test_a_picture_that_is_stopped_stays_unfinished(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    drawing = renderer.start_picture(RenderSettings(Optics(aperture_diameter=4.0), (160, 120)))
+    drawing.advance(budget_s=0.0)
+    assert renderer.field is not None
+    assert renderer.field.is_shared
+    for _ in range(2):
+        drawing.stop()
+    assert drawing.is_stopped
+    assert not renderer.field.is_shared
+    drawing.advance()
+    assert not drawing.is_done

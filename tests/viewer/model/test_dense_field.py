@@ -9,7 +9,7 @@ import pytest
 from iibr_core.generation.dense_field import require_steps
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.commands import COMMANDS
-from viewer.model.dense_field import MOST_ACROSS, denser_grids, next_denser, with_views_between
+from viewer.model.dense_field import MOST_ACROSS, chosen_grid, denser_grids, next_denser, with_views_between
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import Optics
@@ -25,6 +25,14 @@ def test_all_grids_that_are_offered_have_places_for_the_given_views(given: GridS
     for grid in denser_grids(given):
         assert require_steps(given, grid) > 1
         assert max(grid) <= MOST_ACROSS
+
+
+def test_the_grid_that_was_chosen_is_shown_before_its_views_are_there() -> None:
+    assert chosen_grid(FIELD, with_views_between(FIELD, DENSE)) == DENSE
+    filled = replace(FIELD, grid=DENSE, source=replace(FIELD.source, filled_grid=DENSE))
+    assert chosen_grid(filled, with_views_between(filled, GIVEN)) == GIVEN
+    for asked in (None, Source("other.png")):
+        assert chosen_grid(filled, asked) == DENSE
 
 
 def test_nothing_lies_between_one_view_or_very_many() -> None:

@@ -46,6 +46,7 @@ from viewer.model.reducers.notices import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.depth_editing import DepthSettings, SetTone
+from viewer.model.state.jobs import JobProgress, JobsChanged, QuitWhenDone
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
     APERTURE_KINDS,
@@ -222,6 +223,31 @@ def test_quitting_asks_where_depth_edits_would_be_lost() -> None:
     other = reduce(reduce(edited, EditsSaved(edits)), OpenPath(Source("other.png")))
     other = reduce(other, SceneOpened(other.generation, scene_of(source=other.source)))
     assert not reduce(replace(other, depth=DepthSettings(edits=edits)), Quit()).should_quit, "those of another photo"
+
+
+def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
+    job = JobProgress(1, "export", "a.gif")
+    busy = reduce(state_with(scene_of()), JobsChanged((job,)))
+    asked = reduce(busy, Quit())
+    assert (asked.prompt, asked.should_quit) == ("quit", False)
+    assert reduce(asked, Quit(is_sure=True)).should_quit
+    waiting = reduce(asked, QuitWhenDone())
+    assert (waiting.prompt, waiting.should_quit, waiting.quits_when_done) == (None, False, True)
+    assert not reduce(waiting, JobsChanged((replace(job, done=0.5),))).should_quit
+    assert reduce(waiting, JobsChanged(())).should_quit
+    failed = reduce(waiting, Notify(Notice("a.gif: the disk is full", is_error=True)))
+    assert not reduce(failed, JobsChanged(())).should_quit, "what went wrong is to be seen"
+    assert reduce(reduce(asked, JobsChanged(())), QuitWhenDone()).should_quit, "they ended while that was asked"
+    edited = replace(waiting, depth=DepthSettings(edits=replace(UNEDITED, gamma=1.5)))
+    assert reduce(edited, JobsChanged(())).prompt == "quit", "edits are still asked for"
+
+
+def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
+    stays, goes = Notice("Exported a.gif", stays=True), Notice("This photo has no depth.")
+    told = reduce(reduce(state_with(scene_of()), Notify(goes)), Notify(stays))
+    asked = reduce(told, OpenPath(Source("other.png")))
+    opened = reduce(asked, SceneOpened(asked.generation, scene_of(source=asked.source)))
+    assert opened.notices == (stays,)
 
 
 def test_undone_edits_are_lost_as_little_as_others() -> None:

@@ -17,7 +17,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING, CancelJobTask, JobKind, JobProgress
 from viewer.model.state.model_download import CancelGetTask
 from viewer.ui.panel import progress_text
-from viewer.ui.widgets import tooltip
+from viewer.ui.widgets import gap, tooltip
 
 VERBS: dict[JobKind, str] = {"picture": "Saving", "map": "Saving", "copy": "Copying", "export": "Exporting"}
 
@@ -49,7 +49,9 @@ def build_rows(rows: list[ProgressRow], layout: Layout) -> list[Action]:
     All are of the same height, whatever their words: no button moves under the pointer as those change.
     """
     actions: list[Action] = []
-    for row in rows:
+    for number, row in enumerate(rows):
+        if number:
+            gap(layout, 2)
         imgui.progress_bar(row.done, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
         imgui.begin_disabled(row.cancel is None)
         if imgui.button(f"Cancel##{row.key}") and row.cancel is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import GridShape
 from viewer.model.actions import Action, OpenPath, SetInpainter
-from viewer.model.dense_field import denser_grids, with_views_between
+from viewer.model.dense_field import chosen_grid, denser_grids, with_views_between
 from viewer.model.layout import Layout
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.scene import Scene, Source
@@ -56,8 +56,7 @@ def _holes(scene: Scene, layout: Layout) -> list[Action]:
 
 def _views_between(scene: Scene, asked: Source | None, given: GridShape, layout: Layout) -> list[Action]:
     """The views on disk alone, or one of the denser grids; what was chosen is shown at once."""
-    is_asked = asked is not None and asked.path == scene.source.path
-    chosen = (asked.filled_grid or given) if asked is not None and is_asked else scene.grid
+    chosen = chosen_grid(scene, asked)
     label("Views", layout, BETWEEN_TIP)
     grids = (given, *denser_grids(given))
     entries = [(_grid_words(grid, given), _grid_tip(grid, given)) for grid in grids]
