@@ -8,12 +8,14 @@ import pytest
 
 from iibr_core.generation.dense_field import require_steps
 from iibr_core.types import GridShape, ViewOffset
+from viewer.model.actions import OpenPath
 from viewer.model.commands import COMMANDS
 from viewer.model.dense_field import MOST_ACROSS, chosen_grid, denser_grids, next_denser, with_views_between
 from viewer.model.reducers.lens import carry_optics
+from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Scene, Source, source_beside
+from viewer.model.state.scene import Progress, Scene, Source, source_beside
 
 GIVEN, DENSE = GridShape(3, 3), GridShape(5, 5)
 FIELD = Scene(Source("field"), "field", 60, 40, GIVEN, (-2.0, 3.0), "light field", given_grid=GIVEN)
@@ -33,6 +35,15 @@ def test_the_grid_that_was_chosen_is_shown_before_its_views_are_there() -> None:
     assert chosen_grid(filled, with_views_between(filled, GIVEN)) == GIVEN
     for asked in (None, Source("other.png")):
         assert chosen_grid(filled, asked) == DENSE
+
+
+@pytest.mark.parametrize(("done", "is_told"), [(3, True), (25, False)])
+def test_leaving_a_field_before_its_views_are_filled_in_is_told(done: int, is_told: bool) -> None:
+    filled = with_views_between(FIELD, DENSE)
+    state = AppState(source=filled, scene=replace(FIELD, source=filled), progress=Progress(done, 25))
+    opened = reduce(state, OpenPath(Source("other.png")))
+    assert [notice.stays for notice in opened.notices] == [True] * is_told
+    assert not reduce(state, OpenPath(with_views_between(FIELD, GIVEN))).notices, "it is still open"
 
 
 def test_nothing_lies_between_one_view_or_very_many() -> None:

@@ -85,11 +85,12 @@ from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import SECTIONS, Preferences
 from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
 from viewer.model.state.saving import SavedSettings, path_beside
-from viewer.model.state.scene import Progress
+from viewer.model.state.scene import Progress, Source
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
 EDITS_KEPT = "Depth edits are kept: the photo opens as you leave it. Save the depth map for other programs."
+UNFINISHED_FILL = "the views between those on disk were not finished. Open it and fill between its views again."
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
 
 
@@ -167,7 +168,7 @@ def _reduce_files(state: AppState, action: Action) -> AppState:
             progress = Progress(doing=f"reading {PurePath(source.path).name}")
             generation, left = state.next_generation, _leave_field(state)
             prompt = state.prompt if state.prompt == "welcome" else None  # a folder opens a photo of it by itself
-            state = replace(state, free_camera=None, poses=None, prompt=prompt)
+            state = replace(_tell_unfinished_fill(state, source), free_camera=None, poses=None, prompt=prompt)
             return replace(state, source=source, progress=progress, generation=generation, left_field=left)
         case StopWork():
             return stop_work(state)
@@ -251,6 +252,16 @@ def _checked_zoom(zoom: Zoom | None) -> Zoom | None:
         return None
     x, y = (clamp(at, 0.0, 1.0) for at in zoom.centre)
     return Zoom(max(zoom.scale, LEAST_ZOOM), (x, y))
+
+
+def _tell_unfinished_fill(state: AppState, opened: Source) -> AppState:
+    """With a notice where the views between those of a light field are left before they are all there."""
+    left = state.source
+    if left is None or left.filled_grid is None or left.path == opened.path:
+        return state
+    if state.progress.is_complete or state.stopped == state.generation:
+        return state
+    return add_notice(state, Notice(f"{PurePath(left.path).name}: {UNFINISHED_FILL}", stays=True))
 
 
 def _step_photo(state: AppState, steps: int) -> AppState:

@@ -1,0 +1,43 @@
+"""What stands in the notice corner while something takes long."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from iibr_core.types import GridShape
+from viewer.model.actions import DoTask, StopWork
+from viewer.model.state.app_state import AppState
+from viewer.model.state.jobs import STOPPING, WRITING, CancelJobTask, JobProgress
+from viewer.model.state.model_download import CancelGetTask, Downloading
+from viewer.model.state.scene import Progress, Source
+from viewer.ui.overlays.progress_rows import progress_rows
+
+FILLING = AppState(source=Source("field", filled_grid=GridShape(9, 9)), progress=Progress(20, 81, 4.0), generation=1)
+
+
+def test_each_job_has_a_row_and_a_cancel_of_its_own() -> None:
+    jobs = [JobProgress(7, "export", "a.gif", "drawing frames", 0.5), JobProgress(9, "copy", "the picture")]
+    rows = progress_rows(AppState(jobs=tuple(jobs)))
+    assert [row.name for row in rows] == ["Exporting a.gif", "Copying the picture"]
+    assert [row.cancel for row in rows] == [DoTask(CancelJobTask(7)), DoTask(CancelJobTask(9))]
+    for doing in (WRITING, STOPPING):
+        (row,) = progress_rows(AppState(jobs=(replace(jobs[0], doing=doing),)))
+        assert row.cancel is None
+
+
+def test_views_between_those_on_disk_are_seen_while_they_are_made() -> None:
+    (row,) = progress_rows(FILLING)
+    assert row.cancel == StopWork()
+    assert row.done == FILLING.progress.share
+    for over in (
+        replace(FILLING, progress=Progress(81, 81, 9.0)),
+        replace(FILLING, stopped=1),
+        replace(FILLING, source=Source("photo.png")),
+    ):
+        assert not progress_rows(over)
+
+
+def test_a_download_has_the_same_row() -> None:
+    (row,) = progress_rows(AppState(downloading=Downloading("A model", 25, 100)))
+    assert (row.name, row.words, row.done) == ("Downloading A model", "25 of 100 MB", 0.25)
+    assert row.cancel == DoTask(CancelGetTask())
