@@ -68,8 +68,9 @@ class JobQueue:
         is_newest = state.scene.source is state.source
         job.id, job.generation = next(self._ids), state.generation if is_newest else view.generation
         source = state.source if is_newest else state.scene.source
-        is_there = view.generation == job.generation and not state.scene.is_sketch
-        loaded, plan = (view.loaded, state.scene.plan) if is_there else (None, None)
+        loaded, plan = view.loaded, state.scene.plan
+        if view.generation != job.generation or loaded is None or loaded.depth_settings != state.depth:
+            loaded = plan = None  # what is loaded is not what was asked for
         job.request = SceneRequest(0, source, state.depth_strength, loaded, state.depth, takes_drafts=False, plan=plan)
         self._jobs.append(job)
         self._prepare(job, state)
@@ -127,12 +128,12 @@ class JobQueue:
 
     def _release_left(self) -> None:
         """Views that are no longer shown are kept for what is being drawn only: the others are made once more, for
-        memory would not hold many.
+        memory would not hold many. A free camera's is one view, and cannot be made once more.
         """
         running = [job.snapshot for job in self._jobs if job.is_running and job.snapshot is not None]
         for job in self._jobs:
             snapshot = job.snapshot
-            if job.is_running or snapshot is None or self._scene_view.is_shown(snapshot):
+            if job.is_running or snapshot is None or snapshot.is_free_view or self._scene_view.is_shown(snapshot):
                 continue
             if not any(other.field.colors is snapshot.field.colors for other in running):
                 snapshot.release()
@@ -163,6 +164,7 @@ class JobQueue:
 
     def _end(self, job: Job) -> None:
         self._jobs.remove(job)
+        job.is_given_up.set()  # a thread that was lost left steps behind
         if job.snapshot is not None:
             job.snapshot.release()
             job.snapshot = None

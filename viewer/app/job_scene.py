@@ -74,7 +74,7 @@ class JobScenes:
             ready = next(results)
             assert isinstance(ready, SceneReady)
             snapshot = self._run(job, _in_one_step(lambda: self._open(job, ready)))
-            if job.needs(ready.scene, job.optics_on(ready.scene)) == "views":
+            if job.needs(ready.scene, job.optics_on(ready.scene)) != "scene":
                 self._make_views(job, snapshot, results, report)
 
     def _open(self, job: Job, ready: SceneReady) -> SceneSnapshot:

@@ -113,9 +113,6 @@ class Sharpener:
 
     def _draw_smaller(self, request: FullPicture, drawing: PictureDrawing, budget_s: float) -> None:
         """What of the picture is blurred, from the views."""
-        if drawing.is_stopped:  # for another one, or by other views
-            self._stop()
-            return
         drawing.advance(budget_s)
         if drawing.is_done:
             drawing.stop()

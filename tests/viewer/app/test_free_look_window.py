@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import pytest
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import Camera, ImageSize
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver
+from viewer.app import picture_saver
 from viewer.model.actions import DoTask
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.state.optics import SetAperture, SetFocus
@@ -75,6 +78,33 @@ def test_the_lens_blurs_what_it_sees_and_a_saved_picture_shows_that(viewer: Driv
     viewer.until_idle()
     saved, beside = 255 * read_photo(path).pixels, viewer.image()
     assert np.abs(saved - blurred).mean() < np.abs(saved - beside).mean() / 4
+
+
+def test_pictures_that_wait_show_what_the_camera_saw(
+    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of its own camera, however far that has moved when its turn comes."""
+    app, paths = viewer.app, [tmp_path / f"{k}.png" for k in range(3)]
+    held, export = threading.Event(), picture_saver.export_picture
+
+    def export_when_held(*arguments: Any) -> Path:
+        assert held.wait(60)
+        return export(*arguments)
+
+    monkeypatch.setattr(picture_saver, "export_picture", export_when_held)
+    expected = []
+    for path in paths:
+        viewer.send("key", "w")
+        before = app.state.free_camera
+        viewer.until(lambda app, before=before: app.state.free_camera != before)  # type: ignore[misc]
+        expected.append(seen(viewer))
+        app.do(DoTask(SaveTask(str(path), (expected[-1].shape[1], expected[-1].shape[0]))))
+        viewer.until(lambda app: not app.state.tasks)
+    held.set()
+    viewer.until(lambda app: not app.state.jobs)
+    for path, image in zip(paths, expected):
+        np.testing.assert_allclose(255 * read_photo(path).pixels, image, atol=1.01)
+    assert not np.array_equal(expected[0], expected[2])
 
 
 def test_poses_are_stepped_through_and_what_sees_nothing_is_told(viewer: Driver) -> None:
