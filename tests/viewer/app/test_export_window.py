@@ -244,6 +244,7 @@ def test_any_job_of_the_queue_can_be_given_up(viewer: Driver, tmp_path: Path, ga
     for name in "bc":
         app.do(DoTask(ExportTask("gif", str(tmp_path / f"{name}.gif"), SMALL)))
     viewer.until(lambda app: len(app.state.jobs) == 3)
+    viewer.until_idle()
     viewer.press(f"Cancel##job {app.state.jobs[1].id}", "notices")
     viewer.until(lambda app: [job.name for job in app.state.jobs] == ["a.gif", "c.gif"])
     viewer.until_idle()  # the rows have moved together

@@ -18,6 +18,7 @@ from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.full_picture import FullPicture
+from viewer.app.main_loop import SETTLING_FRAMES
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import AskToSave, DismissNotice, DoTask
 from viewer.model.saved_settings import read_settings
@@ -104,6 +105,8 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_
     start(viewer, tmp_path / "large.png")
     viewer.app.do(DoTask(SaveTask(str(tmp_path / "next.png"), (48, 32))))
     viewer.until(lambda app: len(app.state.jobs) == 2)
+    for _ in range(SETTLING_FRAMES):  # the first row moves up
+        viewer.app.step()
     viewer.press(f"Cancel##job {job_of(viewer).id}", "notices")
     viewer.until(lambda app: [job.name for job in app.state.jobs] in ([], ["next.png"]))
     viewer.until(lambda app: not app.state.jobs)
