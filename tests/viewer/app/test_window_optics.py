@@ -163,6 +163,7 @@ ONLY_PANELS = (
     Notify(Notice("hello")),
     ShowPrompt("help"),
     SetTheme("light"),
+    ShowTiltHandles(False),
 )
 
 
