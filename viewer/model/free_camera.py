@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 
 from iibr_core.types import Camera
-from viewer.model.state.scene import Scene
 
 MOST_ASIDE = 0.6
 """Of half the picture."""
@@ -69,12 +68,6 @@ class CameraProgress:
 
 
 FreeCameraAction = MoveCamera | StepPose | LeaveCamera | CameraProgress
-
-
-def mean_depth(scene: Scene) -> float:
-    """Of what the photo shows, in distances of the nearest: in the middle of their inverses."""
-    far, near = (disparity - scene.infinity_px for disparity in scene.disparity_range_px)
-    return 2 / (1 + max(far, 0.0) / near) if near > 0 else 1.0
 
 
 def seen_share(camera: FreeCamera, depth: float) -> float:

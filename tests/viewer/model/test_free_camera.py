@@ -24,10 +24,10 @@ from viewer.model.free_camera import (
     Poses,
     StepPose,
     is_at_end,
-    mean_depth,
     seen_share,
 )
 from viewer.model.layout import ScreenSize
+from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import CENTRE, MoveEye, ResetOptics, SetAperture, SetFocus

@@ -11,10 +11,10 @@ from viewer.model.free_camera import (
     LeaveCamera,
     MoveCamera,
     StepPose,
-    mean_depth,
     moved,
     stepped,
 )
+from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice

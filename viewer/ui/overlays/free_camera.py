@@ -6,8 +6,9 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action
-from viewer.model.free_camera import LeaveCamera, is_at_end, mean_depth
+from viewer.model.free_camera import LeaveCamera, is_at_end
 from viewer.model.layout import Layout
+from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.state.app_state import AppState
 from viewer.ui.style import DARK
 
