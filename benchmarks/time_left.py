@@ -24,6 +24,8 @@ import psutil
 
 from benchmarks.batch import write_photos
 from iibr_core.runtime.time_left import TimeLeft
+from viewer.background import opening_work
+from viewer.cli import terminal
 from viewer.cli.demo import demo_photo
 
 ENOUGH = 0.1
@@ -125,17 +127,21 @@ def measure(words: list[str]) -> Outcome | str:
 def run_job(words: list[str]) -> list[Record]:
     """In a process of its own: what was told, and at last when it ended."""
     records: list[Record] = []
-    begun, before, update = time.perf_counter(), processor_s(), TimeLeft.update
+    begun, before = time.perf_counter(), processor_s()
 
-    def recorded(self: TimeLeft, done: float, total: float) -> float | None:
-        left_s = update(self, done, total)
-        records.append(Record(time.perf_counter() - begun, processor_s() - before, self.share, left_s))
-        return left_s
+    class Recorded(TimeLeft):
+        """What is shown: a command's bar, or the window's."""
 
-    TimeLeft.update = recorded  # type: ignore[method-assign]
+        def update(self, done: float, total: float) -> float | None:
+            left_s = super().update(done, total)
+            records.append(Record(time.perf_counter() - begun, processor_s() - before, self.share, left_s))
+            return left_s
+
     if words[0] == WINDOW:
+        opening_work.TimeLeft = Recorded  # type: ignore[misc]
         open_field(words[1])
     else:
+        terminal.TimeLeft = Recorded  # type: ignore[misc]
         command(words)
     return [*records, Record(time.perf_counter() - begun, processor_s() - before, 1.0, 0.0)]
 
