@@ -12,8 +12,9 @@ from iibr_core.types import ImageSize, InputError
 
 
 @pytest.mark.parametrize("name", DEVICES)
-def test_displays_are_9_to_16_3_to_4_or_16_to_9(name: str) -> None:
+def test_displays_are_9_to_16_3_to_4_or_16_to_9_and_their_quilts_square(name: str) -> None:
     quilt = quilt_for(name, ImageSize(10, 10))
+    assert quilt.size.width == pytest.approx(quilt.size.height, rel=1e-3)
     is_upright = name == "go" or "portrait" in name
     assert any(
         quilt.aspect == pytest.approx(aspect, abs=1e-3) for aspect in ((9 / 16, 3 / 4) if is_upright else (16 / 9,))

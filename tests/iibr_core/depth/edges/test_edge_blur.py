@@ -142,3 +142,26 @@ def test_the_photo_agrees_where_it_changes_most_at_the_middle() -> None:
     assert agrees((30, 0.4), (24, 0.6), (36, 0.6)) == 0
     assert agrees((30, 0.4), (45, 0.6)) == 1, "too far to count"
     assert agrees((30, 0.01)) == 0.5, "nothing tells"
+
+
+@pytest.mark.parametrize(("agree", "sigma"), [(1.0, 2.0), (0.6, 2.0), (0.52, 0.0)])
+def test_where_the_photo_is_not_sure_of_a_place_it_must_be_of_the_rest_and_likely_here(
+    agree: float, sigma: float
+) -> None:
+    near, far = found_edges(agree, edge_blur.WITNESSES, 1), found_edges(1.0, 900, 2 * edge_blur.WITNESS_PX)
+    far[0] += 10_000
+    assert edge_blur._sigma_at(np.concatenate([near, far], axis=1), 100.0, 0.0) == sigma
+    # Without the rest, a place must be sure by itself.
+    assert edge_blur._sigma_at(near, 100.0, 0.0) == (2.0 if agree == 1 else 0.0)
+
+
+def test_nothing_is_soft_where_edges_measure_as_exact_ones_or_few_of_them_are_steps() -> None:
+    edges = found_edges(1.0, 200, 2 * edge_blur.WITNESS_PX)
+    assert edge_blur._sigma_at(edges, 0.0, 0.0) == 2
+    exact, hills = edges.copy(), edges.copy()
+    exact[2], hills[5] = 0.7, np.arange(200) % 10 == 0
+    assert edge_blur._sigma_at(exact, 0.0, 0.0) == 0
+    assert edge_blur._sigma_at(hills, 0.0, 0.0) == 0
+    wide = edges.copy()
+    wide[2] = 40.0
+    assert edge_blur._sigma_at(wide, 0.0, 0.0) == edge_blur.WIDEST_SIGMA_PX

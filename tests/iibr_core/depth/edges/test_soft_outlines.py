@@ -187,6 +187,13 @@ def test_what_is_soft_for_a_few_pixels_only_is_the_edge_of_something_else(length
     assert (widened is not values) == (length_px == 32)
 
 
+@pytest.mark.parametrize(("contrast", "is_told"), [(0.07, False), (0.14, True)])
+def test_fronts_of_nearly_the_colour_of_their_back_stay(contrast, is_told):
+    _, photo, values = soft_front(8)
+    faint = photo[:, -1:].mean(axis=0) + contrast / np.sqrt(1.1) * (photo - photo[:, -1:].mean(axis=0))
+    assert (widen_fronts(faint.astype(np.float32), values, STEP, never) is not values) == is_told
+
+
 def test_single_mixed_pixels_are_left_to_matting():
     _, photo, values = soft_front(2)
     assert widen_fronts(photo, values, STEP, never) is values

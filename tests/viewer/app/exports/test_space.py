@@ -125,6 +125,13 @@ def test_what_stays_still_changes_neither_distances_nor_places(source: ExportSou
         assert cameras.step == pytest.approx(straight.step)
 
 
+@pytest.mark.parametrize("scale", [0.0, -0.5])
+def test_a_photo_that_is_flat_or_inside_out_has_no_cameras(source: ExportSource, scale: float) -> None:
+    plan = replace(source.plan(), disparity_scale=scale)
+    with pytest.raises(InputError, match="is flat, or turned inside out"):
+        cameras_of(replace(source, scene=replace(source.scene, plan=plan)))
+
+
 def test_what_several_views_had_made_up_in_one_place_is_taken_once() -> None:
     cameras, seen = FieldCameras(GRID, SIZE, 80.0, (0.0, 6.0), -1.0), set()
 
@@ -228,5 +235,8 @@ def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
     for line, s in zip(epi, (-1.0, 0.0, 1.0)):
         shown = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64)))[32].astype(int)
         assert np.abs(line - shown).max() <= 1
-    with pytest.raises(InputError, match="rows 0 to 63"):
-        exported(source, "epi", tmp_path / "b.png", row=64)
+    for row in (0, 63):
+        assert exported(source, "epi", tmp_path / "b.png", row=row).is_file()
+    for row in (-1, 64):
+        with pytest.raises(InputError, match="rows 0 to 63"):
+            exported(source, "epi", tmp_path / "c.png", row=row)
