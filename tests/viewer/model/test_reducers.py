@@ -42,6 +42,7 @@ from viewer.model.lens.limits import (
     is_finite,
 )
 from viewer.model.lens.presets import PRESETS
+from viewer.model.reducers.lens import carry_optics
 from viewer.model.reducers.notices import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover, Picture
@@ -451,6 +452,12 @@ def test_another_depth_strength_keeps_the_surface_in_focus_and_the_place_in_the_
     assert optics.eye == ViewOffset(2, -4)
     assert optics.aperture_diameter == 4.0
     assert optics.exposure_stops == 1.0
+
+
+@pytest.mark.parametrize(("views", "eye"), [(2, -2.0), (3, -1.0), (1, -2.0)])
+def test_a_step_between_two_views_is_the_whole_grid_and_of_one_view_it_is_one(views: int, eye: float) -> None:
+    old, new = (scene_of(GridShape(1, n), plan=plan_of(GridShape(1, n), scale=0.5)) for n in (views, 5))
+    assert carry_optics(Optics(eye=ViewOffset(0.0, -0.5)), old, replace(new, source=old.source)).eye.s == eye
 
 
 def test_depth_strength_of_zero_and_back_gives_finite_optics() -> None:
