@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,16 @@ from typing import Any
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.inpainting.registry import INPAINTERS
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.background.model_download import list_models
 from viewer.model.actions import SetFontScale, SetUnits, ShowPrompt
 from viewer.model.layout import PANEL_WIDTH, ScreenSize
+from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.exporting import ANIMATIONS, ExportPrompt
+from viewer.model.state.jobs import JobProgress
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     ApertureShape,
@@ -137,6 +140,7 @@ PROMPTS: dict[str, Prompt] = {
     "help": "help",
     "welcome": "welcome",
     "quit": "quit",
+    "quit while busy": "quit",
     "palette": PalettePrompt(),
     "save": SavePrompt("a.jpg", ScreenSize(48, 32), problem="There is no such folder: choose another one, or make it."),
     "path": PathPrompt("photo"),
@@ -160,6 +164,10 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
         end()
 
     monkeypatch.setattr(imgui, "end", note_and_end)
+    if name == "quit while busy":
+        jobs = JobProgress(1, "export", "a.mp4", "drawing frames", 0.5), JobProgress(2, "picture", "b.png")
+        edited = DepthSettings(edits=DepthEdits(gamma=1.5))
+        viewer.state = replace(viewer.state, jobs=jobs, depth=edited)
     viewer.do(SetFontScale(scale), ShowPrompt(PROMPTS[name]))
     viewer.screen(WINDOW)
     left, top, right, bottom, hidden = ended[-1]

@@ -12,6 +12,7 @@ from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.ui.overlays.progress_rows import build_rows, progress_rows
+from viewer.ui.overlays.prompt_rows import button_rows
 from viewer.ui.style import palette_of
 
 NOTICE_WIDTH = 420.0
@@ -67,20 +68,6 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
     offers += [("Use its settings", TakeSettings(notice.offer))] if notice.offer is not None else []
     offers += [(f"Close all ({others + 1})", DismissNotices())] if others else []
-    actions += _buttons(offers)
+    actions += button_rows(offers)
     imgui.end_group()
-    return actions
-
-
-def _buttons(offers: list[tuple[str, Action]]) -> list[Action]:
-    """Side by side, on as many lines as they need."""
-    actions: list[Action] = []
-    style = imgui.get_style()
-    right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
-    for i, (words, action) in enumerate(offers):
-        width = imgui.calc_text_size(words).x + 2 * style.frame_padding.x
-        if i and imgui.get_item_rect_max().x + style.item_spacing.x + width <= right:
-            imgui.same_line()
-        if imgui.button(words):
-            actions.append(action)
     return actions

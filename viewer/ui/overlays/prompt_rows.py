@@ -88,3 +88,17 @@ def say_problem(problem: str, state: AppState) -> None:
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
         imgui.text_wrapped(problem)
         imgui.pop_style_color()
+
+
+def button_rows(offers: list[tuple[str, Action]]) -> list[Action]:
+    """Buttons side by side, on as many lines as they need; what was pressed comes back."""
+    actions: list[Action] = []
+    style = imgui.get_style()
+    right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    for i, (words, action) in enumerate(offers):
+        width = imgui.calc_text_size(words).x + 2 * style.frame_padding.x
+        if i and imgui.get_item_rect_max().x + style.item_spacing.x + width <= right:
+            imgui.same_line()
+        if imgui.button(words):
+            actions.append(action)
+    return actions

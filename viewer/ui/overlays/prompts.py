@@ -22,6 +22,7 @@ from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePr
 from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.prompt_rows import (
+    button_rows,
     focus_on_appearing,
     path_field,
     prompt_actions,
@@ -308,13 +309,7 @@ def _quit(state: AppState, layout: Layout) -> list[Action]:
         offers.append(("Save the depth map…", AskToSave("map")))
     gap(layout, 2)
     sure = "Quit without saving" if state.has_unsaved_edits else "Give up and quit" if state.jobs else "Quit"
-    actions: list[Action] = []
-    for words, action in (*offers, (sure, Quit(is_sure=True)), ("Cancel", ShowPrompt(None))):
-        if button(words, layout):
-            actions.append(action)
-        if words != "Cancel":
-            imgui.same_line()
-    return actions
+    return button_rows([*offers, (sure, Quit(is_sure=True)), ("Cancel", ShowPrompt(None))])
 
 
 def jobs_text(jobs: Sequence[JobProgress]) -> str:
