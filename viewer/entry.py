@@ -23,6 +23,10 @@ NUMBA_THREADS = "NUMBA_NUM_THREADS"
 MOST_NUMBA_THREADS = 1024
 TOO_FEW_THREADS = "can't start new thread"
 """What Python says."""
+LEAST_ADDRESS_SPACE = 256 * 2**20
+"""With less, OpenBLAS ends the process by itself."""
+TOO_LITTLE_MEMORY = ("failed to map segment", "Cannot allocate memory")
+"""What libraries say that are loaded."""
 TRACEBACK_VARIABLE = "IIBR_TRACEBACK"
 """With this in the environment, errors that are told here come with their traceback."""
 
@@ -59,6 +63,7 @@ def _run() -> int:
         return _tell(f"the working folder is gone ({error.strerror}); go to another one", EXIT_BAD_INPUT)
     try:
         _require_threads()
+        _require_address_space()
         return _run_command()
     except Exception as error:
         return _tell_error(error)
@@ -132,6 +137,8 @@ def _tell_error(error: Exception) -> int:
     if isinstance(error, OSError):
         file = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "a file"
         return _tell(f"{file}: {error.strerror or said} ({TRACEBACK_VARIABLE}=1 shows where)", EXIT_BAD_INPUT)
+    if isinstance(error, MemoryError) or any(words in str(error) for words in TOO_LITTLE_MEMORY):
+        return _tell("out of memory before anything was read; raise the limit (ulimit -v, or -d)", EXIT_BAD_INPUT)
     if TOO_FEW_THREADS in said:
         return _tell("no more threads may be started here; raise the limit of processes (ulimit -u)", EXIT_BAD_INPUT)
     kind = type(error).__name__
@@ -194,6 +201,17 @@ def _require_threads() -> None:
     with ends:
         for _ in range(min(os.cpu_count() or 1, MOST_TRIED_THREADS)):
             start_new_thread(wait, ())
+
+
+def _require_address_space() -> None:
+    """Raise MemoryError where not even the libraries can be loaded."""
+    try:
+        import resource
+    except ImportError:  # Windows knows no such limits
+        return
+    limits = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
+    if any(0 <= limit < LEAST_ADDRESS_SPACE for limit in limits):
+        raise MemoryError
 
 
 def _whole_number(text: str) -> int:

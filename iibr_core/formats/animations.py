@@ -80,7 +80,9 @@ def _write_video(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]
                 container.mux(stream.encode(_as_yuv(frame)))
             container.mux(stream.encode(None))
     except av.error.FFmpegError as error:
-        raise InputError(f"{path}: cannot be written ({reason_of(error)}); choose another place") from error
+        # Of what failed in writing to the file PyAV says only that something did.
+        reason = error.__context__ if isinstance(error.__context__, OSError) else error
+        raise InputError(f"{path}: cannot be written ({reason_of(reason)}); choose another place") from error
     return count
 
 

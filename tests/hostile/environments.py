@@ -115,6 +115,13 @@ _folders = [
     *(Case(f"{command[0]} among traps", command, 0, "", makes, prepare=_set_traps) for command, makes in MAKING),
 ]
 
+_threads = [
+    Case(f"{command[0]} with {number!r} threads", command, says=f"NUMBA_NUM_THREADS={number}",
+         environment={"NUMBA_NUM_THREADS": number})
+    for command, _ in MAKING
+    for number in ("0", "abc")
+]  # fmt: skip
+
 _limits = [
     Case(f"{command[0]} with {words}", command, 0, "", makes, environment=environment, limits=limits)
     for command, makes in MAKING[:3]
@@ -132,4 +139,4 @@ _limits = [
     Case("view with nonsense for a display", ("view", "photo.png"), environment={"DISPLAY": "nonsense"}),
 ]
 
-ENVIRONMENT_CASES = (*_homes, *_locales, *_streams, *_folders, *_limits)
+ENVIRONMENT_CASES = (*_homes, *_locales, *_streams, *_folders, *_threads, *_limits)

@@ -189,4 +189,31 @@ _naming_files = [
     ),
 ]
 
-INPUT_CASES = (*_view_files, *_photos, *_odd_paths, *_permissions, *_maps, *_fields, *_saved, *_naming_files)
+
+def _make_pipe(name: str) -> Callable[[Path], None]:
+    return lambda folder: os.mkfifo(folder / name)
+
+
+_pipes = [
+    Case(f"{words[0]} with a pipe for {words[-1]}", words, prepare=_make_pipe(name), says=f"{name}: is a pipe")
+    for name, words in (
+        ("in.toml", ("screenshot", "photo.png", "-o", "new.png", "--gloss", "in.toml")),
+        ("in.json", ("generate", "photo.png", "--out", "new", "--poses", "in.json")),
+        ("in.txt", ("export", "photo.png", "--to", "gif", "-o", "new.gif", "--path", "in.txt")),
+        ("in.pfm", ("plan", "photo.png", "--disparity", "in.pfm")),
+        ("in.png", ("screenshot", "photo.png", "-o", "new.png", "--like", "in.png")),
+        ("in.lif", ("depth", "-o", "new.pfm", "in.lif")),
+    )
+]
+
+INPUT_CASES = (
+    *_pipes,
+    *_view_files,
+    *_photos,
+    *_odd_paths,
+    *_permissions,
+    *_maps,
+    *_fields,
+    *_saved,
+    *_naming_files,
+)

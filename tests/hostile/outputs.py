@@ -133,6 +133,24 @@ _screenshot = [
     Case("screenshot without a place", ("screenshot", "photo.png"), says="-o"),
 ]
 
+
+def _write_gloss(folder: Path) -> None:
+    (folder / "gloss.toml").write_text('environment = "env.png"')
+    (folder / "env.png").write_bytes((folder / "photo.png").read_bytes())
+    (folder / "gloss.png").write_text("roughness = 0.3")
+
+
+_gloss = [
+    Case(
+        f"{command} onto {place} of its gloss {gloss}",
+        (*WRITING[command], place, "--gloss", gloss, "--force"),
+        prepare=_write_gloss,
+        says="is read here",
+    )
+    for command in ("screenshot", "export")
+    for gloss, place in (("gloss.toml", "env.png"), ("gloss.toml", "folder/../env.png"), ("gloss.png", "gloss.png"))
+]
+
 _missing_folders = [
     Case("screenshot in a missing folder", (*WRITING["screenshot"], "missing/new.png"), says="missing"),
     Case("train in a missing folder", (*WRITING["train"], "missing/new.safetensors"), says="missing"),
@@ -238,4 +256,4 @@ _exports = [
     )
 ]
 
-OUTPUT_CASES = (*_places, *_missing_folders, *_screenshot, *_generate, *_others, *_full, *_exports)
+OUTPUT_CASES = (*_places, *_missing_folders, *_screenshot, *_gloss, *_generate, *_others, *_full, *_exports)

@@ -213,6 +213,14 @@ def test_what_libraries_warn_of_is_not_told(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits the address space of a program it starts")
+@pytest.mark.parametrize("megabytes", [100, 150, 200, 250, 300, 350])
+def test_where_not_even_libraries_can_be_loaded_it_says_so(megabytes: int, tmp_path: Path) -> None:
+    limited = ("prlimit", f"--as={megabytes * 10**6}")
+    told = the_error(run("plan", write_scene(tmp_path), start=(*limited, *START)))
+    assert "ulimit -v" in told
+
+
 AS_NOBODY = (
     *("setpriv", "--reuid=65534", "--clear-groups"),
     *("--inh-caps=+dac_read_search,+dac_override", "--ambient-caps=+dac_read_search,+dac_override"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -151,3 +152,19 @@ def test_a_rate_is_kept_on_the_whole_where_no_frame_can_last_so_long(tmp_path: P
         durations = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
     assert sum(durations) == 1000
     assert set(durations) == {30, 40}
+
+
+@pytest.mark.parametrize("kind", ["mp4", "webm", "gif", "apng"])
+def test_a_disk_that_is_full_leaves_nothing(kind: str, tmp_path: Path) -> None:
+    """Room for 4 kB: it is full while frames are still written, or at the end."""
+    noise = np.random.default_rng(0).integers(0, 256, (12, 96, 128, 3), np.uint8)
+    path = tmp_path / f"new.{'png' if kind == 'apng' else kind}"
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        with pytest.raises(InputError, match="File too large") as refused:
+            write_animation(path, noise, ImageSize(96, 128), 30.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert ".iibr" not in str(refused.value)
+    assert list(tmp_path.iterdir()) == []
