@@ -1,12 +1,13 @@
 """What memory the commands take at most under `--memory`, and what stays after many photos in one process.
 
-python -m benchmarks.memory bounds [12 24 ...] | day | speed: the peaks of fresh processes for photos of so many MP;
-memory after 10 and after 150 photos, by what is done about freed memory; the time that this costs a light field.
-docs/memory.md has what they printed.
+python -m benchmarks.memory predicted | bounds [12 24 ...] | day | speed: what twelve commands were predicted to take,
+and took; the peaks of fresh processes for photos of so many MP; memory after 10 and after 150 photos, by what is done
+about freed memory; the time that this costs a light field. docs/memory.md has what they printed.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import psutil
+from numpy.typing import NDArray
 
 from benchmarks.speed.measure import cost_of
 from iibr_core.runtime.allocator import give_back_memory, limit_arenas
@@ -34,13 +36,85 @@ POLICIES = {
     "fixed mmap threshold": {"MALLOC_MMAP_THRESHOLD_": str(1 << 17)},
 }
 SHIPPED = "two heaps, trimmed"
+SQUARES = 16
+PREDICTED = (
+    ((480, 640), "generate PHOTO --grid 3 --out OUT"),
+    ((760, 800), "generate PHOTO --grid 17 --quality fast --out OUT"),
+    ((1000, 1500), "generate PHOTO --grid 7 --quality balanced --out OUT"),
+    ((1500, 2000), "generate PHOTO --grid 3 --quality fast --max-pixels 3000000 --out OUT"),
+    ((4000, 6000), "generate PHOTO --grid 5 --out OUT"),
+    ((480, 640), "screenshot PHOTO --grid 5 --view 1,1 --aperture 3 -o OUT.png"),
+    ((900, 1200), "screenshot PHOTO --grid 9 --quality fast --view 2,1 -o OUT.png"),
+    ((2000, 3000), "screenshot PHOTO --grid 5 --view 1,-1 -o OUT.png"),
+    ((700, 900), "export PHOTO --grid 7 --to gif --frames 6 -o OUT.gif"),
+    ((1200, 1000), "export PHOTO --grid 3 --to sbs -o OUT.png"),
+    ((2450, 3650), "screenshot PHOTO --full --grid 3 --max-pixels 600000 --view 1,0.5 -o OUT.png"),
+    ((4000, 6000), "screenshot PHOTO --full --view 0,0 -o OUT.png"),
+)
+"""(height, width) of a photo, and what is done with it. The constants of `memory_model` were compared with other cases:
+1, 2, 6 and 12 MP, grids of 3, 5 and 9, with one step of disparity.
+"""
 
 
 def main() -> None:
-    ways = {"bounds": bounds, "day": day, "speed": speed, "photos": photos_in_turn, "views": views_once}
+    ways = {
+        "predicted": predicted,
+        "watched": watched,
+        "bounds": bounds,
+        "day": day,
+        "speed": speed,
+        "photos": photos_in_turn,
+        "views": views_once,
+    }
     if len(sys.argv) < 2 or sys.argv[1] not in ways:
         sys.exit(__doc__)
     ways[sys.argv[1]](*sys.argv[2:])
+
+
+def predicted() -> None:
+    """What PREDICTED are predicted to take, and take: a table."""
+    print("| photo | command | predicted, MiB | peak, MiB | ratio |\n| --- | --- | --- | --- | --- |", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for size, command in PREDICTED:
+            photo, out = Path(folder) / "photo.jpg", Path(folder) / "out"
+            write_photo(photo, size)
+            np.save(photo.with_name("photo_disparity.npy"), squares_before_wall(size))
+            words = [word.replace("PHOTO", str(photo)).replace("OUT", str(out)) for word in command.split()]
+            code, peak = peak_of([*words, "--force"], [sys.executable, "-m", "benchmarks.memory", "watched", str(out)])
+            needed = float(Path(f"{out}.needed").read_text()) / MIB if code == 0 else math.nan
+            megapixels = f"{math.prod(size) / 1e6:.1f} MP"
+            print(f"| {megapixels} | {command} | {needed:.0f} | {peak:.0f} | {needed / peak:.2f} |", flush=True)
+
+
+def watched(out: str, *arguments: str) -> None:
+    """One process of `predicted`: the command line, which writes down what it asked the budget for."""
+    from iibr_core.generation.memory_model import Budget
+    from viewer.entry import main as run
+
+    require, asked = Budget.require, [0.0]
+
+    def noted(budget: Budget, needed: float, what: str, advice: str) -> None:
+        asked.append(needed)
+        require(budget, needed, what, advice)
+
+    Budget.require = noted  # type: ignore[method-assign]
+    sys.argv = ["iibr", *arguments]
+    try:
+        run()
+    finally:
+        Path(f"{out}.needed").write_text(str(max(asked)))
+
+
+def squares_before_wall(size: tuple[int, int]) -> NDArray[np.float32]:
+    """A slanted wall and squares before it, no larger than 2 MP."""
+    smaller = min(math.sqrt(2e6 / math.prod(size)), 1.0)
+    height, width = (round(side * smaller) for side in size)
+    rng = np.random.default_rng(height)
+    disparity = np.linspace(-1, 0, height, dtype=np.float32)[:, None] * np.ones(width, np.float32)
+    for _ in range(SQUARES):
+        top, left, side = rng.integers(0, height), rng.integers(0, width), rng.integers(height // 20, height // 4)
+        disparity[top : top + side, left : left + side] = rng.uniform(0, 2)
+    return disparity
 
 
 def bounds(*megapixels: str) -> None:
@@ -70,10 +144,13 @@ def _peaks(photo: Path, budget: str) -> Iterator[str]:
         yield f"{command} {peak / allowed:.2f}" if code == 0 else f"{command} - ({peak:.0f} MiB)"
 
 
-def peak_of(arguments: list[str]) -> tuple[int, float]:
+COMMAND_LINE = [sys.executable, "-P", "-m", "viewer"]
+
+
+def peak_of(arguments: list[str], program: list[str] = COMMAND_LINE) -> tuple[int, float]:
     """Exit code of the command line in a process of its own, and its peak, MiB; this one's counts too, but is less."""
     silent = subprocess.DEVNULL
-    child = subprocess.Popen([sys.executable, "-P", "-m", "viewer", *arguments], stdout=silent, stderr=silent)
+    child = subprocess.Popen([*program, *arguments], stdout=silent, stderr=silent)
     _, status, used = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
     return child.returncode, used.ru_maxrss / 1024

@@ -44,7 +44,8 @@ SIZES = (600, 900), (700, 600), (480, 720), (640, 960), (512, 512), (560, 840)
 GRIDS = 5, 7, 9
 FRAMES_A_STEP = 3
 SLOW_FRAME_S = 0.25
-COUNTED_AFTER = 1, 10, 100, 250, 500, 1000, 2000
+RESTS_AFTER, REST_S = 10, 600.0
+COUNTED_AFTER = 10, 100, 250, 500, 1000, 2000
 MIB = 2**20
 
 
@@ -176,9 +177,9 @@ class User:
         self.app.do(*actions)
         self.frame()
 
-    def until(self, condition: Callable[[], bool]) -> None:
-        """Show frames until it is so, for a minute at most."""
-        end = time.perf_counter() + 60
+    def until(self, condition: Callable[[], bool], most_s: float = 60.0) -> None:
+        """Show frames until it is so, for so long at most."""
+        end = time.perf_counter() + most_s
         while not condition() and time.perf_counter() < end:
             self.frame()
 
@@ -227,11 +228,11 @@ def take_steps(user: User, steps: int) -> None:
 
     for number in range(1, steps + 1):
         user.step()
-        if number in COUNTED_AFTER:
+        if number in COUNTED_AFTER or number == steps:
             tell(f"{number} actions")
-    tell(f"{steps} actions")
-    user.until(user.is_resting)
-    tell("rest")
+        if number in (RESTS_AFTER, steps):
+            user.until(user.is_resting, REST_S)
+            tell(f"{number} actions, at rest")
 
 
 def print_frames(frames: list[tuple[float, float, str]]) -> None:

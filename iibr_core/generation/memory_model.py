@@ -22,8 +22,10 @@ from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
 from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
 
 MIB = 2**20
-VIEWER_BYTES, WRITER_BYTES = 360 * MIB, 260 * MIB
+VIEWER_BYTES, WRITER_BYTES = 350 * MIB, 260 * MIB
 """Of a process that does nothing yet: Python and compiled kernels; OpenGL, where views are shown."""
+HEADROOM = 1.06
+"""Times the arrays: small ones are not counted, and heaps are never full."""
 READING_BYTES, PHOTO_BYTES = 90, 28
 """Of one pixel of the photo while it is read and its depth looked for; then: its colours as floats, its disparity as
 found, as refined and as the views take it, the view in the middle as it is stored.
@@ -48,8 +50,12 @@ TARGET_BYTES, MOST_TARGET_PIXELS = 24, 8_000_000
 """Of one pixel of what a picture is drawn into; larger ones are drawn in parts."""
 PICTURE_BYTES, FLOAT_PICTURE_BYTES = 9, 64
 """Of one pixel of a picture on its way to a file: 8 bits a channel, or linear light."""
-OWN_SIZE_BYTES, TILE_BYTES = 45, 350 * MIB
-"""Of one pixel of a photo that is drawn at its own size; and of a tile of it, whatever its size."""
+OWN_SIZE_BYTES, TILE_BYTES = 28, 121
+"""Of one pixel of a photo that is drawn at its own size: its colours and its light as floats, its disparity. Of one
+pixel of the tile that is being drawn, beside its rays: the view, its holes, the light of a lens.
+"""
+TILE_IMAGES = 7
+"""Source images that a tile is drawn from: its own two, and what was inpainted on the side that is looked at from."""
 MOST_COMPLETING = 10
 """Views that complete the rays of several photos: three rows of three at most, and the centre."""
 USUAL_GRID = GridShape(5, 5)
@@ -138,7 +144,7 @@ def whole_bytes(pixels: int, field_bytes: int, making_bytes: int, keeps_views: b
     field_bytes: of all views, which count where they are kept. making_bytes: beside them while they are made.
     """
     making = pixels * PHOTO_BYTES + (field_bytes if keeps_views else 0) + making_bytes
-    return process_bytes(keeps_views) + max(pixels * READING_BYTES, making)
+    return process_bytes(keeps_views) + round(HEADROOM * max(pixels * READING_BYTES, making))
 
 
 def pixels_within(budget: Budget, grid: GridShape | None, keeps_views: bool = True) -> int:
@@ -148,17 +154,22 @@ def pixels_within(budget: Budget, grid: GridShape | None, keeps_views: bool = Tr
     views = min(math.prod(grid or USUAL_GRID), math.prod(USUAL_GRID))
     each = PHOTO_BYTES + (views * STORED_BYTES if keeps_views else 0)
     if views == 1:
-        return max((budget.bytes - process_bytes(keeps_views)) // max(each, READING_BYTES), LEAST_PIXELS)
+        return max(int(_room(budget, keeps_views) / max(each, READING_BYTES)), LEAST_PIXELS)
     # Of photos larger than a band, all but the bands' share grows with their pixels.
     least, more = (making_bytes(Making.usual(count * MOST_BAND_PIXELS)) for count in (1, 2))
     growing = (more - least) / MOST_BAND_PIXELS
-    room = budget.bytes - process_bytes(keeps_views) - (2 * least - more)
+    room = _room(budget, keeps_views) - (2 * least - more)
     return max(int(room / (each + growing)), LEAST_PIXELS)
+
+
+def _room(budget: Budget, keeps_views: bool) -> float:
+    """For arrays."""
+    return (budget.bytes - process_bytes(keeps_views)) / HEADROOM
 
 
 def largest_side(budget: Budget, needed_beside: int, each_view: int) -> int:
     """So many views a side of a square grid fit beside what else is needed; 0 where none does."""
-    return math.isqrt(max(budget.bytes - needed_beside, 0) // max(each_view, 1))
+    return math.isqrt(int(max(budget.bytes - needed_beside, 0) / (HEADROOM * max(each_view, 1))))
 
 
 def require_reading(budget: Budget, size: ImageSize) -> None:
@@ -192,7 +203,7 @@ def require_views(budget: Budget, name: str, size: ImageSize, grid: GridShape) -
     side = largest_side(budget, beside + making_bytes(Making.usual(pixels)), each)
     advice = f"at most --grid {side}, or " if side > 1 else ""
     what = f"{grid.columns} x {grid.rows} views of {name} ({size})"
-    budget.require(beside + views * each, what, f"{advice}raise --memory or lower --max-pixels")
+    budget.require(beside + round(HEADROOM * views * each), what, f"{advice}raise --memory or lower --max-pixels")
 
 
 def require_field(budget: Budget, name: str, size: ImageSize, grid: GridShape) -> None:
@@ -233,13 +244,26 @@ def require_picture(budget: Budget, size: ImageSize, is_float: bool) -> None:
     budget.require(needed, f"a picture of {size}", "give a smaller --size or raise --memory")
 
 
-def require_own_size(budget: Budget, size: ImageSize, view: ImageSize, field_bytes: int) -> None:
-    """Raise InputError where a picture at the photo's own (height, width) takes more than there is. view: the size of
-    the light field's views; field_bytes: of those that stay there meanwhile.
+def require_own_size(
+    budget: Budget, size: ImageSize, view: ImageSize, field_bytes: int, tile: ImageSize, shows_hidden: bool
+) -> None:
+    """Raise InputError where a picture at the photo's own (height, width) takes more than there is.
+
+    view: the size of the light field's views; field_bytes: of those that stay there meanwhile. tile: the size of the
+    largest tile, with what is read around it. shows_hidden: whether the picture shows what the photo hides.
     """
-    fills = math.prod(view) * PHOTO_BYTES + making_bytes(Making.usual(math.prod(view)))
-    needed = VIEWER_BYTES + field_bytes + fills + TILE_BYTES + math.prod(size) * OWN_SIZE_BYTES
+    needed = own_size_bytes(size, view, field_bytes, tile, shows_hidden)
     budget.require(needed, f"a picture at the photo's own size, {size},", "raise --memory, or save a smaller picture")
+
+
+def own_size_bytes(size: ImageSize, view: ImageSize, field_bytes: int, tile: ImageSize, shows_hidden: bool) -> int:
+    """What a process takes that draws such a picture; see `require_own_size`."""
+    images = TILE_IMAGES if shows_hidden else 2
+    drawing = math.prod(size) * OWN_SIZE_BYTES + math.prod(tile) * (images * RAY_BYTES + TILE_BYTES)
+    photo = math.prod(view) * PHOTO_BYTES
+    making = making_bytes(Making.usual(math.prod(view))) if shows_hidden else 0
+    fills = math.prod(view) * Making.usual(0).images * RAY_BYTES if shows_hidden else 0
+    return VIEWER_BYTES + round(HEADROOM * (photo + field_bytes + max(making, fills + drawing)))
 
 
 def require_free_views(budget: Budget, canvas: ImageSize, largest: ImageSize) -> None:

@@ -22,6 +22,7 @@ from iibr_core.generation.cost_model import (
     measure_parallax,
 )
 from iibr_core.generation.memory_model import (
+    HEADROOM,
     LEAST_PIXELS,
     Budget,
     budget_of,
@@ -195,7 +196,8 @@ def _require_room(plan: ScenePlan, photo: Photo, budget: Budget, keeps_views: bo
     pixels, making = photo.size.height * photo.size.width, plan.peak_bytes
     needed = whole_bytes(pixels, plan.field_bytes, making, keeps_views)
     what = f"{plan.grid.columns} x {plan.grid.rows} views of {photo.name} ({photo.size})"
-    side = largest_side(budget, needed - plan.field_bytes, view_bytes(pixels, photo.is_hdr)) if keeps_views else 0
+    beside = needed - round(HEADROOM * plan.field_bytes)
+    side = largest_side(budget, beside, view_bytes(pixels, photo.is_hdr)) if keeps_views else 0
     fits = f"at most --grid {side}, or " if side > 1 else ""
     # Nearly all of it grows with the pixels.
     process = process_bytes(keeps_views)
@@ -251,7 +253,7 @@ def _complete_plan(
     draft_bytes = 0
     if draft_budget is not None:
         left = draft_budget.bytes - whole_bytes(pixels, field_bytes, peak_bytes, keeps_views=True)
-        draft_bytes = max(min(costs.of(quality).draft_bytes, left), 0)
+        draft_bytes = max(min(costs.of(quality).draft_bytes, int(left / HEADROOM)), 0)
     in_all = whole_bytes(pixels, field_bytes, peak_bytes + draft_bytes, keeps_views=True)
     return ScenePlan(
         grid,

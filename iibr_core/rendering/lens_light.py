@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile, whole
+from iibr_core.rendering.large_views import AROUND_PX, TILE_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.rendering.resampling import keys_weights
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.jit import kernel, linear_scalar
@@ -70,6 +70,23 @@ class LargeLens:
         return seen
 
 
+def largest_tile(size: ImageSize, lens: LargeLens, disparity_px: float) -> ImageSize:
+    """What is read of a photo of (height, width) to draw a tile of it, at most. disparity_px: its greatest, either way,
+    px of it per view step.
+    """
+    views = max([1.0, *(abs(axis) for offset in lens.offsets for axis in offset)])
+    around_px = AROUND_PX + math.ceil(views * disparity_px)
+    if lens.share > 0:
+        around_px += math.ceil(_moved_px(lens)) + TAPS
+    return ImageSize(*(min(side, TILE_PX + 2 * around_px) for side in size))
+
+
+def _moved_px(lens: LargeLens) -> float:
+    """How far what is in focus moves between the points of the lens, at most."""
+    steepest = abs(lens.focus) + sum(map(abs, lens.tilt)) + lens.focus_range
+    return max((steepest * abs(axis) for at in lens.samples for axis in at.offset), default=0.0)
+
+
 def draw_large(
     photo: LargePhoto,
     lens: LargeLens,
@@ -106,9 +123,7 @@ def _draw_tile(
     if not _has_sharp(photo, lens, tile):
         return
     in_focus, weights = np.zeros_like(light), np.zeros(tile.size, np.float32)
-    steepest = abs(lens.focus) + sum(map(abs, lens.tilt)) + lens.focus_range
-    moved_px = max((steepest * abs(axis) for at in lens.samples for axis in at.offset), default=0.0)
-    around = tile.grown(math.ceil(min(moved_px, max(photo.size))) + TAPS, whole(photo.size))
+    around = tile.grown(math.ceil(min(_moved_px(lens), max(photo.size))) + TAPS, whole(photo.size))
     views = views_of_tile(photo, around, lens.offsets[lens.share < 1 :], synthesis, should_stop)
     for sample, view in zip(lens.samples, views):
         shown = _linear(view.colors, lens, should_stop)

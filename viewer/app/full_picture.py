@@ -155,6 +155,8 @@ def is_full(scene: Scene, optics: Optics, size: ScreenSize) -> bool:
 def require_full(scene: Scene, optics: Optics) -> None:
     """Raise InputError where there is no memory for a picture at the photo's own size."""
     from iibr_core.formats.images.photo import size_within
+    from iibr_core.rendering.lens_light import CENTRE, largest_tile
+    from viewer.display.large_lens import large_lens
 
     if scene.plan is None or scene.own_size is None:
         return
@@ -162,4 +164,8 @@ def require_full(scene: Scene, optics: Optics) -> None:
     field_bytes = scene.plan.field_bytes if needs_smaller(optics) else 0
     budget = budget_of(scene.source.depth.memory_bytes)
     read = size_within(ImageSize(own_height, own_width), MOST_PIXELS)
-    require_own_size(budget, read, ImageSize(height, width), field_bytes)
+    lens = large_lens(optics, scene, read.width / width)
+    reach_px = max(map(abs, scene.disparity_range_px)) * read.width / width
+    tile = largest_tile(read, lens, reach_px)
+    shows_hidden = any(offset != CENTRE for offset in lens.offsets)
+    require_own_size(budget, read, ImageSize(height, width), field_bytes, tile, shows_hidden)

@@ -7,8 +7,11 @@ import pytest
 
 from iibr_core.generation import memory_model, plan
 from iibr_core.generation.memory_model import (
+    HEADROOM,
     LEAST_PIXELS,
     MIB,
+    RAY_BYTES,
+    STATISTICS_BYTES,
     VIEWER_BYTES,
     WRITER_BYTES,
     Budget,
@@ -16,6 +19,7 @@ from iibr_core.generation.memory_model import (
     budget_of,
     largest_side,
     making_bytes,
+    own_size_bytes,
     pixels_within,
     require_decoding,
     require_map,
@@ -27,8 +31,9 @@ from iibr_core.generation.memory_model import (
     whole_bytes,
 )
 from iibr_core.generation.plan import PlanOverrides, plan_for_viewing, plan_literal
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.runtime.machine import memory_bytes
-from iibr_core.types import GridShape, ImageSize, InputError
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core.scenes import square_before_wall
 
 GIB = 1024 * MIB
@@ -70,7 +75,7 @@ def test_so_many_pixels_fit_indeed():
 
 def test_views_that_are_kept_count_and_those_that_are_written_do_not():
     kept, written = (whole_bytes(1000, 10**9, 10**6, keeps) for keeps in (True, False))
-    assert kept - written == 10**9 + VIEWER_BYTES - WRITER_BYTES
+    assert kept - written == HEADROOM * 10**9 + VIEWER_BYTES - WRITER_BYTES
 
 
 def test_a_grid_that_was_asked_for_is_refused_with_the_largest_that_fits():
@@ -80,7 +85,7 @@ def test_a_grid_that_was_asked_for_is_refused_with_the_largest_that_fits():
     side = int(str(error.value).split("--grid ")[1].split(",")[0])
     assert side > 1
     require_views(budget, "a.jpg", ImageSize(1000, 1000), GridShape(side, side))
-    assert largest_side(Budget(100, ""), 10, 10) == 3
+    assert largest_side(Budget(110, ""), 10, 10) == 3
 
 
 def test_a_photo_too_large_to_be_read_is_refused_with_the_size_that_fits():
@@ -144,3 +149,25 @@ def test_the_picture_counts_and_floats_count_more():
     require_picture(budget, size, is_float=False)
     with pytest.raises(InputError, match="a picture of 9000x9000 takes"):
         require_picture(budget, size, is_float=True)
+
+
+def test_a_ray_takes_what_is_counted_for_it():
+    rays = RaySet(3, ImageSize(64, 80), 0.1)
+    image = np.zeros((64, 80), np.float32)
+    rays.add(ViewOffset(0.0, 0.0), np.zeros((64, 80, 3), np.float32), image, np.ones_like(image))
+    assert sum(part.nbytes for part in rays.arrays if part.ndim > 2) == 5120 * RAY_BYTES
+    more = making_bytes(Making(5120, 5120, 3, 0, 0, "balanced")) - making_bytes(Making(5120, 5120, 2, 0, 0, "balanced"))
+    assert more == 5120 * (RAY_BYTES + STATISTICS_BYTES)
+
+
+def test_views_in_flight_and_the_one_that_is_filled_do_not_add_up():
+    counts = [making_bytes(Making(10**6, 10**6, 2, hole, 0, "fast")) for hole in (0.0, 0.2, 0.9)]
+    assert counts[0] == counts[1] < counts[2]
+
+
+def test_a_picture_at_the_photos_own_size_counts_what_it_shows_of_what_is_hidden():
+    large, view, tile = ImageSize(3000, 4000), ImageSize(600, 800), ImageSize(1100, 1100)
+    in_the_middle, aside = (own_size_bytes(large, view, 0, tile, hidden) for hidden in (False, True))
+    assert VIEWER_BYTES + 28 * 12_000_000 < in_the_middle < aside < 2 * in_the_middle
+    assert own_size_bytes(large, view, 10**8, tile, False) == in_the_middle + HEADROOM * 10**8
+    assert own_size_bytes(large, view, 0, ImageSize(1300, 1300), True) > aside

@@ -21,7 +21,7 @@ from viewer.background.loaded_photo import load_photo
 from viewer.model.actions import OpenPath, SetLoop, ToggleSection
 from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import Compare, SetOverlay, ShowEpis
+from viewer.model.state.inspection import Compare, KeepState, SetOverlay, ShowEpis
 from viewer.model.state.optics import MoveEye, Optics
 from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ReadTruthTask
@@ -252,3 +252,19 @@ def test_a_light_field_from_disk_beside_its_truth(open_window: Opener, photo_pat
     assert app.state.inspection.truth is None
     assert app.state.inspection.shows_epis
     driver.until_idle()
+
+
+def test_a_picture_drawn_in_a_hurry_is_not_compared_before_it_is_whole(viewer: Driver) -> None:
+    """It is smaller than the one that was kept, and a view that comes then leaves it unfinished."""
+    app = viewer.app
+    app.do(KeepState(), Compare("difference"))
+    viewer.until_idle()
+    drawn, renderer = app.scene_view.picture_drawn, app.scene_view.renderer
+    assert drawn is not None
+    renderer.render_in_time(replace(app.state.optics, aperture_diameter=3.0), drawn.size_px, 0.0)
+    app.do(MoveEye(ViewOffset(0.3, 0.4)), KeepState())
+    centre = app.scene_view.centre
+    assert centre is not None
+    renderer.upload_view(*GRID.centre, centre.colors, centre.disparity)
+    app.scene_view.views_uploaded += 1
+    app.inspection_view.draw(app.state, app.layout())

@@ -18,7 +18,7 @@ from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanf
 from tests.viewer.background.test_light_field_job import showings
 from viewer.background.jobs import QUEUED_RESULTS, Failed
 from viewer.background.light_field_job import UNKNOWN_DISPARITY_RANGE_PX
-from viewer.background.loaded_photo import sketch_photo
+from viewer.background.loaded_photo import load_photo, sketch_photo, without_history
 from viewer.background.read_ahead import WantedPhoto
 from viewer.background.scene_worker import (
     SceneReady,
@@ -451,3 +451,13 @@ def test_an_avif_photo_opens(tmp_path: Path) -> None:
     Image.new("RGB", (48, 32), (200, 80, 60)).save(tmp_path / "a.avif")
     loaded = load_photo(Source(str(tmp_path / "a.avif")))
     assert (loaded.photo.size, loaded.settings) == ((32, 48), "")
+
+
+def test_a_photo_that_is_left_keeps_its_map_and_nothing_of_its_strokes(photo_path: Path) -> None:
+    loaded = load_photo(Source(str(photo_path)))
+    edits = DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 0.5),))
+    painted = loaded.canvas.apply(edits)
+    left = without_history(loaded)
+    assert left.canvas is not loaded.canvas
+    np.testing.assert_array_equal(left.disparity.values, loaded.disparity.values)
+    np.testing.assert_array_equal(left.canvas.apply(edits), painted)
