@@ -88,7 +88,8 @@ def started_batch(*words: object, until: Path) -> subprocess.Popen[str]:
 
 def goes_on(archive: Path, out: Path, *words: object) -> None:
     """What was finished is not made again, and of the rest one photo is."""
-    finished = {json.loads(line)["name"] for line in (out / "manifest.jsonl").read_text().splitlines()}
+    lines = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
+    finished = {line["name"] for line in lines if line["key"]} - {line["name"] for line in lines if not line["key"]}
     left = [path for path in sorted(archive.iterdir()) if path.stem not in finished]
     assert finished
     assert left

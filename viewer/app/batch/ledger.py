@@ -131,8 +131,8 @@ class Ledger:
         """What was written and not reported is ours: the next run replaces it."""
         for path in self.folder.glob(f"{CLAIM_PREFIX}*"):
             for entry in _read_entries(path) if is_file(path) else ():
-                if os.path.lexists(self.folder / entry.output):
-                    self._add(json.dumps(entry._asdict()).encode() + b"\n")
+                if os.path.lexists(self.folder / entry.output) and not self.has(entry.name, entry.key):
+                    self._add(json.dumps(entry._replace(key="")._asdict()).encode() + b"\n")
             path.unlink()
 
 

@@ -72,7 +72,7 @@ def _claim(task: PhotoTask, output: Path) -> None:
     from iibr_core.formats.outputs import atomic_write
 
     with atomic_write(task.place.claim) as temporary:
-        temporary.write_bytes(task.line(str(output)))
+        temporary.write_bytes(task.line(str(output), key=task.key))
         _sync(temporary)
     _sync(task.place.claim.parent)
 

@@ -111,6 +111,19 @@ def test_what_is_no_file_of_its_own_is_refused_and_not_written(tmp_path: Path, n
     assert not (tmp_path / "new").exists()
 
 
+def test_a_claim_of_what_is_finished_changes_nothing(tmp_path: Path) -> None:
+    """As when a run is interrupted between the manifest's line and the end of the claim."""
+    with Ledger(tmp_path) as ledger:
+        finish(ledger, "a.pfm", "1")
+    for key, is_finished in (("1", True), ("2", False)):
+        task = PhotoTask("/photos/a.pfm", Place(str(tmp_path), "a.pfm"), key, SETTINGS)
+        task.place.claim.write_bytes(task.line(str(tmp_path / "a.pfm"), key=key))
+        with Ledger(tmp_path) as ledger:
+            assert ledger.has("a.pfm", "1") == is_finished
+            assert not ledger.has("a.pfm", "2")
+            assert ledger.place_of("a.pfm").own_output == "a.pfm"
+
+
 def test_failures_are_those_of_the_last_run(tmp_path: Path) -> None:
     with Ledger(tmp_path) as ledger:
         ledger.add_failure("/a, \udcff.png", "two\nlines")
