@@ -69,7 +69,6 @@ class Ledger:
 
     def _read(self) -> None:
         _lock(self._manifest.fileno(), self.folder)
-        self._entries = {entry.name: entry for entry in _read_entries(self.folder / MANIFEST)}
         _end_last_line(self._manifest)
         self._take_claims()
         failures = open_to_append(self.folder / FAILURES)
@@ -128,7 +127,9 @@ class Ledger:
         self._entries.update((entry.name, entry) for entry in _entries_of(line))
 
     def _take_claims(self) -> None:
-        """What was written and not reported is ours: the next run replaces it."""
+        """Read the manifest; what was written and not reported is ours, too: the next run replaces it."""
+        # Again at the end: an interruption may have come between a line and what is known of it here.
+        self._entries = {entry.name: entry for entry in _read_entries(self.folder / MANIFEST)}
         for path in self.folder.glob(f"{CLAIM_PREFIX}*"):
             for entry in _read_entries(path) if is_file(path) else ():
                 if os.path.lexists(self.folder / entry.output) and not self.has(entry.name, entry.key):
