@@ -206,7 +206,7 @@ OUTPUTS = ("new", "new.png", "new.gif", "new.pfm")
 MOST_TOLD = 1500
 """Characters of what a case says."""
 LIMITS = ("--nofile=8", "--nofile=16", "--nofile=24", "--as=120000000", "--as=280000000", "--as=450000000",
-          "--data=200000000", "--fsize=0", "--fsize=100", "--stack=300000", "--cpu=600", "--memlock=0")  # fmt: skip
+          "--data=200000000", "--fsize=300", "--fsize=1000", "--stack=300000", "--cpu=600", "--memlock=0")  # fmt: skip
 
 
 def cases() -> Iterator[Case]:
