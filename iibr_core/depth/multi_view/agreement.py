@@ -35,8 +35,7 @@ def reconcile(
         is_confirmed = find_confirmed(maps, offsets, index, should_stop)
         if is_confirmed.any() and not is_confirmed.all():
             known = np.where(is_confirmed, values, np.float32(np.nan))
-            photo = np.nan_to_num(encoded_from_stored(colors), posinf=1.0)
-            values = fill_disparity_by_color(photo, known, should_stop)
+            values = fill_disparity_by_color(encoded_from_stored(colors), known, should_stop)
         reconciled.append(values)
         report_progress(len(reconciled), len(maps), "finding disparity")
     return reconciled

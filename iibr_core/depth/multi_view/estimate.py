@@ -185,8 +185,7 @@ def _fill_unseen(
     if not is_seen.any():
         return values
     known = np.where(is_seen, values, np.float32(np.nan))
-    photo = np.nan_to_num(encoded_from_stored(colors), posinf=1.0)
-    return fill_disparity_by_color(photo, known, should_stop)
+    return fill_disparity_by_color(encoded_from_stored(colors), known, should_stop)
 
 
 def _median(values: FloatImage, should_stop: ShouldStop) -> FloatImage:

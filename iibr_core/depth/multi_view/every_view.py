@@ -97,14 +97,11 @@ def _carry(
     nearest = sorted(maps, key=lambda other: hypot(*away(other)))[:CARRIED_FROM]
     with ViewSynthesis(should_stop) as synthesis:
         for other in nearest:
-            rays = rays_of_photo(_shown(views[other]), maps[other], max(map(abs, away(other))), 0, should_stop)
+            rays = rays_of_photo(
+                encoded_from_stored(views[other]), maps[other], max(map(abs, away(other))), 0, should_stop
+            )
             seen, _ = synthesis.render_seen(rays, away(other))
             np.copyto(carried, seen.disparity, where=np.isnan(carried) & ~seen.occluded)
     if np.isnan(carried).all():
         return maps[nearest[0]]
-    return fill_disparity_by_color(_shown(views[index]), carried, should_stop)
-
-
-def _shown(colors: StoredColors) -> FloatImage:
-    """Colours (H, W, 3), sRGB-encoded and finite."""
-    return np.nan_to_num(encoded_from_stored(colors), posinf=1.0)
+    return fill_disparity_by_color(encoded_from_stored(views[index]), carried, should_stop)

@@ -289,6 +289,17 @@ def test_parameters_that_do_not_fit(tmp_path, count):
         read_light_field(tmp_path / "lf")
 
 
+@pytest.mark.parametrize("name", ["disp_min", "disp_max"])
+def test_half_a_range_is_none(tmp_path, name):
+    write(tmp_path / "lf", updates())
+    parser = configparser.ConfigParser()
+    parser.read(tmp_path / "lf" / "parameters.cfg")
+    assert parser.remove_option("meta", name)
+    with (tmp_path / "lf" / "parameters.cfg").open("w") as file:
+        parser.write(file)
+    assert read_light_field(tmp_path / "lf")[0].range_px is None
+
+
 def test_parameters_that_are_none(tmp_path):
     write(tmp_path / "lf", updates())
     edit_parameters(tmp_path / "lf", "meta", disp_min="low", disp_max="nan", scene="100 % %(x)s".replace("%", "%%"))

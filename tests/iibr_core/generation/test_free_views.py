@@ -10,11 +10,12 @@ from iibr_core.generation.free_views import (
     MOST_BEYOND,
     MOST_PARALLAX,
     FreeViews,
+    fitted_cameras,
     inverse_depth_of,
     reach_of,
     steered,
 )
-from iibr_core.types import InputError
+from iibr_core.types import ImageSize, InputError
 from tests.iibr_core.rendering.test_free_view import about, camera, square_scene
 
 
@@ -77,6 +78,18 @@ def test_cameras_that_look_along_add_nothing():
     reach = reach_of(photo, [photo], (1.0, 3.0))
     assert reach.margins == (0, 0, 0, 0)
     assert reach.outer == ()
+
+
+def test_cameras_are_made_to_fit_a_smaller_photo_of_the_same_shape():
+    """Copies are rounded; another shape is another picture."""
+    given, other = camera(1000, 1200, focal=1500.0), camera(500, 800, focal=900.0)
+    first, second = fitted_cameras([given, other], 0, ImageSize(101, 120))
+    assert (first.size, second.size) == ((101, 120), (50, 80))
+    assert first.focal_px[0] == pytest.approx(150)
+    assert second.focal_px == (pytest.approx(90), pytest.approx(90))
+    for height in (97, 103):
+        with pytest.raises(InputError, match="is of pictures of 1200x1000, the photo is 120x"):
+            fitted_cameras([given, other], 0, ImageSize(height, 120))
 
 
 @pytest.mark.parametrize(("right", "down"), [(0.6, 0.0), (-1.0, 0.0), (0.0, 0.7), (0.5, -0.8)])

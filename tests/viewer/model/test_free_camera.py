@@ -50,6 +50,11 @@ def test_it_moves_from_where_it_is() -> None:
     assert state.free_camera == FreeCamera(None, 0.2, -0.1, 0.2)
 
 
+def test_before_a_photo_is_open_there_is_nothing_to_look_around_in() -> None:
+    for action in (MoveCamera(0.1), StepPose(1)):
+        assert reduce(AppState(), action).free_camera is None
+
+
 @pytest.mark.parametrize("value", [1e300, math.inf, math.nan, -math.inf, -5.0])
 def test_it_stays_within_its_limits(value: float) -> None:
     camera = reduce(opened(), MoveCamera(value, value, value)).free_camera

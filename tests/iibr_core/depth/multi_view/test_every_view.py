@@ -82,6 +82,19 @@ def test_views_without_any_texture_get_finite_maps():
     assert all(np.isfinite(values).all() for values in estimate_all(views, LINE, range_px))
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_carried_map_does_not_mind_wild_colours_of_hdr_views(value):
+    wall = (textured() / np.float16(255)).astype(np.float16)
+    views = [np.roll(wall, shift, axis=1) for shift in (2, 0, -2)]
+    for view in views:
+        view[10:14, 20:24] = value
+    maps = estimate_all(views, LINE, (-2.0, 3.0))
+    assert all(np.isfinite(values).all() for values in maps)
+    away = np.abs(maps[1] - 1.0)
+    away[6:18, 12:32] = 0
+    assert away[4:-4, 8:-8].max() < 0.1
+
+
 def test_agreement_brings_estimated_maps_nearer_to_the_truth():
     grid, size = GridShape(3, 3), ImageSize(96, 120)
     offsets = [ViewOffset(2 * t, 2 * s) for t, s in (grid.offset(*at) for at in np.ndindex(*grid))]
