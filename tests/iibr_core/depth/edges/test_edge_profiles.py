@@ -53,6 +53,13 @@ def test_a_walk_ends_where_the_ramp_does(slant, late):
     assert down[:2] == (5.0 + late, pytest.approx((20 - late) * slant))
 
 
+def test_shorter_steps_end_at_the_same_place():
+    for pace in (0.5, 2.5):
+        found = walk(ramp(20.0, 30.0), 25.0, 4.0, 1.0, 0.0, 1, 20, pace, 9.0)
+        assert found[:2] == (5.0, pytest.approx(1))
+        assert found[3] == pytest.approx(0.1, abs=1e-6)
+
+
 def test_a_walk_goes_no_farther_than_told_and_ends_where_it_falls():
     steady = ramp(0.0, 59.0)
     assert walk(steady, 20.0, 4.0, 1.0, 0.0, 1, 7, 1.0, 99.0)[0] == 7
