@@ -49,7 +49,7 @@ PREDICTED = (
     ((700, 900), "export PHOTO --grid 7 --to gif --frames 6 -o OUT.gif"),
     ((1200, 1000), "export PHOTO --grid 3 --to sbs -o OUT.png"),
     ((2450, 3650), "screenshot PHOTO --full --grid 3 --max-pixels 600000 --view 1,0.5 -o OUT.png"),
-    ((4000, 6000), "screenshot PHOTO --full --view 0,0 -o OUT.png"),
+    ((4000, 6000), "screenshot PHOTO --full --max-pixels 400000 --view 0,0 -o OUT.png"),
 )
 """(height, width) of a photo, and what is done with it. The constants of `memory_model` were compared with other cases:
 1, 2, 6 and 12 MP, grids of 3, 5 and 9, with one step of disparity.
