@@ -153,6 +153,15 @@ class User:
         self.do(ResetOptics(), StepPhoto(1 - len(SIZES) if last else 1))
         self.until(self.is_open)
 
+    def go_back(self) -> None:
+        """The first photo as it was opened, nothing else looked at."""
+        source = self.app.state.source
+        assert source is not None
+        first = replace(source, path=str(Path(source.path).with_name("photo0.png")), grid=None)
+        self.do(SetOverlay(None), Compare(None), ShowEpis(False), ShowGrid(False), SetZoom(None))
+        self.do(ResetOptics(), SetGloss(None), OpenPath(first))
+        self.until(self.is_open)
+
     def change_grid(self) -> None:
         """More views, or fewer."""
         source = self.app.state.source
@@ -233,6 +242,9 @@ def take_steps(user: User, steps: int) -> None:
         if number in (RESTS_AFTER, steps):
             user.until(user.is_resting, REST_S)
             tell(f"{number} actions, at rest")
+            user.go_back()
+            user.until(user.is_resting, REST_S)
+            tell(f"{number} actions, back at the first photo")
 
 
 def print_frames(frames: list[tuple[float, float, str]]) -> None:
