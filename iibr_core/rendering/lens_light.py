@@ -75,9 +75,9 @@ def largest_tile(size: ImageSize, lens: LargeLens, disparity_px: float) -> Image
     px of it per view step.
     """
     views = max([1.0, *(abs(axis) for offset in lens.offsets for axis in offset)])
-    around_px = AROUND_PX + math.ceil(views * disparity_px)
+    around_px = AROUND_PX + math.ceil(min(max(size), abs(views * disparity_px)))
     if lens.share > 0:
-        around_px += math.ceil(_moved_px(lens)) + TAPS
+        around_px += math.ceil(min(max(size), _moved_px(lens))) + TAPS
     return ImageSize(*(min(side, TILE_PX + 2 * around_px) for side in size))
 
 

@@ -411,6 +411,9 @@ FINITE = {
     "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
         image(0.5), known(v), 0.5
     )[:2],
+    "rendering.lens_light.largest_tile": lambda v, _: lens_light.largest_tile(
+        ImageSize(8, 8), lens_light.LargeLens(share=0.5, focus=v), v
+    ),
     "rendering.lens_light.draw_large": lambda v, _: large_picture(v),
     "rendering.specks.measure_detail": lambda v, _: specks.measure_detail(image(v)),
     "rendering.specks.without_specks": lambda v, _: settled(v),
@@ -638,7 +641,7 @@ READS_OR_TELLS = {
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
     "require_dense_field "
-    "require_own_size require_free_views require_matching mebibytes",
+    "require_own_size require_free_views require_matching mebibytes Making making_bytes own_size_bytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands pieces_of",
     "depth.search": "estimator_of read_shown_photo",
