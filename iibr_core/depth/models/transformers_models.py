@@ -18,7 +18,7 @@ from iibr_core.color import photo_in_srgb
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
-from iibr_core.depth.models.config import Preparation, read_config, read_preparation
+from iibr_core.depth.models.config import Preparation, input_size, read_config, read_preparation
 from iibr_core.depth.models.download import require_unchanged
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.maps.resample import resample_surfaces
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 ACTIVATION_BYTES = 1500
 """For each pixel of the input of a model of USUAL_WIDTH; measured: 1,060 with Depth Anything V2 Small at 686x518."""
 USUAL_WIDTH = 384
-
-MAX_AREA_GROWTH = 2.5
-"""A long photo's input may hold this many times the pixels that the model was made for; time grows with its square."""
 
 PICKLED = ("*.bin", "*.pt", "*.pth", "*.ckpt")
 INVERSE_LIMITS = (1e-4, 1e4)
@@ -111,27 +108,6 @@ def _input_of(model: LocalModel, size: ImageSize, memory_bytes: int) -> _Input:
             "--memory or choose a smaller model"
         )
     return _Input(preparation, preparation.size if is_fixed else input_size(preparation, size, pixels))
-
-
-def input_size(preparation: Preparation, size: ImageSize, max_pixels: float) -> ImageSize:
-    """(height, width) that a photo is made for its model: as the model asks for, unless that exceeds max_pixels.
-
-    The side that has to change least meets the model's size (as the library's own preparation chooses it).
-    """
-    height, width = size
-    asked_height, asked_width = preparation.size
-    scale_y, scale_x = asked_height / height, asked_width / width
-    if preparation.keeps_aspect:
-        scale_y = scale_x = scale_x if abs(1 - scale_x) < abs(1 - scale_y) else scale_y
-    limit = min(max_pixels, MAX_AREA_GROWTH * asked_height * asked_width)
-    shrink = min(1.0, math.sqrt(limit / (scale_y * height * scale_x * width)))
-    rounded = round if shrink == 1 else math.floor
-    sides = (scale_y * height * shrink, scale_x * width * shrink)
-    multiple = preparation.multiple
-    # Two patches at least: networks halve what they see once more.
-    tall, wide = (max(rounded(side / multiple), 2) * multiple for side in sides)
-    longest = max(2, int(limit / min(tall, wide)) // multiple) * multiple
-    return ImageSize(min(tall, longest), min(wide, longest))
 
 
 def _width_of(config: dict[str, Any]) -> int:

@@ -19,9 +19,9 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import KNOWN_MODELS, LocalModel, cached_folder, fetch, known_model, model_to_use
-from iibr_core.depth.models.config import Preparation, read_preparation
+from iibr_core.depth.models.config import Preparation, input_size, read_preparation
 from iibr_core.depth.models.download import VERIFIED
-from iibr_core.depth.models.transformers_models import estimate_with, input_size
+from iibr_core.depth.models.transformers_models import estimate_with
 from iibr_core.depth.search import estimator_of, open_with_depth
 from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled

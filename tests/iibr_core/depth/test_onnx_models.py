@@ -1,0 +1,251 @@
+"""Depth by ONNX Runtime: graphs whose output is a known function of the input, and the real architecture."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import threading
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import torch
+import transformers
+from onnx import TensorProto, helper, numpy_helper
+
+from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
+from iibr_core.depth.models.onnx_models import USUAL_PREPARATION, input_for, network_input, run_onnx
+from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.types import FloatImage, ImageSize, InputError
+
+BUDGET = 2**30
+MEAN, DEVIATION = (np.array(v, np.float32) for v in (USUAL_PREPARATION.mean, USUAL_PREPARATION.std))
+
+
+def weighing(file: Path, weights: tuple[float, float, float], fixed: ImageSize | None = None) -> Path:
+    """A graph whose output is the weighted sum of the input's channels, (N, H, W)."""
+    sides: list[int | str] = ["height", "width"] if fixed is None else [*fixed]
+    nodes = [
+        helper.make_node("Conv", ["pixel_values", "weights"], ["sum"]),
+        helper.make_node("Squeeze", ["sum", "axis"], ["predicted_depth"]),
+    ]
+    constants = [
+        numpy_helper.from_array(np.array(weights, np.float32).reshape(1, 3, 1, 1), "weights"),
+        numpy_helper.from_array(np.array([1]), "axis"),
+    ]
+    graph = helper.make_graph(
+        nodes,
+        "weighing",
+        [helper.make_tensor_value_info("pixel_values", TensorProto.FLOAT, ["batch", 3, *sides])],
+        [helper.make_tensor_value_info("predicted_depth", TensorProto.FLOAT, ["batch", *sides])],
+        constants,
+    )
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=10), file)
+    return file
+
+
+def smooth_photo(size: ImageSize) -> FloatImage:
+    """Channels that tell top from bottom, left from right, and each other."""
+    y, x = np.indices(size, np.float32) / np.array(size, np.float32)[:, None, None]
+    return np.stack([0.2 + 0.5 * x, 0.1 + 0.6 * y, 0.3 + 0.2 * x * y], axis=2).astype(np.float32)
+
+
+def estimate(file: Path, pixels: FloatImage) -> RelativeInverseDepth | MetricDepth:
+    found = run_onnx(file, pixels, input_for(file, ImageSize(*pixels.shape[:2]), BUDGET), never)
+    assert isinstance(found, RelativeInverseDepth | MetricDepth)
+    return found
+
+
+@pytest.mark.parametrize("channel", range(3))
+def test_orientation_colour_order_and_normalisation(tmp_path: Path, channel: int) -> None:
+    weights = tuple(float(c == channel) for c in range(3))
+    pixels = smooth_photo(ImageSize(518, 518))  # the size of the input: nothing is resized
+    found = estimate(weighing(tmp_path / "model.onnx", weights), pixels)
+    assert isinstance(found, RelativeInverseDepth)
+    expected = (pixels[..., channel] - MEAN[channel]) / DEVIATION[channel]
+    np.testing.assert_allclose(found.values, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize(("height", "width"), [(900, 1500), (777, 401), (1, 1), (518, 5000), (4, 900)])
+def test_sides_are_multiples_of_14_near_the_photos_aspect(tmp_path: Path, height: int, width: int) -> None:
+    wanted = input_for(weighing(tmp_path / "model.onnx", (1, 0, 0)), ImageSize(height, width), BUDGET).size
+    assert all(side % 14 == 0 and side >= 28 for side in wanted)
+    if max(height, width) < 2.5 * min(height, width):
+        assert abs(wanted.width / wanted.height / (width / height) - 1) < 0.05
+        assert abs(min(wanted) - 518) <= 14
+
+
+def test_a_resized_photo_keeps_its_places(tmp_path: Path) -> None:
+    """Linear in x and y, cubic resizing gives the value at each new pixel's centre, but for the frame."""
+    size, pixels = ImageSize(700, 900), smooth_photo(ImageSize(700, 900))
+    file = weighing(tmp_path / "model.onnx", (0, 1, 0))
+    wanted = input_for(file, size, BUDGET).size
+    found = estimate(file, pixels)
+    assert isinstance(found, RelativeInverseDepth)
+    assert found.values.shape == wanted
+    rows = ((np.arange(wanted.height) + 0.5) * size.height / wanted.height - 0.5) / size.height
+    expected = (0.1 + 0.6 * rows - MEAN[1]) / DEVIATION[1]
+    inside = slice(4, -4)
+    np.testing.assert_allclose(found.values[inside, 100], expected[inside], atol=1e-4)
+
+
+def test_a_fixed_input_size_is_kept(tmp_path: Path) -> None:
+    file = weighing(tmp_path / "model.onnx", (1, 0, 0), ImageSize(56, 70))
+    found = estimate(file, smooth_photo(ImageSize(90, 200)))
+    assert isinstance(found, RelativeInverseDepth)
+    assert found.values.shape == (56, 70)
+
+
+def test_settings_beside_the_file_count(tmp_path: Path) -> None:
+    (tmp_path / "onnx").mkdir()
+    file = weighing(tmp_path / "onnx" / "model.onnx", (1, 0, 0))
+    preparation = {"size": 28, "image_mean": [0, 0, 0], "image_std": [0.5, 1, 1], "ensure_multiple_of": 14}
+    (tmp_path / "preprocessor_config.json").write_text(json.dumps(preparation))
+    (tmp_path / "config.json").write_text(json.dumps({"depth_estimation_type": "metric"}))
+    pixels = smooth_photo(ImageSize(28, 28))
+    found = estimate(file, pixels)
+    assert isinstance(found, MetricDepth)
+    np.testing.assert_allclose(found.metres, pixels[..., 0] / 0.5, atol=1e-4)
+
+
+def test_the_input_fits_the_memory(tmp_path: Path) -> None:
+    file = weighing(tmp_path / "model.onnx", (1, 0, 0))
+    size = ImageSize(1000, 1000)
+    small = input_for(file, size, 100 * 2**20).size
+    assert small.height * small.width * 1000 < 100 * 2**20
+    with pytest.raises(InputError, match="raise --memory"):
+        input_for(file, size, 2**20)
+
+
+def test_hdr_and_nan_free_input() -> None:
+    pixels = np.full((30, 30, 3), 1e30, np.float32)
+    values = network_input(pixels, USUAL_PREPARATION, ImageSize(28, 28))
+    np.testing.assert_allclose(values[0, :, 14, 14], (1 - MEAN) / DEVIATION, rtol=1e-5)
+
+
+@pytest.mark.parametrize("damage", ["text", "cut", "empty", "three inputs", "vector"])
+def test_what_is_no_depth_model_is_refused_in_one_line(tmp_path: Path, damage: str) -> None:
+    file = weighing(tmp_path / "model.onnx", (1, 0, 0))
+    if damage == "text":
+        file.write_text("no model")
+    elif damage == "cut":
+        file.write_bytes(file.read_bytes()[:90])
+    elif damage == "empty":
+        file.write_bytes(b"")
+    else:
+        vector = helper.make_tensor_value_info("v", TensorProto.FLOAT, [3])
+        out = helper.make_tensor_value_info("o", TensorProto.FLOAT, [3])
+        graph = helper.make_graph([helper.make_node("Identity", ["v"], ["o"])], "g", [vector], [out])
+        onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=10), file)
+    with pytest.raises(InputError, match=r"model\.onnx") as caught:
+        estimate(file, smooth_photo(ImageSize(40, 50)))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_running_estimate_can_be_stopped(tmp_path: Path) -> None:
+    """The graph loops practically for ever: only stopping ends it."""
+    file = tmp_path / "model.onnx"
+    body = helper.make_graph(
+        [helper.make_node("Identity", ["go_in"], ["go_out"]), helper.make_node("Relu", ["x_in"], ["x_out"])],
+        "body",
+        [
+            helper.make_tensor_value_info("i", TensorProto.INT64, []),
+            helper.make_tensor_value_info("go_in", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("x_in", TensorProto.FLOAT, None),
+        ],
+        [
+            helper.make_tensor_value_info("go_out", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("x_out", TensorProto.FLOAT, None),
+        ],
+    )
+    sides = ["batch", 3, "height", "width"]
+    graph = helper.make_graph(
+        [helper.make_node("Loop", ["count", "go", "pixel_values"], ["predicted_depth"], body=body)],
+        "endless",
+        [helper.make_tensor_value_info("pixel_values", TensorProto.FLOAT, sides)],
+        [helper.make_tensor_value_info("predicted_depth", TensorProto.FLOAT, sides)],
+        [numpy_helper.from_array(np.array(2**62), "count"), numpy_helper.from_array(np.array(True), "go")],
+    )
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=10), file)
+    pixels, asked = smooth_photo(ImageSize(30, 30)), threading.Event()
+
+    def should_stop() -> bool:
+        """The second time it is asked, the graph runs."""
+        was_asked = asked.is_set()
+        asked.set()
+        return was_asked
+
+    with pytest.raises(Cancelled):
+        run_onnx(file, pixels, input_for(file, ImageSize(30, 30), BUDGET), should_stop)
+
+
+@pytest.fixture(scope="module")
+def depth_anything(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, torch.nn.Module]:
+    """Depth Anything V2's architecture, small, with random weights, as its library builds and torch exports it."""
+    backbone = transformers.Dinov2Config(
+        hidden_size=32,
+        num_hidden_layers=4,
+        num_attention_heads=2,
+        image_size=56,
+        patch_size=14,
+        out_indices=[1, 2, 3, 4],
+        reshape_hidden_states=False,
+    )
+    config = transformers.DepthAnythingConfig(
+        backbone_config=backbone,
+        reassemble_hidden_size=32,
+        neck_hidden_sizes=[8, 8, 8, 8],
+        fusion_hidden_size=8,
+        head_hidden_size=8,
+    )
+    torch.manual_seed(0)
+    network = transformers.DepthAnythingForDepthEstimation(config).eval()
+    with torch.no_grad():
+        for weights in network.parameters():
+            if weights.ndim > 1:
+                weights.normal_(0, weights[0].numel() ** -0.5)
+        network.head.conv3.bias += 1
+    file = tmp_path_factory.mktemp("model") / "model.onnx"
+    torch.onnx.export(
+        WithSymbolicSize(network).eval(),
+        (torch.zeros(1, 3, 56, 84),),
+        file,
+        dynamo=False,
+        input_names=["pixel_values"],
+        output_names=["predicted_depth"],
+        dynamic_axes={"pixel_values": {2: "rows", 3: "columns"}},
+    )
+    return file, network
+
+
+class WithSymbolicSize(torch.nn.Module):
+    """The network, its head's last steps repeated without `int()`, which would fix the exported size."""
+
+    def __init__(self, network: torch.nn.Module) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, pixel_values: torch.Tensor) -> torch.Tensor:
+        network, (rows, columns) = self.network, (side // 14 for side in pixel_values.shape[2:])
+        features = network.backbone.forward_with_filtered_kwargs(pixel_values).feature_maps
+        head, hidden = network.head, network.neck(features, rows, columns)[network.head.head_in_index]
+        hidden = torch.nn.functional.interpolate(
+            head.conv1(hidden), (rows * 14, columns * 14), mode="bilinear", align_corners=True
+        )
+        return head.activation2(head.conv3(head.activation1(head.conv2(hidden)))).squeeze(1) * head.max_depth
+
+
+@pytest.mark.parametrize(("height", "width"), [(56, 84), (84, 56), (140, 98)])
+def test_the_architecture_gives_what_its_library_gives(
+    depth_anything: tuple[Path, torch.nn.Module], height: int, width: int
+) -> None:
+    file, network = depth_anything
+    pixels = smooth_photo(ImageSize(height, width))
+    wanted = dataclasses.replace(input_for(file, ImageSize(height, width), BUDGET), size=ImageSize(height, width))
+    with torch.inference_mode():
+        values = torch.from_numpy(network_input(pixels, USUAL_PREPARATION, wanted.size))
+        expected = network(pixel_values=values).predicted_depth[0].numpy()
+    found = run_onnx(file, pixels, wanted, never)
+    assert isinstance(found, RelativeInverseDepth)
+    np.testing.assert_allclose(found.values, expected, atol=1e-4 * np.ptp(expected))
