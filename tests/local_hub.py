@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-LARGE = ".safetensors"
-"""Files of this ending are kept apart from git there, and known by their SHA-256."""
+LARGE = (".safetensors", ".onnx")
+"""Files of these endings are kept apart from git there, and known by their SHA-256."""
 
 
 class Hub(ThreadingHTTPServer):

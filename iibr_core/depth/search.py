@@ -144,7 +144,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
 
     def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
         from iibr_core.depth.models.catalog import model_to_use
-        from iibr_core.depth.models.transformers_models import estimate_with
+        from iibr_core.depth.models.estimate import estimate_with
 
         model = model_to_use(choice)
         if model is None:
@@ -228,7 +228,7 @@ class _DepthSearch:
         model = model_to_use(self.choice)
         if model is None:
             return None
-        from iibr_core.depth.models.transformers_models import estimate_with
+        from iibr_core.depth.models.estimate import estimate_with
 
         self.go_on()
         estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)

@@ -32,7 +32,7 @@ def list_models(context: typer.Context) -> None:
     for model in KNOWN_MODELS:
         size = f"{model.megabytes:,} MB"
         print(f"{model.name:{names}}  {size:>8}  {_state(model):12}  {model.licence}")
-    print("Get one: iibr models get NAME. Use one: --depth-model NAME, or --depth-model FOLDER for any other.")
+    print("Get one: iibr models get NAME. Use one: --depth-model NAME; any other: --depth-model FILE.onnx, or FOLDER.")
 
 
 @models.command()

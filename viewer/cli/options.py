@@ -229,7 +229,7 @@ DepthModel = Annotated[
     str | None,
     typer.Option(
         "--depth-model",
-        metavar="FOLDER|NAME",
+        metavar="FOLDER|FILE.onnx|NAME",
         help="Trained model for photos without depth, see `iibr models`.",
         show_default="the usual one, if it is there",
     ),

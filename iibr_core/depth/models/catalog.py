@@ -1,6 +1,6 @@
-"""Depth models by name: what there is to be had, what lies on this machine, and how to fetch one. Loads no model.
+"""Depth models by name: published ones, those on this machine, and how to download one. Loads no model.
 
-Only safetensors files are ever fetched or read: pickled weights run code.
+Only ONNX and safetensors files are downloaded or read: pickled weights run code.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from iibr_core.runtime.extras import is_installed
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, ReportProgress
 
-TRANSFORMERS = "transformers"
+ONNX, TRANSFORMERS = "onnxruntime", "transformers"
 INSTALL_HINT = "pip install 'iibr[depth]'"
 INSTALLS = {
+    ONNX: "use Python 3.11 to 3.14, later ones have no package of it yet",
     "depth_anything_3": "pip install depth-anything-3",
     "unidepth": "follow github.com/lpiccinelli-eth/UniDepth",
 }
@@ -29,7 +30,7 @@ INSTALLS = {
 @dataclass(frozen=True)
 class KnownModel:
     """A published model. repository: on the Hugging Face hub; commit: of it, in full: no other is downloaded.
-    megabytes: of its weights, about. package: that runs it, as Python imports it.
+    megabytes: of its weights, about. package: that runs it, as Python imports it. files: what is downloaded of it.
     """
 
     name: str
@@ -39,6 +40,7 @@ class KnownModel:
     megabytes: int
     licence: str
     package: str = TRANSFORMERS
+    files: tuple[str, ...] = ("*.json", "*.safetensors")
 
     @property
     def install(self) -> str:
@@ -46,17 +48,18 @@ class KnownModel:
         return INSTALLS.get(self.package, INSTALL_HINT)
 
 
-FILES = ("*.json", "*.safetensors")
 USUAL_MODEL = "depth-anything-v2-small"
 
 KNOWN_MODELS = (
     KnownModel(
         "depth-anything-v2-small",
         "Depth Anything V2 Small",
-        "depth-anything/Depth-Anything-V2-Small-hf",
-        "5426e4f0f36572d16453bbda7a8389317b1bef99",
+        "onnx-community/depth-anything-v2-small",
+        "64fe43eba7f8a384b02fe3fadaa26cbba35548d8",
         99,
         "Apache-2.0",
+        ONNX,
+        ("config.json", "preprocessor_config.json", "onnx/model.onnx"),
     ),
     KnownModel(
         "depth-anything-v2-base",
@@ -129,11 +132,17 @@ KNOWN_MODELS = (
 
 @dataclass(frozen=True)
 class LocalModel:
-    """A model on this machine. package: the Python package that runs it."""
+    """A model on this machine. package: the Python package that runs it. file: the ONNX file, None for other models."""
 
     title: str
     folder: Path
     package: str = TRANSFORMERS
+    file: Path | None = None
+
+    @property
+    def weights(self) -> tuple[Path, ...]:
+        """The files of its weights, in order of their names."""
+        return (self.file,) if self.file is not None else tuple(weight_files(self.folder))
 
 
 def known_model(name: str) -> KnownModel:
@@ -146,7 +155,8 @@ def known_model(name: str) -> KnownModel:
 
 
 def model_to_use(choice: DepthChoice) -> LocalModel | None:
-    """The model that the user wants (a folder or a known name), else the usual one if it is ready, else None.
+    """The model that the user wants (a folder, an ONNX file or a known name), else the usual one if it is ready, else
+    None.
 
     Raises InputError where what is wanted is not here, or the package that runs it is not installed.
     """
@@ -156,12 +166,19 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
         folder = cached_folder(usual) if lacking_package(usual.package) is None else None
         if folder is None and choice.asks_for_model:
             raise InputError(f"--depth model: none is on this machine; get one with: iibr models get {USUAL_MODEL}")
-        return LocalModel(usual.title, folder, usual.package) if folder is not None else None
+        return _local(usual.title, folder, usual.package) if folder is not None else None
     path = Path(os.path.expanduser(wanted))
     if is_folder(path):
         return _model_in(path)
+    if is_file(path) and path.suffix == ".onnx":
+        _require_installed(wanted, ONNX)
+        # The hub lays the settings of ONNX models out in the folder above.
+        folder = path.parent.parent if path.parent.name == "onnx" else path.parent
+        return LocalModel(f"the model {path.name}", folder, ONNX, path)
     if is_file(path):
-        raise InputError(f"{wanted}: is a file; --depth-model takes the model's folder, or a name `iibr models` lists")
+        raise InputError(
+            f"{wanted}: is no ONNX file; --depth-model takes one, a model's folder, or a name `iibr models` lists"
+        )
     if "/" in wanted or "\\" in wanted:
         raise InputError(f"{wanted}: no such folder")
     model = known_model(wanted)
@@ -169,12 +186,18 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
     folder = cached_folder(model)
     if folder is None:
         raise InputError(f"{wanted} is not on this machine; get it with: iibr models get {wanted}")
-    return LocalModel(model.title, folder, model.package)
+    return _local(model.title, folder, model.package)
+
+
+def _local(title: str, folder: Path, package: str) -> LocalModel:
+    """Raises InputError where an ONNX model's folder leaves open which file is meant."""
+    return LocalModel(title, folder, package, onnx_file(folder) if package == ONNX else None)
 
 
 def lacking_package(package: str) -> str | None:
-    """Which of the packages that a model runs on is not installed, its own or torch; None where both are."""
-    return next((name for name in (package, "torch") if not is_installed(name)), None)
+    """Which of the packages that a model runs on is not installed, its own or torch; None where none is missing."""
+    packages = (package,) if package == ONNX else (package, "torch")
+    return next((name for name in packages if not is_installed(name)), None)
 
 
 def cached_folder(model: KnownModel) -> Path | None:
@@ -184,8 +207,19 @@ def cached_folder(model: KnownModel) -> Path | None:
 
 
 def weight_files(folder: Path) -> Iterator[Path]:
-    """The safetensors files of a model folder, in order of their names."""
-    yield from sorted(folder.glob("*.safetensors"))
+    """The safetensors and ONNX files of a model folder, each kind in order of their names."""
+    for pattern in ("*.safetensors", "*.onnx", "onnx/*.onnx"):
+        yield from sorted(folder.glob(pattern))
+
+
+def onnx_file(folder: Path) -> Path:
+    """The one ONNX file of a model folder, `model.onnx` where there are several. Raises InputError for any other."""
+    files = [path for path in weight_files(folder) if path.suffix == ".onnx"]
+    full = [path for path in files if path.name == "model.onnx"]
+    if len(files) != 1 and len(full) != 1:
+        names = ", ".join(path.name for path in files[:3]) or "none"
+        raise InputError(f"{folder}: which ONNX file is meant ({names})? Name it with --depth-model {folder}/FILE.onnx")
+    return (full or files)[0]
 
 
 def bytes_of(folder: Path) -> int:
@@ -196,23 +230,22 @@ def bytes_of(folder: Path) -> int:
 def fetch(model: KnownModel, report_progress: ReportProgress | None = None, should_stop: ShouldStop = never) -> Path:
     """Download a model into the local Hugging Face cache. Returns its folder, named by the commit.
 
-    Raises as `download` does, and InputError where its weights are no safetensors.
+    Raises as `download` does, and InputError where its weights are neither ONNX nor safetensors.
     """
-    if not is_installed("huggingface_hub"):
-        raise InputError(f"downloading needs the package huggingface_hub: {INSTALL_HINT}")
-    folder = download(model.repository, model.commit, FILES, report_progress, should_stop)
+    folder = download(model.repository, model.commit, model.files, report_progress, should_stop)
     if not any(weight_files(folder)):
-        raise InputError(f"{model.repository} publishes no safetensors weights; pickled ones are not taken")
+        raise InputError(f"{model.repository} publishes no ONNX or safetensors weights; pickled ones are not taken")
     return folder
 
 
 def _model_in(folder: Path) -> LocalModel:
-    """The model in a user's folder. Which package runs it stands in its config.json."""
+    """The model in a user's folder: ONNX where it holds such files alone, else what its config.json says."""
     from iibr_core.depth.models.config import package_for, read_config
 
-    package = package_for(read_config(folder))
+    is_onnx = {path.suffix for path in weight_files(folder)} == {".onnx"}
+    package = ONNX if is_onnx else package_for(read_config(folder))
     _require_installed(str(folder), package)
-    return LocalModel(f"the model in {folder.name or folder}", folder, package)
+    return _local(f"the model in {folder.name or folder}", folder, package)
 
 
 def _require_installed(what: str, package: str) -> None:

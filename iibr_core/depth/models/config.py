@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from iibr_core.depth.models.preparation import Preparation
 from iibr_core.formats.files import is_file, printable, read_text
 from iibr_core.types import ImageSize, InputError
 
@@ -19,24 +19,6 @@ TRANSFORMERS_KINDS = ("depth_anything", "depth_pro", "dpt", "zoedepth")
 USUAL_SIZE = {"depth_anything": (518, 518), "depth_pro": (1536, 1536), "dpt": (384, 384), "zoedepth": (384, 512)}
 USUAL_MULTIPLE = {"depth_anything": 14, "zoedepth": 32}
 KEEPS_ASPECT = ("depth_anything", "zoedepth")
-MAX_AREA_GROWTH = 2.5
-"""A long photo's input may hold this many times the pixels that the model was made for; time grows with its square."""
-
-
-@dataclass(frozen=True)
-class Preparation:
-    """How a photo becomes a model's input.
-
-    size: (height, width) it is made; keeps_aspect: then only one of the two is met. multiple: both sides are multiples
-    of it. pads: whether mirrored borders are added first (ZoeDepth). mean, std: of each channel, 0..1.
-    """
-
-    size: ImageSize
-    keeps_aspect: bool
-    multiple: int
-    pads: bool
-    mean: tuple[float, ...]
-    std: tuple[float, ...]
 
 
 def read_config(folder: Path) -> dict[str, Any]:
@@ -100,27 +82,6 @@ def _backbone_elsewhere(config: dict[str, Any]) -> str:
         return _backbone_elsewhere(inner)
     name = config.get("backbone")
     return name if isinstance(name, str) else ""
-
-
-def input_size(preparation: Preparation, size: ImageSize, max_pixels: float) -> ImageSize:
-    """(height, width) that a photo is made for its model: as the model asks for, unless that exceeds max_pixels.
-
-    The side that has to change least meets the model's size (as the library's own preparation chooses it).
-    """
-    height, width = size
-    asked_height, asked_width = preparation.size
-    scale_y, scale_x = asked_height / height, asked_width / width
-    if preparation.keeps_aspect:
-        scale_y = scale_x = scale_x if abs(1 - scale_x) < abs(1 - scale_y) else scale_y
-    limit = min(max_pixels, MAX_AREA_GROWTH * asked_height * asked_width)
-    shrink = min(1.0, math.sqrt(limit / (scale_y * height * scale_x * width)))
-    rounded = round if shrink == 1 else math.floor
-    sides = (scale_y * height * shrink, scale_x * width * shrink)
-    multiple = preparation.multiple
-    # Two patches at least: networks halve what they see once more.
-    tall, wide = (max(rounded(side / multiple), 2) * multiple for side in sides)
-    longest = max(2, int(limit / min(tall, wide)) // multiple) * multiple
-    return ImageSize(min(tall, longest), min(wide, longest))
 
 
 def _json_object(folder: Path, name: str) -> dict[str, Any]:

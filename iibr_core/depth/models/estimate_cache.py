@@ -10,13 +10,12 @@ import hashlib
 import os
 import zipfile
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models.catalog import weight_files
-from iibr_core.depth.models.config import CONFIG, PREPROCESSOR
 from iibr_core.formats.maps import npy
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import FloatImage, InputError
@@ -41,12 +40,14 @@ def cache_folder() -> Path:
     return user_cache_path("iibr", appauthor=False) / "depth"
 
 
-def key_of(pixels: FloatImage, model_folder: Path, options: str) -> str:
-    """A name for what a model makes of a picture: the same for the same contents, wherever they lie."""
+def key_of(pixels: FloatImage, files: Iterable[Path], options: str) -> str:
+    """A name for what a model makes of a picture: the same for the same contents, wherever they lie. files: all that
+    the model is read from; those that are missing count as such.
+    """
     digest = hashlib.blake2b(digest_size=20)
     digest.update(f"{FORMAT} {pixels.shape} {options} ".encode())
     digest.update(np.ascontiguousarray(pixels).data)
-    for path in (model_folder / CONFIG, model_folder / PREPROCESSOR, *weight_files(model_folder)):
+    for path in files:
         with contextlib.suppress(OSError), path.open("rb") as file:
             digest.update(os.fsencode(path.name))
             digest.update(hashlib.file_digest(file, "blake2b").digest())

@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models.config import CONFIG, PREPROCESSOR, Preparation, input_size, read_config, read_preparation
+from iibr_core.depth.models.catalog import LocalModel
+from iibr_core.depth.models.config import CONFIG, PREPROCESSOR, read_config, read_preparation
+from iibr_core.depth.models.preparation import Preparation, input_size, network_input
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.tiling import Cancelled, ShouldStop
-from iibr_core.types import FloatImage, ImageSize, InputError
+from iibr_core.types import ImageSize, InputError, Photo, ReportProgress
 
 KIND = "depth_anything"
 USUAL_PREPARATION = Preparation(ImageSize(518, 518), True, 14, False, (0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
@@ -38,9 +40,9 @@ class OnnxInput:
     is_metric: bool
 
 
-def input_for(file: Path, size: ImageSize, memory_bytes: int) -> OnnxInput:
+def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> OnnxInput:
     """The input for a photo of (height, width). Raises InputError where the memory is too small for any."""
-    folder = _folder_of_settings(file)
+    file, folder = _file_of(model), model.folder
     preparation = read_preparation(folder, KIND) if is_file(folder / PREPROCESSOR) else USUAL_PREPARATION
     is_metric = is_file(folder / CONFIG) and read_config(folder).get("depth_estimation_type") == "metric"
     pixels = (memory_bytes - file.stat().st_size) / ACTIVATION_BYTES
@@ -54,15 +56,19 @@ def input_for(file: Path, size: ImageSize, memory_bytes: int) -> OnnxInput:
     return OnnxInput(preparation, input_size(preparation, size, pixels), is_metric)
 
 
-def run_onnx(file: Path, pixels: FloatImage, wanted: OnnxInput, should_stop: ShouldStop) -> Estimate:
-    """Depth from an ONNX model, at the size of its output; non-finite values as they come.
+def run_onnx(
+    model: LocalModel, wanted: OnnxInput, photo: Photo, should_stop: ShouldStop, report_progress: ReportProgress
+) -> Estimate:
+    """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
 
-    pixels: (H, W, 3), sRGB, 0..1; cut off outside. Raises InputError where the file is no depth model, Cancelled once
-    should_stop is true.
+    Raises InputError where the file is no depth model, Cancelled once should_stop is true.
     """
+    file = _file_of(model)
+    report_progress(0, 0, f"loading {model.title}")
     session = _open(file)
     name, size, number_type = _input_of(session, file)
-    values = network_input(pixels, wanted.preparation, size or wanted.size).astype(number_type)
+    values = network_input(photo.pixels, wanted.preparation, size or wanted.size).astype(number_type)
+    report_progress(0, 0, f"estimating depth with {model.title}")
     output = _run(session, file, {name: values}, should_stop)
     depth = np.asarray(output, np.float32)
     depth = depth[:, 0] if depth.ndim == 4 and depth.shape[1] == 1 else depth
@@ -71,22 +77,9 @@ def run_onnx(file: Path, pixels: FloatImage, wanted: OnnxInput, should_stop: Sho
     return MetricDepth(depth[0]) if wanted.is_metric else RelativeInverseDepth(depth[0])
 
 
-def network_input(pixels: FloatImage, preparation: Preparation, size: ImageSize) -> FloatImage:
-    """(1, 3, height, width) float32: resized by an antialiased cubic kernel, then normalised channel by channel."""
-    from PIL import Image
-
-    planes = np.empty((1, 3, *size), np.float32)
-    for c, (mean, deviation) in enumerate(zip(preparation.mean, preparation.std)):
-        plane = Image.fromarray(np.clip(pixels[..., c], 0, 1).astype(np.float32))
-        resized = np.asarray(plane.resize((size.width, size.height), Image.Resampling.BICUBIC))
-        planes[0, c] = (resized - mean) / deviation
-    return planes
-
-
-def _folder_of_settings(file: Path) -> Path:
-    """The folder of the JSON files: the file's own, or the one above, as the Hugging Face hub lays ONNX models out."""
-    has_settings = any(is_file(file.parent / name) for name in (CONFIG, PREPROCESSOR))
-    return file.parent if has_settings or file.parent.name != "onnx" else file.parent.parent
+def _file_of(model: LocalModel) -> Path:
+    assert model.file is not None
+    return model.file
 
 
 def _open(file: Path) -> Any:

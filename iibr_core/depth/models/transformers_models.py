@@ -1,5 +1,4 @@
-"""Depth by a trained model: a photo in, an estimate out whose type says what is known; kept, so that the same photo
-costs nothing the second time.
+"""Depth models that the library transformers runs, from a folder of safetensors weights.
 
 torch and transformers are imported where they are used: a photo with depth of its own never waits for them.
 """
@@ -8,23 +7,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from safetensors import SafetensorError
 
-from iibr_core.color import photo_in_srgb
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models import estimate_cache
-from iibr_core.depth.models.catalog import TRANSFORMERS, LocalModel, bytes_of, weight_files
-from iibr_core.depth.models.config import Preparation, input_size, read_config, read_preparation
-from iibr_core.depth.models.download import require_unchanged
-from iibr_core.formats.files import is_folder
+from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.models.catalog import LocalModel, bytes_of
+from iibr_core.depth.models.config import read_config, read_preparation
+from iibr_core.depth.models.preparation import Preparation, input_size, network_input
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.runtime.machine import core_count, usual_budget_bytes
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress, image_size
+from iibr_core.runtime.machine import core_count
+from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, image_size
 
 if TYPE_CHECKING:
     import torch
@@ -33,7 +28,6 @@ ACTIVATION_BYTES = 1500
 """For each pixel of the input of a model of USUAL_WIDTH; measured: 1,060 with Depth Anything V2 Small at 686x518."""
 USUAL_WIDTH = 384
 
-PICKLED = ("*.bin", "*.pt", "*.pth", "*.ckpt")
 INVERSE_LIMITS = (1e-4, 1e4)
 """Depth Pro's canonical inverse depth, as its authors clamp it."""
 
@@ -51,49 +45,15 @@ LOAD_ERRORS = (
 )
 
 
-def estimate_with(
-    model: LocalModel,
-    photo: Photo,
-    memory_bytes: int | None = None,
-    should_stop: ShouldStop = never,
-    report_progress: ReportProgress = ignore_progress,
-) -> Estimate:
-    """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
-
-    memory_bytes: what the model may take; its input is made smaller for it. Raises InputError where the model cannot
-    be used or its result is of no use, Cancelled where should_stop says so.
-    """
-    _require_weights(model.folder)
-    require_unchanged(model.folder)
-    photo = photo_in_srgb(photo)
-    report_progress(0, 0, f"looking for what {model.title} said before")
-    network_input = None
-    if model.package == TRANSFORMERS:
-        network_input = _input_of(model, photo.size, memory_bytes or usual_budget_bytes())
-    key = estimate_cache.key_of(photo.pixels, model.folder, f"{model.package} {network_input}")
-    found = estimate_cache.load(key)
-    if found is not None:
-        return found
-    if network_input is not None:
-        found = _run(model, photo, network_input, should_stop, report_progress)
-    else:
-        from iibr_core.depth.models.package_models import run_package
-
-        found = run_package(model, photo)
-    _require_use(model, found)
-    estimate_cache.store(key, found)
-    return found
-
-
 @dataclass(frozen=True)
-class _Input:
+class TransformersInput:
     """How a photo becomes a model's input, and of which (height, width)."""
 
     preparation: Preparation
     size: ImageSize
 
 
-def _input_of(model: LocalModel, size: ImageSize, memory_bytes: int) -> _Input:
+def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> TransformersInput:
     """The input for a photo of (height, width) that the memory allows. Raises InputError where it allows none."""
     config = read_config(model.folder)
     preparation = read_preparation(model.folder, config["model_type"])
@@ -107,7 +67,7 @@ def _input_of(model: LocalModel, size: ImageSize, memory_bytes: int) -> _Input:
             f"{model.title} takes {least / 2**20:,.0f} MiB, the budget is {memory_bytes / 2**20:,.0f} MiB: raise "
             "--memory or choose a smaller model"
         )
-    return _Input(preparation, preparation.size if is_fixed else input_size(preparation, size, pixels))
+    return TransformersInput(preparation, preparation.size if is_fixed else input_size(preparation, size, pixels))
 
 
 def _width_of(config: dict[str, Any]) -> int:
@@ -118,23 +78,27 @@ def _width_of(config: dict[str, Any]) -> int:
     return width if isinstance(width, int) and width > 0 else 1024
 
 
-def _run(
-    model: LocalModel, photo: Photo, network_input: _Input, should_stop: ShouldStop, report_progress: ReportProgress
+def run_transformers(
+    model: LocalModel, wanted: TransformersInput, photo: Photo, should_stop: ShouldStop, report_progress: ReportProgress
 ) -> Estimate:
+    """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
+
+    Raises InputError where the folder holds something else than a depth model, Cancelled once should_stop is true.
+    """
     report_progress(0, 0, f"loading {model.title}")
     import torch
 
     network = _load_network(model)
     torch.set_num_threads(min(torch.get_num_threads(), core_count()))
     device = "cuda" if torch.cuda.is_available() else "cpu"
-    pixels = _network_tensor(photo.pixels, network_input).to(device)
+    pixels = _network_tensor(photo.pixels, wanted).to(device)
     doing = f"estimating depth with {model.title}"
     try:
         with torch.inference_mode(), _LayerProgress(network, doing, should_stop, report_progress):
             output = network.to(device)(pixel_values=pixels)
     except (RuntimeError, ValueError, IndexError, TypeError) as error:
         raise InputError(f"{model.title} failed on this photo ({_line(error)})") from error
-    return _estimate_of(network.config, output, photo.size, network_input.preparation)
+    return _estimate_of(network.config, output, photo.size, wanted.preparation)
 
 
 def _load_network(model: LocalModel) -> Any:
@@ -180,18 +144,14 @@ class _LayerProgress:
         self._report_progress(min(self._seen, len(self._layers)), len(self._layers), self._doing)
 
 
-def _network_tensor(pixels: FloatImage, network_input: _Input) -> torch.Tensor:
-    """(1, 3, height, width), normalised as the model was trained; white is 1, HDR is cut off there."""
+def _network_tensor(pixels: FloatImage, wanted: TransformersInput) -> torch.Tensor:
+    """(1, 3, height, width), prepared as the model was trained."""
     import torch
 
-    wanted = network_input.preparation
-    if wanted.pads:
+    if wanted.preparation.pads:
         pad_y, pad_x = _padding(image_size(pixels))
         pixels = np.pad(pixels, ((pad_y, pad_y), (pad_x, pad_x), (0, 0)), "reflect")
-    image = torch.from_numpy(np.clip(pixels, 0, 1)).permute(2, 0, 1)[None]
-    small = torch.nn.functional.interpolate(image, network_input.size, mode="bicubic", antialias=True)
-    mean, std = (torch.tensor(values).view(1, 3, 1, 1) for values in (wanted.mean, wanted.std))
-    return (small - mean) / std
+    return torch.from_numpy(network_input(pixels, wanted.preparation, wanted.size))
 
 
 def _padding(size: ImageSize) -> tuple[int, int]:
@@ -226,31 +186,6 @@ def _depth_pro_estimate(canonical: FloatImage, field_of_view: Any) -> Estimate:
     width = canonical.shape[1]
     focal_px = width / 2 / math.tan(math.radians(float(field_of_view[0])) / 2)
     return MetricDepth(1 / np.clip(canonical * np.float32(width / focal_px), *INVERSE_LIMITS))
-
-
-def _require_weights(folder: Path) -> None:
-    """Raises InputError where a model folder holds no safetensors weights; pickled ones are told apart."""
-    if not is_folder(folder):
-        raise InputError(f"{folder}: no such folder")
-    if any(weight_files(folder)):
-        return
-    pickled = [path.name for pattern in PICKLED for path in folder.glob(pattern)]
-    if pickled:
-        raise InputError(f"{folder}: {pickled[0]} is pickled, which can run code; only .safetensors weights are read")
-    raise InputError(f"{folder}: holds no .safetensors weights; get the whole model folder")
-
-
-def _require_use(model: LocalModel, estimate: Estimate) -> None:
-    """Raises InputError for results that say nothing about the photo."""
-    match estimate:
-        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
-            known = values if model.package == TRANSFORMERS else values[~np.isnan(values)]
-    if not known.size or not np.isfinite(known).all():
-        raise InputError(f"{model.title} gave NaN or infinity for this photo")
-    if isinstance(estimate, MetricDepth) and not (known > 0).all():
-        raise InputError(f"{model.title} gave distances of 0 or less for this photo")
-    if known.max() == known.min():
-        raise InputError(f"{model.title} gave the same depth everywhere")
 
 
 def _line(error: Exception) -> str:

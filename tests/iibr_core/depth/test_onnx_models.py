@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -14,35 +17,21 @@ import torch
 import transformers
 from onnx import TensorProto, helper, numpy_helper
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models.onnx_models import USUAL_PREPARATION, input_for, network_input, run_onnx
+from iibr_core.depth.models import estimate_cache, onnx_models
+from iibr_core.depth.models.catalog import USUAL_MODEL, LocalModel, known_model, model_to_use
+from iibr_core.depth.models.download import VERIFIED
+from iibr_core.depth.models.estimate import estimate_with
+from iibr_core.depth.models.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
+from iibr_core.depth.models.preparation import network_input
+from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled, never
-from iibr_core.types import FloatImage, ImageSize, InputError
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ignore_progress
+from tests.iibr_core.depth.onnx_graphs import published, weighing
 
 BUDGET = 2**30
 MEAN, DEVIATION = (np.array(v, np.float32) for v in (USUAL_PREPARATION.mean, USUAL_PREPARATION.std))
-
-
-def weighing(file: Path, weights: tuple[float, float, float], fixed: ImageSize | None = None) -> Path:
-    """A graph whose output is the weighted sum of the input's channels, (N, H, W)."""
-    sides: list[int | str] = ["height", "width"] if fixed is None else [*fixed]
-    nodes = [
-        helper.make_node("Conv", ["pixel_values", "weights"], ["sum"]),
-        helper.make_node("Squeeze", ["sum", "axis"], ["predicted_depth"]),
-    ]
-    constants = [
-        numpy_helper.from_array(np.array(weights, np.float32).reshape(1, 3, 1, 1), "weights"),
-        numpy_helper.from_array(np.array([1]), "axis"),
-    ]
-    graph = helper.make_graph(
-        nodes,
-        "weighing",
-        [helper.make_tensor_value_info("pixel_values", TensorProto.FLOAT, ["batch", 3, *sides])],
-        [helper.make_tensor_value_info("predicted_depth", TensorProto.FLOAT, ["batch", *sides])],
-        constants,
-    )
-    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=10), file)
-    return file
 
 
 def smooth_photo(size: ImageSize) -> FloatImage:
@@ -51,8 +40,23 @@ def smooth_photo(size: ImageSize) -> FloatImage:
     return np.stack([0.2 + 0.5 * x, 0.1 + 0.6 * y, 0.3 + 0.2 * x * y], axis=2).astype(np.float32)
 
 
+def model_of(file: Path) -> LocalModel:
+    model = model_to_use(DepthChoice(model=str(file)))
+    assert model is not None
+    return model
+
+
+def input_for(file: Path, size: ImageSize, memory_bytes: int) -> OnnxInput:
+    return onnx_models.input_for(model_of(file), size, memory_bytes)
+
+
+def photo_of(pixels: FloatImage) -> Photo:
+    return Photo(pixels, 50.0, "photo")
+
+
 def estimate(file: Path, pixels: FloatImage) -> RelativeInverseDepth | MetricDepth:
-    found = run_onnx(file, pixels, input_for(file, ImageSize(*pixels.shape[:2]), BUDGET), never)
+    wanted = input_for(file, ImageSize(*pixels.shape[:2]), BUDGET)
+    found = run_onnx(model_of(file), wanted, photo_of(pixels), never, ignore_progress)
     assert isinstance(found, RelativeInverseDepth | MetricDepth)
     return found
 
@@ -177,7 +181,9 @@ def test_a_running_estimate_can_be_stopped(tmp_path: Path) -> None:
         return was_asked
 
     with pytest.raises(Cancelled):
-        run_onnx(file, pixels, input_for(file, ImageSize(30, 30), BUDGET), should_stop)
+        run_onnx(
+            model_of(file), input_for(file, ImageSize(30, 30), BUDGET), photo_of(pixels), should_stop, ignore_progress
+        )
 
 
 @pytest.fixture(scope="module")
@@ -246,6 +252,56 @@ def test_the_architecture_gives_what_its_library_gives(
     with torch.inference_mode():
         values = torch.from_numpy(network_input(pixels, USUAL_PREPARATION, wanted.size))
         expected = network(pixel_values=values).predicted_depth[0].numpy()
-    found = run_onnx(file, pixels, wanted, never)
+    found = run_onnx(model_of(file), wanted, photo_of(pixels), never, ignore_progress)
     assert isinstance(found, RelativeInverseDepth)
     np.testing.assert_allclose(found.values, expected, atol=1e-4 * np.ptp(expected))
+
+
+def test_the_usual_model_is_used_once_it_is_verified(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
+    usual = known_model(USUAL_MODEL)
+    snapshot = tmp_path / "hub" / f"models--{usual.repository.replace('/', '--')}" / "snapshots" / usual.commit
+    published(snapshot)
+    assert model_to_use(DepthChoice()) is None
+    (snapshot / VERIFIED).write_text("{}")
+    for choice in (DepthChoice(), DepthChoice(model=usual.name)):
+        found = model_to_use(choice)
+        assert found is not None
+        assert (found.title, found.folder, found.file) == (usual.title, snapshot, snapshot / "onnx" / "model.onnx")
+
+
+def test_a_folder_with_several_files_asks_which(tmp_path: Path) -> None:
+    for name in ("a.onnx", "b.onnx"):
+        weighing(tmp_path / name, (1, 0, 0))
+    with pytest.raises(InputError, match="which ONNX file is meant"):
+        model_of(tmp_path)
+    weighing(tmp_path / "model.onnx", (1, 0, 0))
+    assert model_of(tmp_path).file == tmp_path / "model.onnx"
+
+
+def test_an_estimate_is_cached_by_the_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(estimate_cache, "cache_folder", lambda: tmp_path / "cache")
+    file = weighing(tmp_path / "model.onnx", (1, 0, 0))
+    photo = photo_of(smooth_photo(ImageSize(60, 60)))
+    first = estimate_with(model_of(file), photo)
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+    weighing(file, (0, 1, 0))
+    second = estimate_with(model_of(file), photo)
+    assert isinstance(first, RelativeInverseDepth)
+    assert isinstance(second, RelativeInverseDepth)
+    assert np.abs(first.values - second.values).max() > 0.1
+    assert len(list((tmp_path / "cache").iterdir())) == 2
+
+
+def test_neither_torch_nor_transformers_is_imported(tmp_path: Path) -> None:
+    file = weighing(tmp_path / "model.onnx", (1, 1, 1))
+    write_image(tmp_path / "photo.png", (smooth_photo(ImageSize(40, 50)) * 255).astype(np.uint8))
+    code = (
+        "import sys; from pathlib import Path; from iibr_core.depth.choice import DepthChoice; "
+        "from iibr_core.depth.search import open_with_depth; "
+        f"found = open_with_depth(Path({str(tmp_path / 'photo.png')!r}), DepthChoice(model={str(file)!r})); "
+        "print(found.origin.kind, sorted({'torch', 'transformers'} & set(sys.modules)))"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == ("model []", "")

@@ -11,11 +11,13 @@ from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import USUAL_MODEL, known_model
+from iibr_core.depth.models.download import VERIFIED
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resize_estimate, sketch_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
+from tests.iibr_core.depth.onnx_graphs import published
 
 SIZE = ImageSize(48, 72)
 DEPTH = np.full(SIZE, 200, np.uint8)
@@ -158,10 +160,11 @@ def test_a_model_is_asked_for_where_there_is_none(tmp_path: Path) -> None:
 
 
 def test_a_damaged_usual_model_is_told_and_followed_by_the_next(tmp_path: Path) -> None:
-    repository = tmp_path / "hub" / f"models--{known_model(USUAL_MODEL).repository.replace('/', '--')}"
-    damaged_model(repository / "snapshots" / "abc", ("config.json", "model.safetensors"))
-    (repository / "refs").mkdir()
-    (repository / "refs" / "main").write_text("abc")
+    usual = known_model(USUAL_MODEL)
+    snapshot = tmp_path / "hub" / f"models--{usual.repository.replace('/', '--')}" / "snapshots" / usual.commit
+    published(snapshot)
+    (snapshot / VERIFIED).write_text("{}")
+    (snapshot / "onnx" / "model.onnx").write_bytes(b"no model")
     found = open_with_depth(photo_file(tmp_path, None))
     assert found.origin.kind == "rough"
     assert found.origin.failures[0].startswith("The depth model was not used: ")

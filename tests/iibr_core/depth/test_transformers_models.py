@@ -19,9 +19,10 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models import estimate_cache
 from iibr_core.depth.models.catalog import KNOWN_MODELS, LocalModel, cached_folder, fetch, known_model, model_to_use
-from iibr_core.depth.models.config import Preparation, input_size, read_preparation
+from iibr_core.depth.models.config import read_preparation
 from iibr_core.depth.models.download import VERIFIED
-from iibr_core.depth.models.transformers_models import estimate_with
+from iibr_core.depth.models.estimate import estimate_with
+from iibr_core.depth.models.preparation import Preparation, input_size
 from iibr_core.depth.search import estimator_of, open_with_depth
 from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled
@@ -410,25 +411,24 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, own_cach
 # ---- which model
 
 
-def test_models_are_found_by_folder_by_name_and_by_default(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_models_are_found_by_folder_and_by_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
     folder = depth_anything(tmp_path / "model").folder
     assert model_to_use(DepthChoice(model=str(folder))) == LocalModel("the model in model", folder)
     assert model_to_use(DepthChoice(model=None)) is None
     with pytest.raises(InputError, match="iibr models get depth-pro"):
         model_to_use(DepthChoice(model="depth-pro"))
-    usual = known_model("depth-anything-v2-small")
-    snapshot = tmp_path / "hub" / f"models--{usual.repository.replace('/', '--')}" / "snapshots" / usual.commit
+    published = known_model("depth-anything-v2-base")
+    snapshot = tmp_path / "hub" / f"models--{published.repository.replace('/', '--')}" / "snapshots" / published.commit
     snapshot.parent.mkdir(parents=True)
     folder.rename(snapshot)
-    assert cached_folder(usual) is None  # nobody verified it
+    assert cached_folder(published) is None  # nobody verified it
     (snapshot / VERIFIED).write_text("{}")
-    for wanted in (None, usual.name):
-        found = model_to_use(DepthChoice(model=wanted))
-        assert found is not None
-        assert (found.title, found.folder) == (usual.title, snapshot)
+    found = model_to_use(DepthChoice(model=published.name))
+    assert found is not None
+    assert (found.title, found.folder) == (published.title, snapshot)
     (snapshot / "model.safetensors").unlink()
-    assert cached_folder(usual) is None
+    assert cached_folder(published) is None
 
 
 @pytest.mark.parametrize("wanted", ["", "nonsense", "/no/such/folder", "./neither"])
@@ -456,7 +456,7 @@ def test_a_config_cannot_have_another_model_fetched(tmp_path: Path, changes: dic
 
 def test_a_file_is_no_model(tmp_path: Path) -> None:
     (tmp_path / "a.safetensors").touch()
-    with pytest.raises(InputError, match="takes the model's folder"):
+    with pytest.raises(InputError, match="is no ONNX file"):
         model_to_use(DepthChoice(model=str(tmp_path / "a.safetensors")))
 
 
@@ -513,7 +513,7 @@ def test_no_network_is_one_line(tmp_path: Path) -> None:
     assert (
         done.stderr.strip()
         .splitlines()[-1]
-        .startswith("iibr_core.types.InputError: depth-anything/Depth-Anything-V2-Small-hf cannot be downloaded")
+        .startswith("iibr_core.types.InputError: onnx-community/depth-anything-v2-small cannot be downloaded")
     )
     assert fetch is not None
 

@@ -10,7 +10,7 @@ import pytest
 from iibr_core.depth.models.catalog import cached_folder, known_model
 from iibr_core.depth.models.download import VERIFIED
 from iibr_core.types import GridShape
-from tests.iibr_core.depth.test_transformers_models import depth_anything
+from tests.iibr_core.depth.onnx_graphs import published
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener
 from viewer.model.commands import BY_NAME
@@ -23,9 +23,7 @@ MODEL = known_model("depth-anything-v2-small")
 def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
     import huggingface_hub
 
-    (tmp_path / "network").mkdir()
-    files = {path.name: path.read_bytes() for path in depth_anything(tmp_path / "network").folder.iterdir()}
-    with local_hub(MODEL.commit, files) as server:
+    with local_hub(MODEL.commit, published(tmp_path / "network")) as server:
         server.may_finish.clear()
         address = server.address
         # read once, at import: HF_ENDPOINT and HF_HOME come too late here

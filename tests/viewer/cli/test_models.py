@@ -59,7 +59,7 @@ def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
     about, error = done.stderr.splitlines()
     assert "99 MB" in about
     assert "Apache-2.0" in about
-    assert error.startswith("iibr: depth-anything/Depth-Anything-V2-Small-hf cannot be downloaded")
+    assert error.startswith("iibr: onnx-community/depth-anything-v2-small cannot be downloaded")
     assert "network" in error
     assert not list(tmp_path.rglob("*.safetensors"))
 
