@@ -579,9 +579,9 @@ READS_OR_TELLS = {
     "formats.quilts": "Quilt quilt_named quilt_for lay_out tagged",
     "formats.stereo": "anaglyph",
     "formats.files": "reason_of shown_name printable status_of is_file is_folder ordinary_file file_within "
-    "stays_within entries_of require_file open_binary refuse_bomb",
+    "stays_within entries_of require_file open_binary read_text refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
-    "atomic_write UnfinishedFolder remove_leftovers require_own_folder",
+    "atomic_write UnfinishedFolder remove_leftovers require_own_folder require_no_link open_to_append",
     "formats.poses": "read_poses read_llff_poses",
     "formats.light_fields.numbered_grid": "read_numbered_grid NumberedGridWriter",
     "formats.light_fields.hci": "read_hci HciWriter",

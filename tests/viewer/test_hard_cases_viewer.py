@@ -7,6 +7,7 @@ Beside these: a worker that is lost (test_worker.py, test_window_everyday.py), p
 from __future__ import annotations
 
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -100,7 +101,7 @@ def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
 
 def test_too_little_memory_is_one_line_and_the_worker_goes_on(desk: Desk, tmp_path: Path) -> None:
     message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)), DepthChoice(memory_bytes=10_000))))
-    assert "takes 392 MiB, --memory is 1 MiB" in message
+    assert re.search(r"takes \d+ MiB, --memory is 1 MiB", message)
     goes_on(desk, tmp_path, 2)
 
 

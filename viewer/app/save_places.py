@@ -26,10 +26,15 @@ def inputs_of(source: Source) -> tuple[Path, ...]:
     """What is read to open it, the map beside it and folders of models included: nothing may be written there. See
     `require_file_place`.
     """
+    found = map_to_read(Path(source.path), source.depth)
+    return (*_named_by(source), *((found,) if found is not None else ()))
+
+
+def _named_by(source: Source) -> tuple[Path, ...]:
+    """Its photo or folder, its map and its folders of models, as far as they are named."""
     models = (source.depth.model or "", source.inpaint.partition(":")[2])
     folders = [path for path in map(os.path.expanduser, models) if path and os.path.lexists(path)]  # else: names
-    found = (source.path, map_to_read(Path(source.path), source.depth), *folders)
-    return tuple(Path(path) for path in found if path)
+    return tuple(Path(path) for path in (source.path, source.depth.file, *folders) if path)
 
 
 def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
@@ -37,10 +42,11 @@ def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     from viewer.app.session_store import sidecar_of
 
     sources = [about.source for about in (state, state.scene) if about is not None and about.source is not None]
+    is_open = state.scene is not None and state.scene.source == state.source  # then its map is known
     origin = state.scene.depth_origin if state.scene is not None else None
     truth, gloss, poses = state.inspection.truth, state.optics.gloss, state.poses
     beside = (origin and origin.file, truth and truth.path, gloss and gloss.environment, poses and poses.file)
-    found = [path for source in sources for path in inputs_of(source)]
+    found = [path for source in sources for path in (_named_by(source) if is_open else inputs_of(source))]
     settings = [path for path in (sidecar_of(Path(source.path)) for source in sources if source.path) if is_file(path)]
     return (*found, *settings, *(Path(os.path.expanduser(path)) for path in beside if path))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,16 +127,20 @@ def bytes_of(path: Path) -> dict[str, bytes]:
 @pytest.fixture
 def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """What counts its pictures or views goes no farther than the second while this is not set."""
-    gate, watched = threading.Event(), ExportSource.watched
+    gate = threading.Event()
 
-    def held(self: ExportSource, items: Iterable[object], total: int, doing: str) -> Iterator[object]:
-        for number, item in enumerate(watched(self, items, total, doing)):
-            if number == 1:
-                while not gate.wait(0.01):
-                    raise_if_stopped(self.should_stop)
-            yield item
+    def holding(counted: Callable[..., Iterator[object]]) -> Callable[..., Iterator[object]]:
+        def held(self: ExportSource, *arguments: object) -> Iterator[object]:
+            for number, item in enumerate(counted(self, *arguments)):
+                if number == 1:
+                    while not gate.wait(0.01):
+                        raise_if_stopped(self.should_stop)
+                yield item
 
-    monkeypatch.setattr(ExportSource, "watched", held)
+        return held
+
+    for name in ("watched", "views"):
+        monkeypatch.setattr(ExportSource, name, holding(getattr(ExportSource, name)))
     gate.set()
     yield gate
     gate.set()

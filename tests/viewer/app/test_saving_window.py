@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.full_picture import FullPicture
+from viewer.app.image_export import export_picture
+from viewer.app.job_queue import JobQueue
 from viewer.app.main_loop import SETTLING_FRAMES
 from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import AskToSave, DismissNotice, DoTask
@@ -184,8 +187,23 @@ def test_closing_the_window_gives_up_what_is_being_drawn(viewer: Driver, tmp_pat
     assert set(tmp_path.iterdir()) == before
 
 
-def test_closing_the_window_waits_for_what_is_being_written(viewer: Driver, tmp_path: Path) -> None:
-    out = tmp_path / "out.png"
+def test_closing_the_window_waits_for_what_is_being_written(
+    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, closes = tmp_path / "out.png", threading.Event()
+
+    def write(*arguments: Any) -> Path:
+        """Once the window is closing, not before."""
+        assert closes.wait(120)
+        return export_picture(*arguments)
+
+    def close(queue: JobQueue) -> None:
+        closes.set()
+        close_queue(queue)
+
+    close_queue = JobQueue.close
+    monkeypatch.setattr("viewer.app.picture_saver.export_picture", write)
+    monkeypatch.setattr(JobQueue, "close", close)
     viewer.app.do(DoTask(SaveTask(str(out), SIZE)))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].doing == WRITING)
     viewer.close()

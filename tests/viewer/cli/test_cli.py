@@ -249,10 +249,14 @@ def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
 def test_full_gives_the_size_and_needs_memory(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:
+    from iibr_core.formats.images.photo import write_image
+
     out = tmp_path / "o.png"
     assert run(monkeypatch, "screenshot", photo_path, "--full", "--size", "8x8", "-o", out) == 2
     assert "--full" in capsys.readouterr().err
-    assert run(monkeypatch, "screenshot", photo_path, "--full", "--memory", "500M", "-o", out) == 2
+    large = tmp_path / "large.png"
+    write_image(large, np.zeros((2000, 3000, 3), np.uint8))
+    assert run(monkeypatch, "screenshot", large, "--depth", "flat", "--full", "--memory", "420M", "-o", out) == 2
     assert "own size" in capsys.readouterr().err
     assert not out.exists()
 

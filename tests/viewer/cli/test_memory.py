@@ -96,7 +96,7 @@ def test_a_limited_address_space_is_refused_before_opengl_starts(
     [
         ({"size_px": [30_000, 30_000]}, "30000x30000"),
         ({"source": {"grid": [99, 99]}}, "99 x 99 views"),
-        ({"source": {"memory_bytes": 2**62, "grid": [99, 99]}}, "this machine has"),
+        ({"source": {"memory_bytes": 2**62, "grid": [99, 99]}}, "the budget (--memory) is"),
     ],
 )
 def test_settings_of_a_picture_ask_for_no_more_than_the_machine_has(
