@@ -26,8 +26,8 @@ def inputs_of(source: Source) -> tuple[Path, ...]:
     """What is read to open it, the map beside it and folders of models included: nothing may be written there. See
     `require_file_place`.
     """
-    found = map_to_read(Path(source.path), source.depth)
-    return (*_named_by(source), *((found,) if found is not None else ()))
+    named, found = _named_by(source), map_to_read(Path(source.path), source.depth)
+    return named if found is None or found in named else (*named, found)
 
 
 def _named_by(source: Source) -> tuple[Path, ...]:

@@ -89,7 +89,7 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
     if is_working and state.source is not None and state.source.filled_grid is not None:
         yield ProgressRow("views", FILLING, progress_text(progress), progress.share, StopWork())
     if state.free_progress is not None:
-        share = state.free_progress
+        share = min(state.free_progress, 0.99)  # what is whole has no row
         yield ProgressRow("looking", "Drawing what the photo hides", f"{round(100 * share)} %", share, LeaveCamera())
     if downloading is not None:
         words = f"{downloading.done:,} of {downloading.total:,} MB"
