@@ -102,25 +102,32 @@ def draw_large(
     result, made smaller, equals it. A lens with samples needs it. Raises Cancelled once should_stop is true.
     """
     light, tiles = np.zeros((*part.size, 3), np.float32), tiles_of(part)
-    done, total = 0, len(tiles) * max(len(lens.offsets), 1)
-    for tile in tiles:
-        for _ in _draw_tile(photo, lens, tile, synthesis, should_stop, light[tile.inside(part).slices]):
-            report_progress(done, total, DRAWING)
+    sharp = [_has_sharp(photo, lens, tile) for tile in tiles]
+    done, total = 0, len(tiles) * (lens.share < 1) + sum(sharp) * len(lens.samples)
+    for tile, is_sharp in zip(tiles, sharp):
+        for _ in _draw_tile(photo, lens, tile, is_sharp, synthesis, should_stop, light[tile.inside(part).slices]):
             done += 1
+            report_progress(done, total, DRAWING)
     if smaller is not None:
         bring_to(light, smaller, part, photo.size, should_stop)
     return light
 
 
 def _draw_tile(
-    photo: LargePhoto, lens: LargeLens, tile: Part, synthesis: ViewSynthesis, should_stop: ShouldStop, light: FloatImage
+    photo: LargePhoto,
+    lens: LargeLens,
+    tile: Part,
+    is_sharp: bool,
+    synthesis: ViewSynthesis,
+    should_stop: ShouldStop,
+    light: FloatImage,
 ) -> Iterator[None]:
-    """Add what a tile shows in focus to its light, one view of the lens after the other."""
+    """Add what a tile shows in focus to its light, one view of the lens after the other. is_sharp: whether any is."""
     if lens.share < 1:
         (view,) = views_of_tile(photo, tile, [lens.eye], synthesis, should_stop)
         light += np.float32(1 - lens.share) * _linear(view.colors, lens, should_stop)
         yield
-    if not _has_sharp(photo, lens, tile):
+    if not is_sharp:
         return
     in_focus, weights = np.zeros_like(light), np.zeros(tile.size, np.float32)
     around = tile.grown(math.ceil(min(_moved_px(lens), max(photo.size))) + TAPS, whole(photo.size))

@@ -20,7 +20,6 @@ from viewer.background.gloss import answer
 from viewer.background.loaded_photo import LoadedPhoto
 from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.display.inspection_view import InspectionView
-from viewer.display.large_lens import large_lens
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
 from viewer.gpu.refocus.render_settings import RenderSettings
@@ -195,16 +194,11 @@ class HeadlessViewer:
 
     def needs_views(self, size: ScreenSize | None) -> bool:
         """Whether `picture` at this size shows views other than the photo."""
-        scene, optics = self.scene, self.state.optics
-        return needs_smaller(optics) or not is_full(scene, optics, size or scene.size)
+        return needs_smaller(self.state.optics) or not self.draws_own_pixels(size)
 
-    def picture_work(self, size: ScreenSize | None) -> float:
-        """What drawing `picture` takes, in views of the scene to be made; 0 where it is drawn from those."""
-        scene, optics = self.scene, self.state.optics
-        if not is_full(scene, optics, size or scene.size):
-            return 0.0
-        scale = self.own_size.width / scene.width
-        return len(large_lens(optics, scene, scale).offsets) * scale**2
+    def draws_own_pixels(self, size: ScreenSize | None) -> bool:
+        """Whether `picture` at this size is drawn from the photo's own pixels: it takes long after the views."""
+        return is_full(self.scene, self.state.optics, size or self.scene.size)
 
     def draw(self, settings: RenderSettings) -> NDArray[Any]:
         """A picture for an export, see `viewer.app.exports.source.Draw`."""

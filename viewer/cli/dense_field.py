@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from iibr_core.types import GridShape, image_size
 from viewer.cli.scene_options import NOT_FOR_LIGHT_FIELDS
-from viewer.cli.terminal import print_notes, show_progress
-from viewer.cli.view_writing import MAKING, write_views
+from viewer.cli.terminal import MAKING, print_notes, show_progress
+from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.registry import WriterFactory

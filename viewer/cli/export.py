@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iibr_core.rendering.gloss.settings import Gloss
-from iibr_core.types import ReportProgress
 from viewer.app.exports.registry import export_path, require_export_place, writer_of
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import LensOptions
@@ -28,8 +27,7 @@ from viewer.cli.options import (
     require_model,
 )
 from viewer.cli.scene_options import SceneOptions, require_heeded
-from viewer.cli.terminal import print_depth, print_notes, show_progress
-from viewer.cli.view_writing import MAKING
+from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 from viewer.model.export_kinds import require_ending
 
 if TYPE_CHECKING:
@@ -122,7 +120,7 @@ def _export_drawn(
 
     with HeadlessViewer() as viewer:
         with show_progress("reading") as show:
-            made = open_drawn(viewer, source, depth_strength, lens.actions(), look_at, _untimed(show))
+            made = open_drawn(viewer, source, depth_strength, lens.actions(), look_at, untimed(show))
         with show_progress("exporting") as show:
             write(replace(made, report_progress=show))
 
@@ -139,11 +137,6 @@ def _export_undrawn(
     from viewer.app.exports.opening import open_undrawn
 
     with show_progress("reading") as show:
-        made = open_undrawn(source, depth_strength, needs_disparity, require_place, _untimed(show), gloss)
+        made = open_undrawn(source, depth_strength, needs_disparity, require_place, untimed(show), gloss)
     with show_progress("exporting") as show:
         write(replace(made, report_progress=show))
-
-
-def _untimed(show: Callable[..., None]) -> ReportProgress:
-    """The share in words, without time: what follows takes longer or shorter."""
-    return lambda done, total, doing: show(0, 0, f"{doing or MAKING}, {done / total:.0%}" if total else doing)

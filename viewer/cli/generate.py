@@ -33,8 +33,8 @@ from viewer.cli.options import (
     require_model,
 )
 from viewer.cli.scene_options import SceneOptions, require_heeded
-from viewer.cli.terminal import print_depth, print_notes, show_progress
-from viewer.cli.view_writing import MAKING, write_views
+from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress
+from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.registry import WriterFactory

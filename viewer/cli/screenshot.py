@@ -31,11 +31,12 @@ from viewer.cli.options import (
     size_from_text,
 )
 from viewer.cli.scene_options import SceneOptions, require_heeded
-from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 from viewer.model.layout import ScreenSize
 
 if TYPE_CHECKING:
     from iibr_core.depth.choice import DepthOrigin
+    from viewer.app.headless import HeadlessViewer
     from viewer.model.actions import Action
     from viewer.model.state.scene import Source
 
@@ -163,9 +164,20 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
     )
 
 
+def _size_of(shot: _Shot, viewer: HeadlessViewer) -> ScreenSize | None:
+    """Of the picture. Raises InputError where all of the photo's pixels are asked for and cannot be drawn."""
+    from viewer.app.full_picture import require_full
+
+    if not shot.is_full:
+        return shot.size
+    if viewer.state.optics.gloss is not None:
+        raise InputError("--full: gloss is drawn from the views, which may be smaller; leave one of both out")
+    require_full(viewer.scene, viewer.state.optics)
+    return viewer.own_size
+
+
 def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple[str, ...], DepthOrigin | None]:
     """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
-    from viewer.app.full_picture import require_full
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image, export_picture, shot_of
 
@@ -173,36 +185,27 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
         with show_progress("reading") as show:
+            tell = untimed(show)  # until it is known how much there is to draw
             viewer.open_scene(
                 shot.source,
                 shot.depth_strength,
-                lambda made: show(made.share, float(made.total > 0), made.doing),
+                lambda made: tell(made.share, float(made.total > 0), made.doing),
                 shot.edits,
                 on_ready=shot.lens.require_within,
             )
             viewer.do(*shot.actions, *shot.lens.actions())
-            size = shot.size
-            if shot.is_full:
-                if viewer.state.optics.gloss is not None:
-                    raise InputError(
-                        "--full: gloss is drawn from the views, which may be smaller; leave one of both out"
-                    )
-                size = viewer.own_size
-                require_full(viewer.scene, viewer.state.optics)
-            views = viewer.scene.grid.rows * viewer.scene.grid.columns if ui or viewer.needs_views(size) else 0
-            total = views + (0.0 if ui else viewer.picture_work(size))
-            if views:
-                viewer.make_views(lambda made: show(made.share * views, total, made.doing))
+            size = _size_of(shot, viewer)
+            draws_long = not ui and viewer.draws_own_pixels(size)
+            if ui or viewer.needs_views(size):
+                told = tell if draws_long else show
+                viewer.make_views(lambda made: told(made.share, 1.0, made.doing))
             scene = viewer.scene
             saved = shot_of(viewer.state, size or scene.size, shot.form)
+        with show_progress("drawing") as show:
             if ui:
                 pixels = viewer.screen(shot.size or SCREEN_SIZE)
             else:
-
-                def report(done: float, all_of_it: float, doing: str) -> None:
-                    show(views + (total - views) * (done / all_of_it if all_of_it else 0.0), total, doing)
-
-                pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space, report)
+                pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space, show)
     if ui:
         export_image(output, pixels)
     else:

@@ -14,6 +14,9 @@ from typer.core import TyperGroup
 
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.runtime.time_left import TimeLeft, about_left
+from iibr_core.types import ReportProgress
+
+MAKING = "making views"
 
 
 class Commands(TyperGroup):
@@ -79,7 +82,7 @@ def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., No
             left_s = time_left.update(done, total)
             told = [f"{done:.0f} of {total:.0f}"] if counts and total else []
             told += [about_left(left_s)] if left_s else []
-            said = now or ("making views" if total else doing)
+            said = now or (MAKING if total else doing)
             bar.update(
                 task,
                 completed=time_left.share,
@@ -89,3 +92,8 @@ def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., No
             )
 
         yield show
+
+
+def untimed(show: Callable[..., None]) -> ReportProgress:
+    """The share in words, without time: what follows takes longer or shorter."""
+    return lambda done, total, doing: show(0, 0, f"{doing or MAKING}, {done / total:.0%}" if total else doing)

@@ -11,8 +11,6 @@ from iibr_core.types import GridShape, ImageSize, ViewUpdate
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.registry import LightFieldWriter
 
-MAKING = "making views"
-
 
 def write_views(
     views: Iterator[ViewUpdate],
