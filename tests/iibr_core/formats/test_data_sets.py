@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from iibr_core.evaluation.datasets import read_known_disparity
+from iibr_core.formats.light_fields.stanford import StanfordWriter
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.types import ImageSize, ViewOffset
+from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.iibr_core.evaluation.test_datasets import offset_by_file, scene_of, write_picture
 from tests.iibr_core.known_scenes import (
     HEIGHT,
@@ -137,3 +138,10 @@ def test_middlebury_rows_store_four_steps_times_a_factor(
     for known in scene.disparity.values():
         values = read_known_disparity(known, ImageSize(4, width)).values
         np.testing.assert_allclose(values, 120 / factor / 4, rtol=1e-5)
+
+
+def test_stanford_rows_are_named_upwards(tmp_path: Path) -> None:
+    names = [
+        StanfordWriter(tmp_path, GridShape(3, 1), 50.0, "scene", False).view_name(row, 0, "png") for row in range(3)
+    ]
+    assert [name.split("_")[1] for name in names] == ["02", "01", "00"]

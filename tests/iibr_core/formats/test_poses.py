@@ -104,9 +104,10 @@ def test_opengls_axes_are_turned(tmp_path):
     assert camera.centre_px == (23.5, 19.5)
 
 
-def test_an_angle_tells_the_focal_length(tmp_path):
-    (camera,) = read_poses(write_transforms(tmp_path / "poses.json", fl_x=None, camera_angle_x=np.pi / 2))
-    assert camera.focal_px[0] == pytest.approx(24.0)
+@pytest.mark.parametrize(("angle", "focal_px"), [(np.pi / 2, 24.0), (np.pi / 3, 24.0 * np.sqrt(3))])
+def test_an_angle_tells_the_focal_length(tmp_path, angle, focal_px):
+    (camera,) = read_poses(write_transforms(tmp_path / "poses.json", fl_x=None, camera_angle_x=angle))
+    assert camera.focal_px[0] == pytest.approx(focal_px)
 
 
 def test_colmaps_quaternion_is_from_the_world(tmp_path):

@@ -183,3 +183,13 @@ def test_pictures_smaller_than_a_patch_stay_as_the_continued_surface(size):
     fill_patches(colors, disparity, hole, disparity, ViewOffset(1.0, 1.0))
     fill_background(plain, disparity, hole, disparity, ViewOffset(1.0, 1.0))
     np.testing.assert_array_equal(colors, plain)
+
+
+def test_what_surrounds_a_wide_hole_is_of_its_own_surface():
+    """Right of the hole its surface goes on; left of it lies one behind, which no patch is to come from."""
+    disparity, hole = np.zeros((15, 15), np.float32), np.zeros((15, 15), bool)
+    disparity[:, :6], hole[6:9, 6:9] = -10.0, True
+    wanted = np.zeros((15, 15), bool)
+    patch._add_surroundings(disparity, hole, np.float32(0.5), np.array([7 * 15 + 7]), wanted)
+    assert wanted[7, 9]
+    assert not wanted[:, :6].any()

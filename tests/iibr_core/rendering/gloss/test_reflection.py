@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from iibr_core.rendering.gloss.reflection import reflection_disparity
 from tests.iibr_core.rendering.gloss.scenes import GEOMETRY, SIZE, disparity_of, plane, sphere
@@ -23,3 +24,11 @@ def test_a_hollow_that_focuses_on_the_eye_stays_finite_and_bounded():
     virtual = reflection_disparity(disparity, towards, GEOMETRY)
     assert np.isfinite(virtual).all()
     assert np.abs(virtual - disparity[..., None, None] * np.eye(2)).max() <= 3.001 * (90 / 30)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 5), (5, 1)])
+def test_a_photo_one_pixel_wide_or_high_has_no_slope_there(size):
+    normals = np.broadcast_to(np.float32([0, 0, -1]), (*size, 3))
+    virtual = reflection_disparity(np.full(size, 2.0, np.float32), normals, GEOMETRY)
+    assert virtual.shape == (*size, 2, 2)
+    assert np.isfinite(virtual).all()
