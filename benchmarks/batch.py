@@ -33,7 +33,7 @@ from iibr_core.runtime.allocator import limit_arenas
 from viewer.app.batch.archive import photos_in
 from viewer.app.batch.processes import local_workers
 from viewer.app.batch.task import BatchSettings, PhotoTask, Place, key_of, target_name
-from viewer.app.batch.threads import set_environment, thread_variables
+from viewer.app.batch.threads import QUIET_AND_SAFE, set_environment, thread_variables
 from viewer.app.batch.work import export_photo
 from viewer.app.batch.workers import outcomes_of
 from viewer.model.state.scene import Source
@@ -127,7 +127,7 @@ def main() -> None:
         photos.mkdir()
         write_photos(photos, given.photos, given.megapixels)
         tasks = tasks_for(photos, settings)
-        stack.enter_context(set_environment(thread_variables(1)))
+        stack.enter_context(set_environment(thread_variables(1) | QUIET_AND_SAFE))
         pipes = [plain_process(stack) for _ in range(given.workers)]
         workers = stack.enter_context(local_workers(given.workers, 1))
         runs: dict[str, Run] = {

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import gc
 import math
-import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from multiprocessing import get_context
@@ -21,6 +19,7 @@ import numpy as np
 import psutil
 
 from iibr_core.types import ReportProgress
+from viewer.app.batch.threads import set_environment
 
 PEAK_RESET, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
 
@@ -82,24 +81,10 @@ def peak_bytes(work: Callable[..., object], *args: object) -> float:
 @cache
 def _gauge() -> ProcessPoolExecutor:
     """A process that gives freed arrays back to the system at once: kept ones would hide what is taken anew."""
-    with _environment(MALLOC_MMAP_THRESHOLD_=str(1 << 17)):
+    with set_environment({"MALLOC_MMAP_THRESHOLD_": str(1 << 17)}):
         gauge = ProcessPoolExecutor(1, get_context("spawn"))
         gauge.submit(gc.collect).result()  # it starts with its first work
     return gauge
-
-
-@contextmanager
-def _environment(**values: str) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _peak_of(work: Callable[..., object], args: tuple[object, ...]) -> float:

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from iibr_core.formats.files import reason_of
 from iibr_core.types import InputError
-from viewer.app.batch.threads import set_environment, thread_variables
+from viewer.app.batch.threads import QUIET_AND_SAFE, set_environment, thread_variables
 from viewer.app.batch.workers import MOST_DEATHS, Workers
 
 SPAWN = multiprocessing.get_context("spawn")
@@ -41,7 +41,7 @@ def local_workers(count: int, threads: int) -> Iterator[Workers]:
     others = set(multiprocessing.active_children())
     _allow_files(count)
     executor = _ProcessExecutor(count)
-    with set_environment(thread_variables(threads)):
+    with set_environment(thread_variables(threads) | QUIET_AND_SAFE):
         try:
             _require_start(executor, count)
             yield Workers(executor, lambda: count, BrokenProcessPool)

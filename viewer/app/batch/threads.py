@@ -21,9 +21,8 @@ def thread_variables(threads: int) -> dict[str, str]:
 @contextmanager
 def set_environment(variables: Mapping[str, str]) -> Iterator[None]:
     """The environment of processes that are started in the block; this one keeps what it has read of its own."""
-    changed = {**variables, **QUIET_AND_SAFE}
-    before = {name: os.environ.get(name) for name in changed}
-    os.environ.update(changed)
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     try:
         yield
     finally:
