@@ -529,6 +529,7 @@ FINITE_BY_CONTRACT = {
     "depth.models.transformers_models.run_transformers": "of a Photo; `estimate_with` refuses non-finite results",
     "depth.models.onnx_models.input_for": "sizes only",
     "depth.models.onnx_models.run_onnx": "of a Photo; `estimate_with` refuses non-finite results",
+    "depth.models.preparation.affordable_pixels": "sizes only",
     "depth.models.preparation.input_size": "sizes only",
     "depth.models.preparation.network_input": "of a Photo, which is finite",
     "formats.images.photo.read_picture": "`read_photo` reads so",

@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.formats.files import is_folder, ordinary_file
+from iibr_core.formats.files import is_folder, ordinary_file, read_text
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
@@ -153,20 +153,12 @@ def _find(folder: Path, scene: Scene) -> SessionFound:
     kept = folder / f"{_key_of(scene.source)}.json"
     try:
         if ordinary_file(kept) is not None:
-            return SessionFound(scene, settings_from_text(_read_text(kept), str(kept), is_own=True))
+            return SessionFound(scene, settings_from_text(read_text(kept, MOST_BYTES), str(kept), is_own=True))
         if ordinary_file(sidecar) is not None:
-            return SessionFound(scene, settings_from_text(_read_text(sidecar), str(sidecar), sidecar.parent))
+            return SessionFound(scene, settings_from_text(read_text(sidecar, MOST_BYTES), str(sidecar), sidecar.parent))
     except InputError as error:
         return SessionFound(scene, None, str(error))
     return SessionFound(scene, None)
-
-
-def _read_text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return file.read(MOST_BYTES).decode("utf-8-sig", "replace")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error}); change its permissions") from error
 
 
 def _can_write(folder: Path) -> bool:

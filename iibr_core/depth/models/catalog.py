@@ -142,7 +142,14 @@ class LocalModel:
     @property
     def weights(self) -> tuple[Path, ...]:
         """The files of its weights, in order of their names."""
-        return (self.file,) if self.file is not None else tuple(weight_files(self.folder))
+        if self.file is not None:
+            return (self.file,)
+        return tuple(path for path in weight_files(self.folder) if path.suffix == ".safetensors")
+
+    @property
+    def weight_bytes(self) -> int:
+        """What they take on disk."""
+        return sum(path.stat().st_size for path in self.weights)
 
 
 def known_model(name: str) -> KnownModel:

@@ -13,9 +13,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import is_file, printable, reason_of, stays_within
+from iibr_core.formats.files import is_file, printable, read_text, reason_of, stays_within
 from iibr_core.formats.outputs import atomic_write
-from iibr_core.runtime.extras import is_installed
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import InputError, ReportProgress
 
@@ -30,8 +29,6 @@ Digests = Mapping[str, str]
 
 def verified_folder(repository: str, commit: str) -> Path | None:
     """Where a commit's files lie in the hub's cache, None where they were not downloaded and verified."""
-    if not is_installed("huggingface_hub"):
-        return None
     from huggingface_hub import constants  # the rest of that library takes half a second to import
 
     cache = Path(constants.HF_HUB_CACHE) / f"models--{repository.replace('/', '--')}"
@@ -86,9 +83,7 @@ def require_unchanged(folder: Path) -> None:
     if not is_file(path):
         return
     try:
-        if path.stat().st_size > MOST_LIST_BYTES:
-            raise ValueError("too large")
-        stated = json.loads(path.read_text("utf-8"))
+        stated = json.loads(read_text(path, MOST_LIST_BYTES))
         if not isinstance(stated, dict) or not all(map(_is_digest, stated.values())):
             raise ValueError("no digests")
         changed = _unlike(folder, stated)
@@ -141,9 +136,7 @@ def _digest_of(path: Path, like: str) -> str:
     kind, _, _ = like.partition(":")
     digest = hashlib.sha256() if kind == "sha256" else hashlib.sha1(b"blob %d\0" % path.stat().st_size)
     with path.open("rb") as file:
-        while part := file.read(1 << 20):
-            digest.update(part)
-    return f"{kind}:{digest.hexdigest()}"
+        return f"{kind}:{hashlib.file_digest(file, lambda: digest).hexdigest()}"
 
 
 def _is_digest(text: object) -> bool:

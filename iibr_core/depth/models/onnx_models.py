@@ -16,7 +16,7 @@ import numpy as np
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.models.catalog import LocalModel
 from iibr_core.depth.models.config import CONFIG, PREPROCESSOR, read_config, read_preparation
-from iibr_core.depth.models.preparation import Preparation, input_size, network_input
+from iibr_core.depth.models.preparation import Preparation, affordable_pixels, input_size, network_input
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.tiling import Cancelled, ShouldStop
@@ -42,17 +42,11 @@ class OnnxInput:
 
 def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> OnnxInput:
     """The input for a photo of (height, width). Raises InputError where the memory is too small for any."""
-    file, folder = _file_of(model), model.folder
+    folder = model.folder
     preparation = read_preparation(folder, KIND) if is_file(folder / PREPROCESSOR) else USUAL_PREPARATION
     is_metric = is_file(folder / CONFIG) and read_config(folder).get("depth_estimation_type") == "metric"
-    pixels = (memory_bytes - file.stat().st_size) / ACTIVATION_BYTES
     least = (2 * preparation.multiple) ** 2
-    if pixels < least:
-        needed_mib = (file.stat().st_size + least * ACTIVATION_BYTES) / 2**20
-        raise InputError(
-            f"{file}: takes {needed_mib:,.0f} MiB, the budget is {memory_bytes / 2**20:,.0f} MiB: raise --memory or "
-            "choose a smaller model"
-        )
+    pixels = affordable_pixels(model.title, model.weight_bytes, ACTIVATION_BYTES, least, memory_bytes)
     return OnnxInput(preparation, input_size(preparation, size, pixels), is_metric)
 
 

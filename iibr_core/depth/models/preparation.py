@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iibr_core.types import FloatImage, ImageSize
+from iibr_core.types import FloatImage, ImageSize, InputError
 
 MAX_AREA_GROWTH = 2.5
 """A long photo's input may hold this many times the pixels that the model was made for; time grows with its square."""
@@ -27,6 +27,23 @@ class Preparation:
     pads: bool
     mean: tuple[float, ...]
     std: tuple[float, ...]
+
+
+def affordable_pixels(
+    title: str, weights_bytes: int, pixel_bytes: float, least_pixels: int, memory_bytes: int
+) -> float:
+    """Pixels of the input that the memory has room for beside the weights, pixel_bytes each.
+
+    Raises InputError, naming the model, where they are fewer than least_pixels.
+    """
+    pixels = (memory_bytes - weights_bytes) / pixel_bytes
+    if pixels < least_pixels:
+        least = weights_bytes + least_pixels * pixel_bytes
+        raise InputError(
+            f"{title} takes {least / 2**20:,.0f} MiB, the budget is {memory_bytes / 2**20:,.0f} MiB: raise "
+            "--memory or choose a smaller model"
+        )
+    return pixels
 
 
 def input_size(preparation: Preparation, size: ImageSize, max_pixels: float) -> ImageSize:

@@ -13,9 +13,9 @@ import numpy as np
 from safetensors import SafetensorError
 
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models.catalog import LocalModel, bytes_of
+from iibr_core.depth.models.catalog import LocalModel
 from iibr_core.depth.models.config import read_config, read_preparation
-from iibr_core.depth.models.preparation import Preparation, input_size, network_input
+from iibr_core.depth.models.preparation import Preparation, affordable_pixels, input_size, network_input
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
@@ -58,15 +58,9 @@ def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> Transfor
     config = read_config(model.folder)
     preparation = read_preparation(model.folder, config["model_type"])
     per_pixel = ACTIVATION_BYTES * max(_width_of(config), USUAL_WIDTH) / USUAL_WIDTH
-    pixels = (memory_bytes - bytes_of(model.folder)) / per_pixel
     is_fixed = config["model_type"] == "depth_pro"
-    needed = preparation.size.height * preparation.size.width if is_fixed else (2 * preparation.multiple) ** 2
-    if pixels < needed:
-        least = bytes_of(model.folder) + needed * per_pixel
-        raise InputError(
-            f"{model.title} takes {least / 2**20:,.0f} MiB, the budget is {memory_bytes / 2**20:,.0f} MiB: raise "
-            "--memory or choose a smaller model"
-        )
+    least = preparation.size.height * preparation.size.width if is_fixed else (2 * preparation.multiple) ** 2
+    pixels = affordable_pixels(model.title, model.weight_bytes, per_pixel, least, memory_bytes)
     return TransformersInput(preparation, preparation.size if is_fixed else input_size(preparation, size, pixels))
 
 

@@ -29,6 +29,7 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ignore_progress
 from tests.iibr_core.depth.onnx_graphs import published, weighing
+from tests.iibr_core.depth.test_transformers_models import depth_anything as depth_anything_folder
 
 BUDGET = 2**30
 MEAN, DEVIATION = (np.array(v, np.float32) for v in (USUAL_PREPARATION.mean, USUAL_PREPARATION.std))
@@ -189,30 +190,9 @@ def test_a_running_estimate_can_be_stopped(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def depth_anything(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, torch.nn.Module]:
     """Depth Anything V2's architecture, small, with random weights, as its library builds and torch exports it."""
-    backbone = transformers.Dinov2Config(
-        hidden_size=32,
-        num_hidden_layers=4,
-        num_attention_heads=2,
-        image_size=56,
-        patch_size=14,
-        out_indices=[1, 2, 3, 4],
-        reshape_hidden_states=False,
-    )
-    config = transformers.DepthAnythingConfig(
-        backbone_config=backbone,
-        reassemble_hidden_size=32,
-        neck_hidden_sizes=[8, 8, 8, 8],
-        fusion_hidden_size=8,
-        head_hidden_size=8,
-    )
-    torch.manual_seed(0)
-    network = transformers.DepthAnythingForDepthEstimation(config).eval()
-    with torch.no_grad():
-        for weights in network.parameters():
-            if weights.ndim > 1:
-                weights.normal_(0, weights[0].numel() ** -0.5)
-        network.head.conv3.bias += 1
-    file = tmp_path_factory.mktemp("model") / "model.onnx"
+    folder = tmp_path_factory.mktemp("model")
+    saved = depth_anything_folder(folder / "saved").folder
+    network, file = transformers.DepthAnythingForDepthEstimation.from_pretrained(saved).eval(), folder / "model.onnx"
     torch.onnx.export(
         WithSymbolicSize(network).eval(),
         (torch.zeros(1, 3, 56, 84),),
