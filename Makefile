@@ -1,16 +1,21 @@
 # Two commands for people: `make run` opens the viewer on the demo photo, `make test` checks everything.
-# Both set up what they need: the environment in .venv, and system GL libraries where that is allowed.
+# Both set up what they need, and no more: the environment in .venv, and system GL libraries where that is allowed.
 
+# Of several, as in `make wheel PYTHON="python3.11 python3.12"`, the first is that of the environment.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+COMPILE := $(BIN)/python -P -m viewer.precompile iibr_core/_kernels
 READY := $(VENV)/.ready
+READY_TESTS := $(VENV)/.ready-tests
 
-.PHONY: run test bench fuzz install clean
+.PHONY: run test bench fuzz install wheel clean
 
-run: install
+# What is installed is compiled to bytecode where it is imported: not all of it ever is.
+run: $(READY)
 	@.ci/system-libraries run
-	$(BIN)/iibr demo
+	@$(COMPILE) $(BIN)/iibr demo
 
 test: install
 	@.ci/system-libraries test
@@ -20,7 +25,7 @@ test: install
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 --dist loadfile
 
-# DATA: a folder of scenes as `iibr evaluate` takes them; without it, a made-up scene and the demo photo. OUT: for the report.
+# DATA: a folder of scenes as `iibr evaluate` takes them; without it, a drawn scene. OUT: for the report.
 OUT ?= out/bench
 bench: install
 	@.ci/system-libraries test
@@ -31,15 +36,24 @@ fuzz: install
 	@.ci/system-libraries test
 	$(BIN)/python -m benchmarks.fuzz
 
-install: $(READY)
+install: $(READY_TESTS)
 
 $(READY): pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	@$(firstword $(PYTHON)) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "iibr needs Python 3.11 or later; name one with: make PYTHON=python3.11 ..."; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
-	$(BIN)/python -P -m viewer.precompile iibr_core/_kernels
+	$(firstword $(PYTHON)) -m venv $(VENV)
+	$(PIP) --no-compile -e .
 	@touch $(READY)
 
+$(READY_TESTS): $(READY)
+	@.ci/cpu-torch $(BIN)/python
+	$(PIP) -e '.[dev]'
+	$(COMPILE)
+	@touch $(READY_TESTS)
+
+# One wheel with the kernels of each Python named.
+wheel:
+	.ci/wheel $(PYTHON)
+
 clean:
-	rm -rf $(VENV) out iibr_core/_kernels
+	rm -rf $(VENV) out dist iibr_core/_kernels

@@ -1,87 +1,71 @@
 """Processor time of making fields, in turns with a plain warp of the same views, in one process.
 
-    python -m benchmarks.against_warp [--data DATA] [--scenes NAME,...] [--repeats 3] [--warp FILE.py]
+    python -m benchmarks.against_warp [--data DATA] [--only NAME,...] [--repeats 3] [--warp FILE.py]
 
-DATA holds scenes as `iibr evaluate` takes them, made with 9 x 9 views at their own disparity; the demo photo comes
-along, with the parallax that the plan gives it. --warp: a file with `render(photo, disparity, s, t)` to compare with,
-otherwise `iibr_core.evaluation.reference_warp`. Ratios are medians over rounds: other programs disturb them little.
+Scenes of DATA are made with 9 x 9 views at their own disparity; the demo photo comes along, with the parallax that the
+plan gives it. --warp: a file with `render(photo, disparity, s, t)` to compare with, otherwise
+`iibr_core.evaluation.reference_warp`. Ratios are medians over rounds: other programs disturb them little.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import sys
 from collections.abc import Callable, Iterator
-from itertools import islice
+from dataclasses import replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
-from benchmarks.speed.measure import Cost, cost_of, in_turns, median_cost, median_ratio
-from benchmarks.speed.variants import bench_scenes
-from iibr_core.depth.choice import DepthChoice
+from benchmarks.harness.report import emit, head, is_wanted, parser_of, row, start
+from benchmarks.harness.scenes import FIELD, BenchScene, data_scenes, offsets_of, photo_scene
+from benchmarks.harness.timing import cost_of, in_turns, make_field, median_cost, median_ratio
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import ScenePlan, plan_for_viewing, plan_literal
-from iibr_core.types import Disparity, FloatImage, GridShape, Photo, Quality, ViewOffset
-from viewer.cli.demo import demo_photo
+from iibr_core.generation.plan import plan_literal
+from iibr_core.types import FloatImage, Quality, ViewOffset
 
-GRID = GridShape(9, 9)
 Warp = Callable[[FloatImage, FloatImage, ViewOffset], object]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path)
-    parser.add_argument("--scenes", default="", help="only those whose name contains one of these words, by commas")
-    parser.add_argument("--repeats", type=int, default=3)
+    parser = parser_of(__doc__, "data", "only", "repeats")
     parser.add_argument("--qualities", default="fast,balanced")
     parser.add_argument("--warp", type=Path)
     options = parser.parse_args()
     warp = warp_of_file(options.warp) if options.warp else reference_warp
-    for name, photo, disparity, plan in scenes(options.data):
-        if any(word in name for word in options.scenes.split(",")):
-            compare(name, photo, disparity, plan, options.qualities.split(","), warp, options.repeats)
+    qualities = options.qualities.split(",")
+    wanted = (scene for scene in scenes(options.data) if is_wanted(scene.name, options.only))
+    rows = (compare(scene, qualities, warp, options.repeats) for scene in wanted)
+    emit(
+        chain([head("scene", "the plan's", "warp, s", *(f"{quality}, times the warp" for quality in qualities))], rows)
+    )
 
 
-def scenes(data: Path | None) -> Iterator[tuple[str, Photo, Disparity, ScenePlan]]:
-    """Name, photo, the field's disparity, plan."""
-    found = open_with_depth(demo_photo(), DepthChoice(), DEFAULT_MAX_PIXELS)
-    plan = plan_for_viewing(found.photo, found.disparity)
-    yield "demo photo", found.photo, plan.field_disparity(found.disparity), plan
-    for known in find_scenes(data) if data else ():
-        if known.disparity:
-            (scene,) = bench_scenes(known, DEFAULT_MAX_PIXELS, with_soft=False)
-            photo = Photo(scene.photo, float(scene.photo.shape[1]), scene.name)
-            disparity = Disparity(refine(scene.photo, scene.disparity), "its own")
-            yield scene.name, photo, disparity, plan_literal(photo, disparity, GRID)
+def scenes(data: Path | None) -> Iterator[BenchScene]:
+    """The demo photo, and those of a folder with refined maps."""
+    demo = photo_scene()
+    assert demo is not None
+    yield demo
+    for scene in data_scenes(data, with_soft=False):
+        yield replace(scene, disparity=refine(scene.photo, scene.disparity), field=offsets_of(FIELD))
 
 
-def compare(
-    name: str, photo: Photo, disparity: Disparity, plan: ScenePlan, qualities: list[Quality], warp: Warp, repeats: int
-) -> None:
-    """Print a line."""
+def compare(scene: BenchScene, qualities: list[Quality], warp: Warp, repeats: int) -> str:
+    """A line of the table."""
 
-    def make(quality: Quality) -> Iterator[object]:
-        return generate(photo, disparity, plan, quality=quality)
+    def warp_all() -> None:
+        for at in scene.field:
+            warp(scene.photo, scene.disparity, at)
 
-    def make_all(quality: Quality) -> Callable[[], Cost]:
-        return lambda: cost_of(lambda: [None for _ in make(quality)])
-
-    grid = plan.grid
-    offsets = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns)]
     for quality in qualities:  # compiles
-        list(islice(make(quality), 12))
-    warp(photo.pixels, disparity.values, offsets[0])
-    ways = {"warp": lambda: cost_of(lambda: [warp(photo.pixels, disparity.values, at) and None for at in offsets])}
-    costs = in_turns(ways | {quality: make_all(quality) for quality in qualities}, repeats, lambda *progress: None)
-    chosen = {plan.quality: " (the plan's)"}
-    words = [f"{q}{chosen.get(q, '')} {median_ratio(costs[q], costs['warp']):.2f}" for q in qualities]
-    plain = median_cost(costs["warp"]).cpu_s
-    print(f"{name:26} {grid.columns}x{grid.rows} {photo.size}  warp 1 = {plain:.2f} s  {'  '.join(words)}", flush=True)
+        make_field(scene, quality)
+    warp(scene.photo, scene.disparity, scene.field[0])
+    ways = {"warp": warp_all, **{quality: partial(make_field, scene, quality) for quality in qualities}}
+    costs = in_turns({name: partial(cost_of, way) for name, way in ways.items()}, repeats)
+    ratios = (f"{median_ratio(costs[quality], costs['warp']):.2f}" for quality in qualities)
+    planned = plan_literal(*scene.given, scene.grid).quality
+    return row(scene.name, planned, f"{median_cost(costs['warp']).cpu_s:.2f}", *ratios)
 
 
 def warp_of_file(path: Path) -> Warp:
@@ -93,4 +77,4 @@ def warp_of_file(path: Path) -> Warp:
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.against_warp", main)

@@ -9,9 +9,9 @@ where one lies beside them (`tests/data/thin_lens`), which takes every view.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
+from benchmarks.harness.report import parser_of, start
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.protocol import EvaluationResult, Options, evaluate
 from iibr_core.evaluation.tables import NO_FIGURE, number
@@ -20,7 +20,7 @@ from iibr_core.types import DEFAULT_QUALITY
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("data", type=Path, nargs="+", help="a scene as `iibr evaluate` takes it, or a folder of them")
     parser.add_argument("--views", type=int, help="judge at most so many of a scene")
     options = parser.parse_args()
@@ -39,4 +39,4 @@ def line_of(result: EvaluationResult) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.agreement", main)

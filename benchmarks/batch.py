@@ -1,8 +1,8 @@
 """What handing photos to workers costs: `iibr batch`'s rate against that of one process times the workers.
 
-    python -m benchmarks.batch --photos 20 --rounds 5 --megapixels 1 --workers 2 --kind depth
+    python -m benchmarks.batch --photos 20 --repeats 5 --megapixels 1 --workers 2 --kind depth
 
-Photos are textured squares before a texture, all different, with maps beside them. Starting and the first photo count
+Photos are made up, all different, with maps beside them. Starting and the first photo count
 apart. Every round has one process export the photos, so many such processes that know nothing of each other, and the
 workers. Processes side by side share caches and memory: only against the second figure the batch's own cost shows, and
 on a machine that others use only processor time says much.
@@ -10,25 +10,22 @@ on a machine that others use only processor time says much.
 
 from __future__ import annotations
 
-import argparse
-import math
 import multiprocessing
-import statistics
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import count
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import NamedTuple
 
-import numpy as np
 import psutil
 
+from benchmarks.harness.report import emit, head, parser_of, row, start
+from benchmarks.harness.scenes import write_photos
+from benchmarks.harness.timing import Cost, in_turns, median_cost
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.images.photo import write_image
-from iibr_core.formats.maps.writer import write_map
 from iibr_core.runtime.allocator import limit_arenas
 from viewer.app.batch.archive import photos_in
 from viewer.app.batch.processes import local_workers
@@ -38,29 +35,7 @@ from viewer.app.batch.work import export_photo
 from viewer.app.batch.workers import outcomes_of
 from viewer.model.state.scene import Source
 
-
-class Cost(NamedTuple):
-    """Seconds a photo."""
-
-    wall: float
-    processor: float
-
-
 Run = Callable[[Sequence[PhotoTask]], object]
-
-
-def write_photos(folder: Path, count: int, megapixels: float) -> None:
-    height = round(math.sqrt(megapixels * 1e6 * 3 / 4))
-    size = height, height * 4 // 3
-    rows, columns = np.indices(size)
-    for number in range(count):
-        generator = np.random.default_rng(number)
-        texture = generator.integers(0, 80, (-(-size[0] // 8), -(-size[1] // 8), 3))
-        colors = texture.repeat(8, 0).repeat(8, 1)[: size[0], : size[1]]
-        place = generator.random(2) * size / 2
-        is_near = (abs(rows - place[0]) < size[0] / 4) & (abs(columns - place[1]) < size[1] / 4)
-        write_image(folder / f"{number:05}.png", (colors + np.where(is_near, 150, 30)[..., None]).astype(np.uint8))
-        write_map(folder / f"{number:05}_disparity.pfm", np.where(is_near, 2.0, 0.5).astype(np.float32))
 
 
 def tasks_for(photos: Path, settings: BatchSettings) -> list[PhotoTask]:
@@ -106,27 +81,25 @@ def processor_seconds() -> float:
 
 
 def measure(run: Run, tasks: Sequence[PhotoTask], folder: Path) -> Cost:
+    """What a photo costs, over all processes."""
     moved = [replace(task, place=replace(task.place, folder=str(folder))) for task in tasks]
     folder.mkdir()
     wall, processor = time.perf_counter(), processor_seconds()
     run(moved)
-    return Cost((time.perf_counter() - wall) / len(tasks), (processor_seconds() - processor) / len(tasks))
+    return Cost(time.perf_counter() - wall, processor_seconds() - processor).times(1 / len(tasks))
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "repeats")
     parser.add_argument("--photos", type=int, default=20)
-    parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--megapixels", type=float, default=1.0)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--kind", default="depth")
     given = parser.parse_args()
     settings = BatchSettings(given.kind, Source("", DepthChoice()))
     with tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
-        photos = Path(scratch, "photos")
-        photos.mkdir()
-        write_photos(photos, given.photos, given.megapixels)
-        tasks = tasks_for(photos, settings)
+        write_photos(Path(scratch, "photos"), given.photos, given.megapixels)
+        tasks = tasks_for(Path(scratch, "photos"), settings)
         stack.enter_context(set_environment(thread_variables(1) | QUIET_AND_SAFE))
         pipes = [plain_process(stack) for _ in range(given.workers)]
         workers = stack.enter_context(local_workers(given.workers, 1))
@@ -135,20 +108,23 @@ def main() -> None:
             f"{given.workers} on their own": lambda tasks: in_plain_processes(pipes, tasks),
             f"{given.workers} workers": lambda tasks: list(outcomes_of(workers, tasks)),
         }
-        costs: dict[str, list[Cost]] = {name: [] for name in runs}
-        for number in range(given.rounds + 1):
-            for name, run in runs.items():
-                cost = measure(run, tasks, Path(scratch, f"{number} {name}"))
-                if number > 0:  # the first one compiles and loads
-                    costs[name].append(cost)
-    middle = {name: Cost(*(statistics.median(column) for column in zip(*of))) for name, of in costs.items()}
+        folders = (Path(scratch, str(number)) for number in count())
+        ways = {name: lambda run=run: measure(run, tasks, next(folders)) for name, run in runs.items()}
+        in_turns(ways, 1)  # compiles and loads
+        middle = {name: median_cost(costs) for name, costs in in_turns(ways, given.repeats).items()}
+    emit(rows(middle, given.workers))
+
+
+def rows(middle: dict[str, Cost], workers: int) -> Iterator[str]:
+    """What each way takes, and of the rate of one process times the workers, how much it comes to."""
+    yield head(
+        "photos exported by", "s a photo", "of processors", "rate times processes, by the clock", "by processors"
+    )
     one = middle["one process"]
     for name, cost in middle.items():
-        count = 1 if cost is one else given.workers
-        print(f"{name:14} {cost.wall:.3f} s a photo, {cost.processor:.3f} s of processors;"
-              f" rate of one process times {count}: {one.wall / cost.wall / count:.1%} by the clock,"
-              f" {one.processor / cost.processor:.1%} by processor time")  # fmt: skip
+        wall = one.wall_s / cost.wall_s / (1 if cost is one else workers)
+        yield row(name, f"{cost.wall_s:.3f}", f"{cost.cpu_s:.3f}", f"{wall:.1%}", f"{one.cpu_s / cost.cpu_s:.1%}")
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.batch", main)

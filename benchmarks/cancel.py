@@ -1,6 +1,6 @@
 """How long a cancelled field goes on: from the word to the end of the generator, at 4 MP.
 
-    python -m benchmarks.cancel [--pixels 4000000] [--times 20] [--quality fast balanced exact]
+    python -m benchmarks.cancel [--pixels 4000000] [--times 20] [--quality fast balanced]
 
 The word comes at random moments of generating. The viewer's worker then drops the job. Target: 100 ms. Other programs
 lengthen that, so the longest pieces of work between two questions whether to stop stand beside it, in processor time of
@@ -9,14 +9,15 @@ their thread: of views, and of what finds depth before them.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import get_args
 
 import numpy as np
 
+from benchmarks.harness.report import emit, head, parser_of, row, start
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.generation.light_field import generate
@@ -25,6 +26,7 @@ from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import Disparity, GridShape, Photo, Quality, ViewUpdate
 
 GRID = GridShape(9, 9)
+MOST_MS = 100
 LAST_S = 4.0
 """The word comes within so many seconds."""
 WATCHED_GRID = GridShape(5, 4)
@@ -56,32 +58,34 @@ class Watch:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--pixels", type=int, default=4_000_000)
     parser.add_argument("--times", type=int, default=20)
-    parser.add_argument("--quality", nargs="+", default=["fast", "balanced"], choices=["fast", "balanced", "exact"])
+    parser.add_argument("--quality", nargs="+", default=get_args(Quality), choices=get_args(Quality))
     given = parser.parse_args()
-    photo, disparity = scene(given.pixels)
+    emit(report(given.pixels, given.times, given.quality))
+
+
+def report(pixels: int, times: int, qualities: Sequence[Quality]) -> Iterator[str]:
+    longest = "longest of {times}", f"over {MOST_MS} ms", "longest pieces, processor time"
+    yield head("cancelled", "after, ms (median)", *(name.format(times=times) for name in longest))
+    photo, disparity = scene(pixels)
     size = f"{photo.size[1]}x{photo.size[0]}"
-    for quality in given.quality:
-        compile_all(quality)
-        waits = np.sort([wait_ms(photo, disparity, quality, k / given.times) for k in range(given.times)])
-        print(
-            f"{quality:9} {size}: cancelled after {np.median(waits):.0f} ms (median), {waits[-1]:.0f} ms (longest of"
-            f" {given.times}); over 100 ms: {(waits > 100).sum()}",
-            flush=True,
-        )
+    for quality in qualities:
+        list(field(*scene(5_000), lambda: False, quality, GridShape(4, 3)))  # compiles
+        waits = np.sort([wait_ms(photo, disparity, quality, k / times) for k in range(times)])
         watch = Watch()
         for _ in field(photo, disparity, watch, quality, WATCHED_GRID):
             watch()
-        print(f"{'':9} longest pieces, processor time: {watch.in_words()}", flush=True)
+        said = f"{np.median(waits):.0f}", f"{waits[-1]:.0f}", (waits > MOST_MS).sum(), watch.in_words()
+        yield row(f"{quality}, {size}", *said)
     for name, work in depth_work(photo, disparity).items():
         work(lambda: False)
         watch = Watch()
         watch()
         work(watch)
         watch()
-        print(f"{name:9} {size}: longest pieces, processor time: {watch.in_words()}", flush=True)
+        yield row(f"{name}, {size}", "", "", "", watch.in_words())
 
 
 def scene(pixels: int) -> tuple[Photo, Disparity]:
@@ -112,12 +116,6 @@ def depth_work(photo: Photo, disparity: Disparity) -> dict[str, Callable[[Should
     }
 
 
-def compile_all(quality: Quality) -> None:
-    """Everything that is needed, on a small photo."""
-    photo, disparity = scene(5_000)
-    list(field(photo, disparity, lambda: False, quality, GridShape(4, 3)))
-
-
 def wait_ms(photo: Photo, disparity: Disparity, quality: Quality, share: float) -> float:
     """Cancel at some moment of the first seconds; how long until the generator ends."""
     stop, cancelled_at = threading.Event(), []
@@ -146,4 +144,4 @@ def _asker() -> str:
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.cancel", main)

@@ -1,6 +1,6 @@
 """Views of free cameras against the truth: ours beside forward warps of the same photo, disparity and poses.
 
-    python -m benchmarks.free_views [--scenes 12] [--size 480x320] [--seed 0]
+    python -m benchmarks.free_views [--scenes 12] [--size 480x320] [--seed 0] [--out docs/free_views.md]
 
 Scenes are procedural ones, seen from eight cameras each: beside the photo's, before and behind it, turned, and with
 another lens. "warp": every pixel's colour lands on one pixel, the nearest wins; holes are filled from beside.
@@ -12,9 +12,8 @@ time a view.
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from math import cos, radians, sin
@@ -22,7 +21,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.provenance import made_by
+from benchmarks.harness.report import emit, head, parser_of, row, start, title
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import _fill_holes, reference_warp_to
 from iibr_core.generation.free_views import FreeViews
@@ -133,32 +132,33 @@ def plain_warp(photo: FloatImage, disparity: FloatImage, matrix: NDArray[np.floa
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "seed", "out")
     parser.add_argument("--scenes", type=int, default=12)
     parser.add_argument("--size", default="480x320")
-    parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     width, height = map(int, options.size.split("x"))
-    rng = np.random.default_rng(options.seed)
+    emit(report(options.scenes, ImageSize(height, width), options.seed), options.out)
+
+
+def report(scenes: int, size: ImageSize, seed: int) -> Iterator[str]:
+    rng = np.random.default_rng(seed)
     table: Table = {}
-    size, ray_set_ms = ImageSize(height, width), []
-    for _ in range(options.scenes):
-        ray_set_ms.append(judge(random_scene(rng, size, float(rng.uniform(1, 3))), size, table))
-    print(f"{made_by('benchmarks.free_views')}.\n")
-    print("| pose | way | frame dB | gain dB | seen dB | unseen dB | error beyond the frame | ms of processor time |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
-    print(f"| all, once | ray set | | | | | | {np.median(ray_set_ms):.0f} |")
+    ray_set_ms = [judge(random_scene(rng, size, float(rng.uniform(1, 3))), size, table) for _ in range(scenes)]
+    yield title("Views of free cameras", "benchmarks.free_views")
+    yield __doc__[__doc__.index("Scenes are") :]
+    figures = "frame dB", "gain dB", "seen dB", "unseen dB", "error beyond the frame", "ms of processor time"
+    yield head("pose", "way", *figures)
+    yield row("all, once", "ray set", "", "", "", "", "", f"{np.median(ray_set_ms):.0f}")
     for (pose, way), rows in table.items():
-        print(line(pose, way, rows))
+        yield line(pose, way, rows)
     for way in ("warp", "resampled", "ours"):
-        print(line("all", way, [row for (_, other), rows in table.items() if other == way for row in rows]))
+        yield line("all", way, [one for (_, other), rows in table.items() if other == way for one in rows])
 
 
 def line(pose: str, way: str, rows: list[Row]) -> str:
     """Of the table."""
     frame, gain, seen, unseen, beyond, ms = np.nanmedian(np.array(rows), axis=0)
-    figures = f"{frame:.2f} | {gain:+.2f} | {seen:.2f} | {unseen:.2f} | {beyond:.0%} | {ms:.0f}"
-    return f"| {pose} | {way} | {figures} |"
+    return row(pose, way, f"{frame:.2f}", f"{gain:+.2f}", f"{seen:.2f}", f"{unseen:.2f}", f"{beyond:.0%}", f"{ms:.0f}")
 
 
 def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
@@ -169,9 +169,9 @@ def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
     # In view steps of a fiftieth of the nearest's distance.
     scale_px = scene.focal_px * 0.02 / float(inverse_depth.max())
     disparity = inverse_depth * np.float32(scale_px)
-    start = time.process_time()
+    began = time.process_time()
     ours = FreeViews(photo, inverse_depth, taken, list(cameras.values()))
-    ray_set_ms = 1e3 * (time.process_time() - start)
+    ray_set_ms = 1e3 * (time.process_time() - began)
     for name, camera in cameras.items():
         true, true_inverse = truth(scene, camera)
         matrix = target_from_photo(taken, camera, scale_px)
@@ -183,9 +183,9 @@ def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
             "ours": lambda at=camera: ours.view(at).colors,
         }
         for way, make in ways.items():
-            start = time.process_time()
+            began = time.process_time()
             made = np.clip(make(), 0, 1)
-            ms = 1e3 * (time.process_time() - start)
+            ms = 1e3 * (time.process_time() - began)
             frame, seen, unseen = (bounded_psnr(made, true, mask) for mask in (None, judged.visible, judged.hole))
             warped = frame if way == "warp" else table[name, "warp"][-1][0]
             error = (made - true) ** 2
@@ -195,4 +195,4 @@ def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.free_views", main)

@@ -24,6 +24,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.fuzz_cases import READERS, case
+from benchmarks.harness.report import parser_of, start
 from iibr_core.types import InputError
 
 TIME_LIMIT_S = 20.0
@@ -37,11 +38,9 @@ KEPT_EACH = 3
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "seed", out={"default": Path("out/fuzz"), "help": "folder for findings"})
     parser.add_argument("--count", type=int, default=10_000, help="cases for each reader")
     parser.add_argument("--reader", action="append", choices=READERS, help="one of them only; may be repeated")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("out/fuzz"), help="folder for findings")
     parser.add_argument("--work", nargs=2, type=int, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.work:
@@ -167,4 +166,4 @@ def _resident_peak(reset: bool = False) -> int:
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.fuzz", main)

@@ -126,7 +126,7 @@ def _read_preferences(path: Path) -> None:
 
 
 def _read_estimate(path: Path) -> None:
-    from iibr_core.depth.models import estimate_cache
+    from iibr_core.depth.estimators import estimate_cache
 
     estimate_cache.cache_folder = lambda: path.parent
     if estimate_cache.load(path.stem) is None:
@@ -134,9 +134,10 @@ def _read_estimate(path: Path) -> None:
 
 
 def _read_model_config(path: Path) -> None:
-    from iibr_core.depth.models.config import read_preparation
+    from iibr_core.depth.estimators.config import read_preparation
+    from iibr_core.depth.estimators.transformers_models import KINDS
 
-    read_preparation(path.parent, "depth_anything")
+    read_preparation(path.parent, KINDS["depth_anything"])
 
 
 def _read_weights(path: Path) -> None:

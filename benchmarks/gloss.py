@@ -15,16 +15,16 @@ to more than a pixel at the outermost view.
 
 from __future__ import annotations
 
-import argparse
-import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.provenance import made_by
+from benchmarks.harness.report import emit, head, parser_of, row, start, title
+from benchmarks.harness.timing import cost_of
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.generation.light_field import generate
@@ -165,27 +165,22 @@ def cost(truth: Truth, photo: FloatImage) -> tuple[float, float, float]:
     large = np.kron(photo, np.ones((times, times, 1), np.float32))
     geometry = replace(truth.geometry, focal_px=truth.geometry.focal_px * factor)
     maps = make_gloss_maps(truth.gloss, large, disparity, geometry)
-    colors = large.copy()
-    shade(colors, disparity, ViewOffset(1.0, 1.0), maps)
-    start = time.process_time()
-    make_gloss_maps(truth.gloss, large, disparity, geometry)
-    prepared = time.process_time()
-    shade(colors, disparity, ViewOffset(1.0, 1.0), maps)
-    shaded = time.process_time()
+    shading = partial(shade, large.copy(), disparity, ViewOffset(1.0, 1.0), maps)
+    shading()
+    prepared = cost_of(lambda: make_gloss_maps(truth.gloss, large, disparity, geometry))
+    shaded = cost_of(shading)
     picture, map_ = Photo(large, geometry.focal_px, "truth"), Disparity(disparity, "truth")
-    views = list(generate(picture, map_, plan_literal(picture, map_, truth.grid)))
-    made = (time.process_time() - shaded) / len(views)
-    return 1e3 * (prepared - start), 1e3 * (shaded - prepared), 1e3 * made
+    made = cost_of(lambda: list(generate(picture, map_, plan_literal(picture, map_, truth.grid))))
+    return 1e3 * prepared.cpu_s, 1e3 * shaded.cpu_s, 1e3 * made.cpu_s / (truth.grid.rows * truth.grid.columns)
 
 
 def report(folder: Path) -> Iterator[str]:
     """The lines of the report."""
-    yield "# Simulated specularity\n"
-    yield f"{made_by('benchmarks.gloss')}; truth by benchmarks.gloss_scenes, Mitsuba 3.9.1."
-    yield "Nothing was fitted to `table`, `ball` and `post`.\n"
+    more = "Truth by benchmarks.gloss_scenes, Mitsuba 3.9.1. Nothing was fitted to `table`, `ball` and `post`."
+    yield title("Simulated specularity", "benchmarks.gloss", more)
     yield __doc__[__doc__.index("The photo") :]
-    yield "| scene | photo | with gloss, dB | without | gain | true slope | made | off | true bend | made | off |"
-    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    tracks = "true slope", "made", "off", "true bend", "made", "off"
+    yield head("scene", "photo", "with gloss, dB", "without", "gain", *tracks)
     for name in SCENES:
         truth = read(folder / f"{name}.npz")
         matt, shining = encoded(truth.matt_views[truth.grid.centre]), encoded(truth.views[truth.grid.centre])
@@ -198,26 +193,21 @@ def report(folder: Path) -> Iterator[str]:
         ):
             said = judge(truth, photo, plain, matt_views, gloss)
             true, made = said.true, said.made
-            yield (
-                f"| {name} | {case} | {said.gloss_db:.2f} | {said.matt_db:.2f} | {said.gloss_db - said.matt_db:+.2f} dB"
-                f" | {true.slope:.3f} | {made.slope:.3f} | {off_by(made.slope, true.slope, half)}"
-                f" | {true.bend:+.4f} | {made.bend:+.4f} | {off_by(made.bend, true.bend, half**2)} |"
-            )
+            gain = f"{said.gloss_db:.2f}", f"{said.matt_db:.2f}", f"{said.gloss_db - said.matt_db:+.2f} dB"
+            slope = f"{true.slope:.3f}", f"{made.slope:.3f}", off_by(made.slope, true.slope, half)
+            bend = f"{true.bend:+.4f}", f"{made.bend:+.4f}", off_by(made.bend, true.bend, half**2)
+            yield row(name, case, *gain, *slope, *bend)
     prepared, shaded, made = cost(truth, matt)
     yield f"\nProcessor time at {LARGE}x{LARGE}: {prepared:.0f} ms once for the surface's normals and mask,"
     yield f"{shaded:.0f} ms a view, which takes {made:.0f} ms without gloss. Without gloss none of it runs."
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "out")
     parser.add_argument("--truth", type=Path, required=True, help="folder written by benchmarks.gloss_scenes")
-    parser.add_argument("--out", type=Path, help="report to write")
-    args = parser.parse_args()
-    text = "\n".join(report(args.truth)) + "\n"
-    print(text)
-    if args.out is not None:
-        args.out.write_text(text)
+    options = parser.parse_args()
+    emit(report(options.truth), options.out)
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.gloss", main)

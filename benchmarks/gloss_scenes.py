@@ -8,17 +8,104 @@ thing is seen in each view.
 
 from __future__ import annotations
 
-import argparse
+import importlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from benchmarks.path_traced import CameraRig, Image, Shapes, load_mitsuba, matte
-from iibr_core.types import GridShape, ImageSize
+from benchmarks.harness.report import parser_of, start
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+
+Shapes = dict[str, Any]
+"""Mitsuba's descriptions, by name."""
+Image = NDArray[np.float32]
+
+
+def load_mitsuba() -> Any:
+    """Mitsuba, where it is installed. Raises InputError where it is not."""
+    try:
+        mi = importlib.import_module("mitsuba")
+    except ImportError:
+        raise InputError("needs Mitsuba; install it with: pip install mitsuba==3.9.1") from None
+    mi.set_variant("scalar_rgb")
+    return mi
+
+
+@dataclass(frozen=True)
+class CameraRig:
+    """Cameras side by side that look along -z, that of the centre view from 0.
+
+    size: of a view. step: from view to view, still_depth: of the plane that does not move from view to view; both in
+    units of the scene.
+    """
+
+    size: ImageSize
+    field_of_view_deg: float
+    step: float
+    still_depth: float
+
+    @property
+    def focal_px(self) -> float:
+        """Of every camera."""
+        return self.size.width / 2 / math.tan(math.radians(self.field_of_view_deg / 2))
+
+    @property
+    def infinity_px(self) -> float:
+        """Disparity of what is infinitely far, px per view step."""
+        return -self.focal_px * self.step / self.still_depth
+
+    def disparity_at(self, depth: Any) -> Any:
+        """Pixels per view step of points that far in front of the cameras."""
+        return self.focal_px * self.step / depth + self.infinity_px
+
+    def camera(self, mi: Any, offset: ViewOffset) -> Shapes:
+        """What all sensors of a view have in common."""
+        at = np.array([offset.s * self.step, -offset.t * self.step, 0.0])
+        film = {"type": "hdrfilm", "width": self.size.width, "height": self.size.height, "rfilter": {"type": "box"}}
+        return {
+            "fov": self.field_of_view_deg,
+            "fov_axis": "x",
+            "to_world": mi.ScalarTransform4f().look_at(at.tolist(), (at - [0, 0, 1]).tolist(), [0, 1, 0]),
+            "film": film,
+            "sampler": {"type": "multijitter"},
+        }
+
+    def pinhole(self, mi: Any, offset: ViewOffset) -> Any:
+        """The sensor of a view; its frame moves with it, so that the plane at still_depth stays."""
+        shifts = {"principal_point_offset_x": self.infinity_px * offset.s / self.size.width}
+        shifts["principal_point_offset_y"] = self.infinity_px * offset.t / self.size.height
+        return mi.load_dict({"type": "perspective", **self.camera(mi, offset), **shifts})
+
+    def depths(self, scene: Any, sensor: Any) -> NDArray[np.float64]:
+        """(H, W), at the pixel centres of a view, which are integers."""
+        depths = np.empty(self.size)
+        for y, x in np.ndindex(*self.size):
+            place = [(x + 0.5) / self.size.width, (y + 0.5) / self.size.height]
+            ray = sensor.sample_ray(0.0, 0.0, place, [0.5, 0.5])[0]
+            depths[y, x] = -np.array(scene.ray_intersect(ray).p).ravel()[2]
+        return depths
+
+
+def matte(mi: Any, seed: int, dark: Sequence[float], bright: Sequence[float], cells: int = 24) -> Shapes:
+    """A matte surface of irregular blotches between two colours, the same for the same seed."""
+    rng = np.random.default_rng(seed)
+    share = np.zeros((256, 256))
+    for octave, weight in ((cells // 4, 0.5), (cells, 0.5)):
+        at = np.arange(256) * octave / 256
+        low = np.floor(at).astype(int)
+        rest = (at - low)[:, None]
+        nodes = np.pad(rng.random((octave, octave)), (0, 1), mode="wrap")
+        rows = nodes[low] * (1 - rest) + nodes[low + 1] * rest
+        share += weight * (rows[:, low] * (1 - rest.T) + rows[:, low + 1] * rest.T)
+    share = np.clip(0.5 + 2.2 * (share - 0.5), 0, 1)[..., None]
+    colors = (np.array(dark) * (1 - share) + np.array(bright) * share).astype(np.float32)
+    return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": mi.Bitmap(colors), "raw": True}}
+
 
 LIGHT_RADIUS_DEG, LIGHT_DISTANCE = 3.0, 400.0
 FACING_LIGHT = 1.0
@@ -149,17 +236,17 @@ def make(mi: Any, scene: GlossScene, folder: Path, samples: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--out", type=Path, required=True, help="folder for a file a scene")
     parser.add_argument("--samples", type=int, default=256, help="of a pixel")
     names = [scene.name for scene in SCENES]
     parser.add_argument("--scene", choices=names, nargs="+", default=names, help="usually all")
     args = parser.parse_args()
-    mi = load_mitsuba("benchmarks.gloss_scenes")
+    mi = load_mitsuba()
     args.out.mkdir(parents=True, exist_ok=True)
     for scene in (scene for scene in SCENES if scene.name in args.scene):
         make(mi, scene, args.out, args.samples)
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.gloss_scenes", main)

@@ -10,7 +10,6 @@ it is refused, nothing is.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import socket
@@ -23,6 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 
+from benchmarks.harness.report import parser_of, start
 from tests.hostile.case import Case, Ended, run_case
 from tests.hostile.forks import KILLED
 from tests.hostile.sandbox import make_template
@@ -270,7 +270,7 @@ def troubles_of(case: Case, end: Ended) -> tuple[str, ...]:
 
 def main() -> None:
     """Run them, and say what went wrong."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--only", default="", help="cases whose names hold this")
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
@@ -299,4 +299,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.hostile", main)

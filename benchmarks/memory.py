@@ -1,41 +1,35 @@
 """What memory the commands take at most under `--memory`, and what stays after many photos in one process.
 
-python -m benchmarks.memory predicted | bounds [12 24 ...] | day | speed: what twelve commands were predicted to take,
-and took; the peaks of fresh processes for photos of so many MP; memory after 10 and after 150 photos, by what is done
-about freed memory; the time that this costs a light field. docs/memory.md has what they printed.
+python -m benchmarks.memory predicted | bounds [12 24 ...] | day: what twelve commands were predicted to take, and took;
+the peaks of fresh processes for photos of so many MP; memory after 10 and after 150 photos. docs/memory.md has what
+they printed.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
-import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 import psutil
-from numpy.typing import NDArray
 
-from benchmarks.speed.measure import cost_of
-from iibr_core.runtime.allocator import give_back_memory, limit_arenas
+from benchmarks.harness.report import emit, head, parser_of, row, start
+from benchmarks.harness.scenes import MEGAPIXELS, write_photo
+from benchmarks.harness.timing import COMMAND_LINE, run
+from iibr_core.formats.maps.writer import write_map
+from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import GridShape
 
 MIB = 2**20
-SIZES = {12: (3000, 4000), 24: (4000, 6000), 48: (6000, 8000), 100: (8660, 11547)}
-BUDGETS = ("700M", "1G", "2G")
+BUDGETS = {"700M": 700, "1G": 1024, "2G": 2048}
 KINDS = (".jpg", ".png", ".exr")
 PHOTOS, LOOKED_AT, LARGEST = 150, 10, 600_000
-POLICIES = {
-    "glibc's own ways": {},
-    "two heaps, trimmed": {},
-    "fixed mmap threshold": {"MALLOC_MMAP_THRESHOLD_": str(1 << 17)},
-}
-SHIPPED = "two heaps, trimmed"
 SQUARES = 16
 PREDICTED = (
     ((480, 640), "generate PHOTO --grid 3 --out OUT"),
@@ -54,42 +48,47 @@ PREDICTED = (
 """(height, width) of a photo, and what is done with it. The constants of `memory_model` were compared with other cases:
 1, 2, 6 and 12 MP, grids of 3, 5 and 9, with one step of disparity.
 """
+UNDER_BUDGET = (
+    "plan PHOTO",
+    "plan PHOTO --max-pixels 100000000",
+    "screenshot PHOTO -o OUT.png --force",
+    "generate PHOTO --grid 5 --out OUT --force",
+)
 
 
 def main() -> None:
-    ways = {
-        "predicted": predicted,
-        "watched": watched,
-        "bounds": bounds,
-        "day": day,
-        "speed": speed,
-        "photos": photos_in_turn,
-        "views": views_once,
-    }
-    if len(sys.argv) < 2 or sys.argv[1] not in ways:
-        sys.exit(__doc__)
-    ways[sys.argv[1]](*sys.argv[2:])
+    ways = {"predicted": predicted, "watched": watched, "bounds": bounds, "day": day}
+    parser = parser_of(__doc__)
+    parser.add_argument("way", choices=ways, metavar="predicted | bounds | day")
+    parser.add_argument("more", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    emit(ways[given.way](*given.more))
 
 
-def predicted() -> None:
-    """What PREDICTED are predicted to take, and take: a table."""
-    print("| photo | command | predicted, MiB | peak, MiB | ratio |\n| --- | --- | --- | --- | --- |", flush=True)
+def words_of(command: str, photo: Path) -> list[str]:
+    """The words of a command about a photo; it writes beside that."""
+    return command.replace("PHOTO", str(photo)).replace("OUT", str(photo.with_name("out"))).split()
+
+
+def predicted() -> Iterator[str]:
+    """What PREDICTED are predicted to take, and take."""
+    yield head("photo", "command", "predicted, MiB", "peak, MiB", "ratio")
     with tempfile.TemporaryDirectory() as folder:
         for size, command in PREDICTED:
-            photo, out = Path(folder) / "photo.jpg", Path(folder) / "out"
-            write_photo(photo, size)
-            np.save(photo.with_name("photo_disparity.npy"), squares_before_wall(size))
-            words = [word.replace("PHOTO", str(photo)).replace("OUT", str(out)) for word in command.split()]
-            code, peak = peak_of([*words, "--force"], [sys.executable, "-m", "benchmarks.memory", "watched", str(out)])
-            needed = float(Path(f"{out}.needed").read_text()) / MIB if code == 0 else math.nan
-            megapixels = f"{math.prod(size) / 1e6:.1f} MP"
-            print(f"| {megapixels} | {command} | {needed:.0f} | {peak:.0f} | {needed / peak:.2f} |", flush=True)
+            photo = write_photo(Path(folder) / "photo.jpg", size, with_map=False)
+            write_map(photo.with_name("photo_disparity.pfm"), squares_before_wall(size))
+            asked = photo.with_name("asked")
+            watch = (sys.executable, "-m", "benchmarks.memory", "watched", asked)
+            ended = run((*watch, *words_of(command, photo), "--force"))
+            needed = float(asked.read_text()) / MIB if ended.code == 0 else math.nan
+            peak = f"{ended.peak_mib:.0f}", f"{needed / ended.peak_mib:.2f}"
+            yield row(f"{math.prod(size) / 1e6:.1f} MP", command, f"{needed:.0f}", *peak)
 
 
-def watched(out: str, *arguments: str) -> None:
+def watched(asked_path: str, *arguments: str) -> Iterator[str]:
     """One process of `predicted`: the command line, which writes down what it asked the budget for."""
     from iibr_core.generation.memory_model import Budget
-    from viewer.entry import main as run
+    from viewer.entry import main as run_command
 
     require, asked = Budget.require, [0.0]
 
@@ -100,12 +99,13 @@ def watched(out: str, *arguments: str) -> None:
     Budget.require = noted  # type: ignore[method-assign]
     sys.argv = ["iibr", *arguments]
     try:
-        run()
+        run_command()
     finally:
-        Path(f"{out}.needed").write_text(str(max(asked)))
+        Path(asked_path).write_text(str(max(asked)))
+    yield ""
 
 
-def squares_before_wall(size: tuple[int, int]) -> NDArray[np.float32]:
+def squares_before_wall(size: tuple[int, int]) -> np.ndarray:
     """A slanted wall and squares before it, no larger than 2 MP."""
     smaller = min(math.sqrt(2e6 / math.prod(size)), 1.0)
     height, width = (round(side * smaller) for side in size)
@@ -117,104 +117,43 @@ def squares_before_wall(size: tuple[int, int]) -> NDArray[np.float32]:
     return disparity
 
 
-def bounds(*megapixels: str) -> None:
-    """Peaks of `plan`, `screenshot` and `generate`, as shares of what was allowed; "-" where it is refused."""
+def bounds(*megapixels: str) -> Iterator[str]:
+    """Peaks as shares of what was allowed; "refused", with its own peak in MiB, where it is."""
+    yield head("photo", "`--memory`", *UNDER_BUDGET)
     with tempfile.TemporaryDirectory() as folder:
-        for size in map(int, megapixels or map(str, SIZES)):
+        for size in map(int, megapixels or MEGAPIXELS):
             for kind in KINDS:
-                photo = Path(folder) / f"{size}mp{kind}"
-                write_photo(photo, SIZES[size])
-                for budget in BUDGETS:
-                    print(f"{size:4} MP {kind} --memory {budget}:", *_peaks(photo, budget), flush=True)
+                photo = write_photo(Path(folder) / f"{size}mp{kind}", MEGAPIXELS[size], with_map=False)
+                for budget, allowed in BUDGETS.items():
+                    commands = [(*words_of(command, photo), "--memory", budget) for command in UNDER_BUDGET]
+                    ends = [run((*COMMAND_LINE, *words)) for words in commands]
+                    peaks = (f"refused ({e.peak_mib:.0f})" if e.code else f"{e.peak_mib / allowed:.2f}" for e in ends)
+                    yield row(f"{size} MP {kind}", budget, *peaks)
                 photo.unlink()
 
 
-def _peaks(photo: Path, budget: str) -> Iterator[str]:
-    allowed = float(budget[:-1]) * (1024 if budget[-1] == "G" else 1)
-    out = photo.parent
-    commands = {
-        "plan": [],
-        "plan --max-pixels 100000000": [],
-        "screenshot": ["-o", str(out / "picture.png"), "--force"],
-        "generate --grid 5": ["--out", str(out / "field"), "--force"],
-    }
-    for command, more in commands.items():
-        name, *options = command.split()
-        code, peak = peak_of([name, str(photo), *options, *more, "--memory", budget])
-        yield f"{command} {peak / allowed:.2f}" if code == 0 else f"{command} - ({peak:.0f} MiB)"
-
-
-COMMAND_LINE = [sys.executable, "-P", "-m", "viewer"]
-
-
-def peak_of(arguments: list[str], program: list[str] = COMMAND_LINE) -> tuple[int, float]:
-    """Exit code of the command line in a process of its own, and its peak, MiB; this one's counts too, but is less."""
-    silent = subprocess.DEVNULL
-    child = subprocess.Popen([*program, *arguments], stdout=silent, stderr=silent)
-    _, status, used = os.wait4(child.pid, 0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    return child.returncode, used.ru_maxrss / 1024
-
-
-def write_photo(path: Path, size: tuple[int, int]) -> None:
-    """Slopes and noise, with an edge: nothing that compresses as no photo does."""
-    height, width = size
-    noise = np.random.default_rng(0).integers(0, 40, (256, width, 3), np.uint8)
-    spec = oiio.ImageSpec(width, height, 3, "half" if path.suffix == ".exr" else "uint8")
-    output = oiio.ImageOutput.create(str(path))
-    output.open(str(path), spec)
-    across = np.linspace(0, 200, width)[:, None]
-    for top in range(0, height, 256):
-        rows = np.arange(top, min(top + 256, height))
-        slope = 0.5 * (across + 200 * rows[:, None, None] / height) * (1.0, 0.8, 0.6)
-        band = slope.astype(np.uint8) + noise[: len(rows)]
-        band[:, width // 3 : width // 2] //= 2
-        output.write_scanlines(top, int(rows[-1]) + 1, 0, band)
-    output.close()
-
-
-def day() -> None:
-    """Memory of a process that was shown PHOTOS photos, under each policy."""
-    for policy in POLICIES:
-        _in_own_process("photos", policy)
-
-
-def photos_in_turn(policy: str) -> None:
-    """One process's worth of `day`: photos of several sizes, opened by the worker, uploaded, every third left early."""
+def day() -> Iterator[str]:
+    """Memory of this process after photos of several sizes: opened by the worker, uploaded, every third left early."""
     from viewer.background.scene_worker import SceneRequest, SceneWorker
     from viewer.display.scene_view import SceneView
     from viewer.gpu.headless_context import create_headless
     from viewer.model.state.scene import Source
 
-    _apply(policy)
-    process, after = psutil.Process(), {}
-    with tempfile.TemporaryDirectory() as folder, _worker(SceneWorker) as worker:
-        photos = [Path(folder) / f"{k}{kind}" for k, kind in enumerate(KINDS)]
-        for k, photo in enumerate(photos):
-            write_photo(photo, (1500 + 300 * k, 2200 + 200 * k))
+    limit_arenas()  # as the program does
+    yield head("photos", "memory, MiB")
+    with tempfile.TemporaryDirectory() as folder, closing(SceneWorker(lambda: None)) as worker:
+        sizes = ((1500 + 300 * k, 2200 + 200 * k) for k in range(len(KINDS)))
+        photos = [write_photo(Path(folder) / f"a{kind}", size, 0, False) for kind, size in zip(KINDS, sizes)]
         scene_view = SceneView(create_headless())
         for k in range(PHOTOS):
-            pixels = LARGEST >> (k % 3)
-            source = Source(str(photos[k % len(photos)]), grid=GridShape(3, 3), max_pixels=pixels)
+            source = Source(str(photos[k % len(photos)]), grid=GridShape(3, 3), max_pixels=LARGEST >> (k % 3))
             worker.submit(SceneRequest(k, source))
-            _watch(worker, scene_view, k, 4 if k % 3 == 2 else 9)
+            take(worker, scene_view, k, 4 if k % 3 == 2 else 9)
             if k + 1 in (LOOKED_AT, PHOTOS):
-                after[k + 1] = process.memory_info().rss / MIB
-    ratio = after[PHOTOS] / after[LOOKED_AT]
-    told = ", ".join(f"{rss:.0f} MiB after {count}" for count, rss in after.items())
-    print(f"{policy}: {told} ({ratio:.2f} times)", flush=True)
+                yield row(k + 1, f"{psutil.Process().memory_info().rss / MIB:.0f}")
 
 
-@contextmanager
-def _worker(kind):  # type: ignore[no-untyped-def]
-    worker = kind(lambda: None)
-    try:
-        yield worker
-    finally:
-        worker.close()
-
-
-def _watch(worker, scene_view, generation: int, views: int) -> None:  # type: ignore[no-untyped-def]
+def take(worker: Any, scene_view: Any, generation: int, views: int) -> None:
     """Take what the worker posts until so many views of this photo are uploaded."""
     import time
 
@@ -236,52 +175,5 @@ def _watch(worker, scene_view, generation: int, views: int) -> None:  # type: ig
             seen += result.view.is_final
 
 
-def _apply(policy: str) -> None:
-    from viewer.background import jobs, scene_worker
-
-    if policy == SHIPPED:
-        limit_arenas()
-    else:
-        scene_worker.give_back_memory = jobs.give_back_memory = lambda: None
-
-
-def speed(photo: str, disparity: str, rounds: str = "7") -> None:
-    """The processor time that a photo's 9 x 9 views take under each policy, against glibc's own ways in each round."""
-    seconds: dict[str, list[float]] = {policy: [] for policy in POLICIES}
-    for _ in range(int(rounds)):
-        for policy, found in seconds.items():
-            found.append(float(_in_own_process("views", policy, photo, disparity, read=True)))
-    reference = np.array(next(iter(seconds.values())))
-    for policy, found in seconds.items():
-        ratios = np.array(found) / reference
-        told = ", ".join(f"{ratio:.3f}" for ratio in ratios)
-        print(f"{policy}: {np.median(ratios):.3f} of the processor time ({told}), median {np.median(found):.1f} s")
-
-
-def views_once(policy: str, photo: str, disparity: str) -> None:
-    """One round of `speed`: prints seconds of processor time, compiling not counted."""
-    _apply(policy)
-    from iibr_core.formats.images.photo import read_photo
-    from iibr_core.formats.maps.disparity_file import read_disparity
-    from iibr_core.generation.light_field import generate
-    from iibr_core.generation.plan import plan_literal
-
-    read = read_photo(Path(photo))
-    given = read_disparity(Path(disparity), read.size)
-    for grid in (GridShape(3, 3), GridShape(9, 9)):
-        plan = plan_literal(read, given, grid)
-        cost = cost_of(lambda plan=plan: [None for _ in generate(read, given, plan)])
-        if policy == SHIPPED:
-            give_back_memory()
-    print(cost.cpu_s)
-
-
-def _in_own_process(*arguments: str, read: bool = False) -> str:
-    environment = {**os.environ, **POLICIES[arguments[1]]}
-    command = [sys.executable, "-m", "benchmarks.memory", *arguments]
-    done = subprocess.run(command, env=environment, check=True, text=True, stdout=subprocess.PIPE if read else None)
-    return done.stdout or ""
-
-
 if __name__ == "__main__":
-    main()
+    start("benchmarks.memory", main)

@@ -2,28 +2,29 @@
 
     python -m benchmarks.multi_view_depth --data DATA [--no-views]
 
-DATA holds light fields; where one has a true map of its centre view (gt_*.npy), bad pixels and the square error are
-told, 15 px of border left out, as the HCI benchmark does. Every second view is held back, drawn from the others as the
-window does it, and compared with the plain blend of the four views around it.
+Of light fields below DATA with 3x3 views and more. Where one has a true map of its centre view (gt_*.npy), bad pixels
+and the square error are told, 15 px of border left out, as the HCI benchmark does. Every second view is held back,
+drawn from the others as the window does it, and compared with the plain blend of the four views around it.
 """
 
 from __future__ import annotations
 
-import argparse
 import tempfile
-import time
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.refocus import read_views
+from benchmarks.harness.report import emit, head, parser_of, row, start
+from benchmarks.harness.scenes import offsets_of, read_views
+from benchmarks.harness.timing import cost_of
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.formats.images.oiio_writer import write_image_file
+from iibr_core.formats.images.photo import write_image
 from iibr_core.types import FloatImage, GridShape, ViewOffset
 from viewer.app.headless import HeadlessViewer
 from viewer.model.state.scene import Source
@@ -33,71 +34,64 @@ BAD_PX = 0.07
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True)
+    parser = parser_of(__doc__, data={"required": True})
     parser.add_argument("--no-views", action="store_true")
     options = parser.parse_args()
-    for folder in (options.data, *sorted(options.data.iterdir())):
+    emit(report(options.data, not options.no_views))
+
+
+def report(data: Path, with_views: bool) -> Iterator[str]:
+    names = f"bad pixels (> {BAD_PX}), %", "square error x 100", "views held back: drawn, dB", "plain blend, dB"
+    yield head("light field", "views", "coarse, s of processor time", "whole, s", *names)
+    for folder in (data, *sorted(data.iterdir())):
         if (folder / "views").is_dir() and len(list((folder / "views").iterdir())) >= 9:
-            grid, views = read_views(folder)
-            print(f"{folder.name}: {grid.columns}x{grid.rows} views")
-            _judge_map(folder, grid, views)
-            if not options.no_views:
-                _judge_views(grid, views)
+            views = read_views(folder)
+            judged = judge_views(views) if with_views else ("", "")
+            yield row(folder.name, "{}x{}".format(*views.shape[:2]), *judge_map(folder, views), *judged)
 
 
-def _judge_map(folder: Path, grid: GridShape, views: NDArray[np.uint8]) -> None:
-    offsets = [grid.offset(*at) for at in np.ndindex(*grid)]
-    reference = grid.centre[0] * grid.columns + grid.centre[1]
-    start = time.process_time()
-    coarse = estimate_coarse(list(views), offsets, reference)
-    between = time.process_time()
-    values = estimate_disparity(list(views), offsets, reference, coarse.range_px)
-    print(f"  coarse {between - start:.1f} s, whole {time.process_time() - start:.1f} s of processor time")
-    for truth in sorted(folder.glob("gt_disp*.npy")):
-        error = np.abs(values - np.load(truth))[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
-        known = np.isfinite(error)
-        bad, square = (error[known] > BAD_PX).mean(), (error[known] ** 2).mean()
-        print(f"  bad pixels (> {BAD_PX}) {100 * bad:.2f} %, square error x 100 {100 * square:.2f}")
+def judge_map(folder: Path, views: NDArray[np.uint8]) -> Iterator[str]:
+    """Seconds, and errors of the map where the true one is known."""
+    grid, each = GridShape(*views.shape[:2]), list(views.reshape(-1, *views.shape[2:]))
+    about = each, list(offsets_of(grid)), grid.centre[0] * grid.columns + grid.centre[1]
+    found = []
+    coarse = cost_of(lambda: found.append(estimate_coarse(*about).range_px))
+    whole = cost_of(lambda: found.append(estimate_disparity(*about, found[0])))
+    yield f"{coarse.cpu_s:.1f}"
+    yield f"{(coarse + whole).cpu_s:.1f}"
+    truth = next(iter(sorted(folder.glob("gt_disp*.npy"))), None)
+    if truth is None:
+        yield from ("", "")
+        return
+    error = np.abs(found[1] - np.load(truth))[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
+    known = np.isfinite(error)
+    yield f"{100 * (error[known] > BAD_PX).mean():.2f}"
+    yield f"{100 * (error[known] ** 2).mean():.2f}"
 
 
-def _judge_views(grid: GridShape, views: NDArray[np.uint8]) -> None:
+def judge_views(views: NDArray[np.uint8]) -> list[str]:
     """PSNR of the views held back, drawn and blended."""
-    flat = views.reshape(*grid, *views.shape[1:])
-    kept = flat[::2, ::2]
-    drawn, blended = [], []
+    kept, errors = views[::2, ::2], []
     with tempfile.TemporaryDirectory() as folder:
-        _write_views(Path(folder), kept)
+        Path(folder, "views").mkdir()
+        for v, u in np.ndindex(*kept.shape[:2]):
+            write_image(Path(folder, "views", f"v{v:02}_u{u:02}.png"), kept[v, u])
         with HeadlessViewer() as viewer:
             viewer.open(Source(folder), 1.0, lambda progress: None)
-            for row, column in _held_back(grid):
-                eye = ViewOffset((row - 2 * (kept.shape[0] // 2)) / 2, (column - 2 * (kept.shape[1] // 2)) / 2)
-                viewer.state = replace(viewer.state, optics=replace(viewer.state.optics, eye=eye))
-                truth = encoded_from_stored(flat[row, column])
-                drawn.append(bounded_psnr(srgb_from_linear(viewer.picture(is_linear=True)), truth))
-                blended.append(bounded_psnr(_blend(kept, row / 2, column / 2), truth))
-    print(f"  views held back: drawn {np.mean(drawn):.2f} dB, plain blend {np.mean(blended):.2f} dB")
+            for v, u in np.ndindex(*(2 * length - 1 for length in kept.shape[:2])):
+                if v % 2 or u % 2:
+                    eye = ViewOffset(v / 2 - kept.shape[0] // 2, u / 2 - kept.shape[1] // 2)
+                    viewer.state = replace(viewer.state, optics=replace(viewer.state.optics, eye=eye))
+                    made = srgb_from_linear(viewer.picture(is_linear=True)), blend(kept, v, u)
+                    errors.append([bounded_psnr(image, encoded_from_stored(views[v, u])) for image in made])
+    return [f"{mean:.2f}" for mean in np.mean(errors, axis=0)]
 
 
-def _held_back(grid: GridShape) -> Iterator[tuple[int, int]]:
-    inside = (2 * ((length - 1) // 2) for length in grid)
-    last_row, last_column = inside
-    for row, column in np.ndindex(last_row + 1, last_column + 1):
-        if row % 2 or column % 2:
-            yield row, column
-
-
-def _blend(kept: NDArray[np.uint8], row: float, column: float) -> FloatImage:
-    rows, columns = {int(np.floor(row)), int(np.ceil(row))}, {int(np.floor(column)), int(np.ceil(column))}
-    around = [encoded_from_stored(kept[r, c]) for r in rows for c in columns]
-    return np.mean(around, axis=0, dtype=np.float32)
-
-
-def _write_views(folder: Path, views: NDArray[np.uint8]) -> None:
-    (folder / "views").mkdir()
-    for row, column in np.ndindex(*views.shape[:2]):
-        write_image_file(folder / "views" / f"v{row:02}_u{column:02}.png", views[row, column], "uint8")
+def blend(kept: NDArray[np.uint8], v: int, u: int) -> FloatImage:
+    """The mean of the kept views around one, which stands at half its index among them."""
+    around = product({v // 2, -(-v // 2)}, {u // 2, -(-u // 2)})
+    return np.mean([encoded_from_stored(kept[at]) for at in around], axis=0, dtype=np.float32)
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.multi_view_depth", main)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from benchmarks.provenance import WITH_CHANGES
+from benchmarks.harness.report import WITH_CHANGES
 
 ROOT = Path(__file__).resolve().parent.parent
 HEADING = "## Speed and accuracy"

@@ -1,6 +1,6 @@
 """Time of a refocused picture, in alternation with the plainest shift-and-sum shader on the same views.
 
-    python -m benchmarks.refocus --data FOLDER [--radius 2] [--size 768x512] [--rounds 4] [--yardstick SCRIPT]
+    python -m benchmarks.refocus --data FOLDER [--radius 2] [--size 768x512] [--repeats 3] [--yardstick SCRIPT]
 
 FOLDER is a light field of any layout; it may hold the centre view's disparity as *.npy. --yardstick: a script of its
 own that takes --data, --radius and --size and prints "min <milliseconds> ms"; it is run once a round.
@@ -13,16 +13,17 @@ import math
 import re
 import subprocess
 import sys
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.light_fields.registry import open_light_field
-from iibr_core.formats.light_fields.views import grid_of, read_stored_view
+from benchmarks.harness.report import emit, head, parser_of, row, start
+from benchmarks.harness.scenes import read_views
+from benchmarks.harness.timing import cost_of
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.renderer import Renderer
@@ -54,22 +55,14 @@ void main() {
 """
 
 
-def read_views(data: Path) -> tuple[GridShape, NDArray[np.uint8]]:
-    """The grid, and the views as (V * U, H, W, 3)."""
-    scene = open_light_field(data)
-    grid = grid_of(scene)
-    return grid, np.stack([read_stored_view(scene, *at) for at in np.ndindex(*grid)])
-
-
-def open_views(
-    renderer: Renderer, grid: GridShape, views: NDArray[np.uint8], centre: NDArray[np.float32] | None
-) -> None:
+def open_views(renderer: Renderer, views: NDArray[np.uint8], centre: NDArray[np.float32] | None) -> None:
     """Upload the views, with disparity where the centre view's is given."""
-    height, width = views.shape[1:3]
-    renderer.open_field(grid, width, height, hdr=False, with_disparity=centre is not None)
-    for row, column in np.ndindex(*grid):
-        disparity = None if centre is None else approximate_disparity(centre, grid.offset(row, column))
-        renderer.upload_view(row, column, views[row * grid.columns + column], disparity)
+    grid = GridShape(*views.shape[:2])
+    renderer.open_field(grid, views.shape[3], views.shape[2], hdr=False, with_disparity=centre is not None)
+    for at in np.ndindex(*grid):
+        renderer.upload_view(
+            *at, views[at], None if centre is None else approximate_disparity(centre, grid.offset(*at))
+        )
 
 
 def approximate_disparity(disparity: NDArray[np.float32], offset: ViewOffset) -> NDArray[np.float32]:
@@ -84,21 +77,16 @@ def approximate_disparity(disparity: NDArray[np.float32], offset: ViewOffset) ->
 
 
 def plain_pass(
-    ctx: moderngl.Context,
-    grid: GridShape,
-    views: NDArray[np.uint8],
-    size_px: tuple[int, int],
-    radius: float,
-    focus: float,
+    ctx: moderngl.Context, views: NDArray[np.uint8], size_px: tuple[int, int], radius: float, focus: float
 ) -> Callable[[float], None]:
     """The plain shader, ready to draw for an eye that many view steps right of the centre."""
-    _, height, width, _ = views.shape
-    texture = ctx.texture_array((width, height, len(views)), 3, views.tobytes(), alignment=1)
+    rows, columns, height, width, _ = views.shape
+    texture = ctx.texture_array((width, height, rows * columns), 3, views.tobytes(), alignment=1)
     texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.LINEAR, moderngl.LINEAR), False, False
     program = ctx.program(PLAIN_VERTEX, PLAIN_FRAGMENT)
-    centre, reach = grid.columns // 2, math.floor(radius + 0.5)
-    bounds = {"first": max(centre - reach, 0), "last": min(centre + reach, grid.columns - 1)}
-    for name, value in {"columns": grid.columns, "shear": -focus / width, "radius": radius, **bounds}.items():
+    centre, reach = columns // 2, math.floor(radius + 0.5)
+    bounds = {"first": max(centre - reach, 0), "last": min(centre + reach, columns - 1)}
+    for name, value in {"columns": columns, "shear": -focus / width, "radius": radius, **bounds}.items():
         program[name] = value
     target = ctx.simple_framebuffer(size_px, components=4)
     quad = ctx.vertex_array(program, [])
@@ -114,13 +102,12 @@ def plain_pass(
 
 def milliseconds(ctx: moderngl.Context, draw: Callable[[float], None]) -> list[float]:
     """Times of FRAMES pictures, each finished, the eye moving a little; the first two, which warm up, left out."""
-    times = []
-    for k in range(FRAMES + 2):
-        start = time.perf_counter()
+
+    def picture(k: int) -> None:
         draw(0.002 * k)
         ctx.finish()
-        times.append((time.perf_counter() - start) * 1e3)
-    return times[2:]
+
+    return [1e3 * cost_of(partial(picture, k)).wall_s for k in range(FRAMES + 2)][2:]
 
 
 def yardstick_ms(script: Path, args: argparse.Namespace) -> float:
@@ -130,48 +117,42 @@ def yardstick_ms(script: Path, args: argparse.Namespace) -> float:
     return float(re.findall(r"min ([\d.]+) ms", output)[0])
 
 
-def parse_arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True)
+def main() -> None:
+    parser = parser_of(__doc__, "repeats", data={"required": True, "help": "a light field of any layout"})
     parser.add_argument("--radius", type=float, default=2.0, help="of the aperture, in view steps")
     parser.add_argument("--size", default="768x512")
-    parser.add_argument("--rounds", type=int, default=4)
     parser.add_argument("--yardstick", type=Path)
-    return parser.parse_args()
+    emit(report(parser.parse_args()))
 
 
-def main() -> None:
-    args = parse_arguments()
+def report(args: argparse.Namespace) -> Iterator[str]:
     width, height = map(int, args.size.split("x"))
-    size_px = width, height
-    grid, views = read_views(args.data)
+    views = read_views(args.data)
     disparity_file = next(iter(sorted(args.data.glob("*.npy"))), None)
     centre = None if disparity_file is None else np.nan_to_num(np.load(disparity_file)).astype(np.float32)
     focus = 0.0 if centre is None else float(np.quantile(centre, 0.25))
-
     gl = create_headless()
     renderer = Renderer(gl)
-    open_views(renderer, grid, views, centre)
+    open_views(renderer, views, centre)
 
     def ours(eye_s: float) -> None:
         eye = ViewOffset(0.0, eye_s)
-        renderer.render(Optics(eye, focus_disparity=focus, aperture_diameter=2 * args.radius), size_px)
+        renderer.render(Optics(eye, focus_disparity=focus, aperture_diameter=2 * args.radius), (width, height))
 
-    plain = plain_pass(gl.ctx, grid, views, size_px, args.radius, focus)
+    plain = plain_pass(gl.ctx, views, (width, height), args.radius, focus)
     times: dict[str, list[float]] = {}
-    for _ in range(args.rounds):
+    for _ in range(args.repeats):
         times.setdefault("plain shader", []).extend(milliseconds(gl.ctx, plain))
         for renderer.prefilter, name in ((True, "picture, smoothing on"), (False, "picture, smoothing off")):
             times.setdefault(name, []).extend(milliseconds(gl.ctx, ours))
         if args.yardstick:
             times.setdefault("yardstick script", []).append(yardstick_ms(args.yardstick, args))
-
-    print(f"{gl.renderer}, {args.size}, aperture radius {args.radius:g} views, focus at {focus:.1f} px per view step")
-    least = min(times["plain shader"])
-    for name, values in times.items():
-        middle = np.median(values)
-        print(f"{name:24} min {min(values):6.1f} ms, median {middle:6.1f} ms, {min(values) / least:.2f} x plain")
+    yield f"{gl.renderer}, {args.size}, aperture radius {args.radius:g} views, focus at {focus:.1f} px per view step\n"
+    yield head("what", "least, ms", "median, ms", "times the plain one")
+    for name, each in times.items():
+        ratio = min(each) / min(times["plain shader"])
+        yield row(name, f"{min(each):.1f}", f"{np.median(each):.1f}", f"{ratio:.2f}")
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.refocus", main)

@@ -17,16 +17,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 
-from benchmarks.batch import write_photos
+from benchmarks.harness.report import emit, head, holds, is_wanted, parser_of, row, start
+from benchmarks.harness.scenes import DEMO, write_photos
+from benchmarks.harness.timing import COMMAND_LINE
 from iibr_core.runtime.time_left import TimeLeft
 from viewer.background import opening_work
 from viewer.cli import terminal
-from viewer.cli.demo import demo_photo
 
 ENOUGH = 0.1
 WITHIN = 1.5
@@ -74,7 +76,7 @@ def jobs(folder: Path) -> dict[str, list[str]]:
     own, out = f"{large / '00000.png'}", folder / "out"
     return {
         "generate 9x9 fast": ["generate", f"{photo}", "--grid", "9", "--quality", "fast", "-o", f"{out / 'a'}"],
-        "generate 7x7 exact": ["generate", f"{photo}", "--grid", "7", "--quality", "exact", "-o", f"{out / 'b'}"],
+        "generate 7x7 balanced": ["generate", f"{photo}", "--grid", "7", "--quality", "balanced", "-o", f"{out / 'b'}"],
         "generate 11x11 of 2 MP": ["generate", own, "--grid", "11", "-o", f"{out / 'c'}"],
         "export quilt": ["export", f"{photo}", "--to", "quilt", "--device", "portrait", "-o", f"{out / 'd.png'}"],
         "export video": ["export", f"{photo}", "--to", "gif", "-o", f"{out / 'e.gif'}"],
@@ -92,11 +94,9 @@ def jobs(folder: Path) -> dict[str, list[str]]:
 def prepare(folder: Path) -> None:
     """Photos, light fields without disparity, poses."""
     photo = folder / "photo.png"
-    for path in demo_photo().parent.iterdir():
-        if path.stem.startswith(demo_photo().stem):
-            (folder / path.name.replace(demo_photo().stem, "photo", 1)).write_bytes(path.read_bytes())
+    for path in DEMO.parent.glob(f"{DEMO.stem}*"):
+        (folder / path.name.replace(DEMO.stem, "photo", 1)).write_bytes(path.read_bytes())
     for name, count, megapixels in (("large", 1, 2.0), ("archive", 10, 0.5)):
-        (folder / name).mkdir()
         write_photos(folder / name, count, megapixels)
     iibr("export", f"{photo}", "--to", "numbered-grid", "--grid", "9", "-o", f"{folder / 'field'}")
     iibr("export", f"{photo}", "--to", "numbered-grid", "--grid", "3", "-o", f"{folder / 'sparse'}")
@@ -104,7 +104,7 @@ def prepare(folder: Path) -> None:
 
 
 def iibr(*words: str) -> None:
-    subprocess.run([sys.executable, "-P", "-m", "viewer", *words], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([*COMMAND_LINE, *words], check=True, stdout=subprocess.DEVNULL)
 
 
 def measure(words: list[str]) -> Outcome | str:
@@ -175,37 +175,38 @@ def processor_s() -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", help="jobs whose name contains one of these words, by commas")
+    parser = parser_of(__doc__, "only")
     parser.add_argument("--fresh", action="store_true")
     parser.add_argument("--job", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.job:
-        records = run_job(json.loads(options.job))
-        print()
-        print(json.dumps([vars(record) for record in records]))
-        return
-    print("| job | told at | about, s | took, s | by the clock | by processor time |")
-    print("| --- | --- | --- | --- | --- | --- |")
+        print("\n" + json.dumps([vars(record) for record in run_job(json.loads(options.job))]))
+    else:
+        emit(report(options.only, options.fresh))
+
+
+def report(only: str, is_fresh: bool) -> Iterator[str]:
+    yield head("job", "told at", "about, s", "took, s", "by the clock", "by processor time", "holds")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "out").mkdir()
         prepare(folder)
         for what, words in jobs(folder).items():
-            if any(word in what for word in options.only.split(",")):
-                if not options.fresh:
+            if is_wanted(what, only):
+                if not is_fresh:
                     measure(words)
-                print(row(what, measure(words)), flush=True)
+                yield row(what, *cells(measure(words)))
 
 
-def row(what: str, outcome: Outcome | str) -> str:
+def cells(outcome: Outcome | str) -> tuple[str, ...]:
+    """Of a row; holds: whether both factors are within WITHIN."""
     if isinstance(outcome, str):
-        return f"| {what} | {outcome} | | | | |"
-    cells = f"{outcome.share:.0%}", f"{outcome.left_s:.1f}", f"{outcome.true_s:.1f}"
-    both = outcome.by_clock, outcome.by_processor
-    factors = (f"{factor:.2f}{'' if 1 / WITHIN <= factor <= WITHIN else ' !'}" for factor in both)
-    return "| " + " | ".join((what, *cells, *factors)) + " |"
+        return (outcome, *[""] * 5)
+    factors = outcome.by_clock, outcome.by_processor
+    is_near = all(1 / WITHIN <= factor <= WITHIN for factor in factors)
+    times = f"{outcome.share:.0%}", f"{outcome.left_s:.1f}", f"{outcome.true_s:.1f}"
+    return (*times, *(f"{factor:.2f}" for factor in factors), holds(is_near))
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.time_left", main)

@@ -2,8 +2,9 @@
 
 python -m benchmarks.use [--steps 1000] [--seed 0]
 
-Says what memory the process fills after so many actions and once it rests, how threads and open files stand, and how
-long frames took but while something was opened, of wall time and of processor time of the window's own thread: other
+Says what memory the process fills after so many actions and once it rests, against a fresh window that rests with the
+same photo and grid: photos differ in size, and grids in views. Then how threads and open files stand, and how long
+frames took but while something was opened, of wall time and of processor time of the window's own thread: other
 programs make frames wait, and only the second tells what this one costs.
 """
 
@@ -11,6 +12,8 @@ from __future__ import annotations
 
 import argparse
 import random
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -178,7 +181,7 @@ class User:
     def is_resting(self) -> bool:
         """Whether nothing is going on any more."""
         state = self.app.state
-        is_busy = state.exporting is not None or state.saving is not None or bool(state.tasks)
+        is_busy = bool(state.jobs or state.tasks)
         return self.is_open() and state.progress.is_complete and self.app.wait_s > 0 and not is_busy
 
     def do(self, *actions: Action) -> None:
@@ -205,8 +208,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--fresh", nargs=3, metavar=("PHOTO", "ROWS", "COLUMNS"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     limit_arenas()  # as the program does
+    if arguments.fresh:
+        path, *views = arguments.fresh
+        print(memory_of_fresh_window(path, GridShape(*map(int, views))))
+        return
     with tempfile.TemporaryDirectory() as name, private_display():
         folder, out = Path(name) / "photos", Path(name)
         folder.mkdir()
@@ -226,14 +234,37 @@ def main() -> None:
     print(f"threads of Python left when the window is closed: {left}")
 
 
+def memory_of_fresh_window(path: str, grid: GridShape) -> float:
+    """MiB of this process once its window rests with a photo and all its views."""
+    with private_display() as _, tempfile.TemporaryDirectory() as out:
+        app = App(initial_state(OpenPath(Source(path, grid=grid))))
+        user = User(app, Path(out))
+        try:
+            user.until(lambda: user.is_open() and app.state.folder is not None)
+            user.do(ShowFilmstrip(True))
+            user.until(user.is_resting, REST_S)
+            return float(psutil.Process().memory_info().rss) / MIB
+        finally:
+            app.close()
+
+
+def fresh_memory(user: User) -> float:
+    """The same in another process, with what this window shows."""
+    scene = user.app.state.scene
+    assert scene is not None
+    command = [sys.executable, "-m", "benchmarks.use", "--fresh", scene.source.path, *map(str, scene.grid)]
+    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
 def take_steps(user: User, steps: int) -> None:
     """Say what the process takes after some of them, and at the end."""
     process = psutil.Process()
-    print("| after | memory, MiB | open files | threads |\n| --- | --- | --- | --- |")
+    print("| after | memory, MiB | fresh, MiB | times | open files | threads |\n| --- | --- | --- | --- | --- | --- |")
 
     def tell(when: str) -> None:
-        rss = process.memory_info().rss / MIB
-        print(f"| {when} | {rss:.0f} | {process.num_fds()} | {process.num_threads()} |", flush=True)
+        rss, fresh = process.memory_info().rss / MIB, fresh_memory(user)
+        cells = when, f"{rss:.0f}", f"{fresh:.0f}", f"{rss / fresh:.2f}", process.num_fds(), process.num_threads()
+        print(f"| {' | '.join(map(str, cells))} |", flush=True)
 
     for number in range(1, steps + 1):
         user.step()

@@ -1,74 +1,145 @@
-"""Figures of the real window on a private X server: first frame, a new plan, all views, idling.
+"""The real window on a private X server: first picture, all views, dragging, idling.
 
-python -m benchmarks.window, a part of `make bench`.
+python -m benchmarks.window [--apertures 0,4] [--idle 5]
+
+Dragged is with 60 pointer moves a second. Latency is counted from the turn of the loop that reads a pointer move to the
+frame that shows its viewpoint, both included.
 """
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import time
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
 
+import numpy as np
 import psutil
 
-from iibr_core.runtime.resources import resource_folder
+from benchmarks.harness.report import emit, head, holds, parser_of, row, start
+from benchmarks.harness.scenes import DEMO
+from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
-from viewer.background import scene_worker
-from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.actions import OpenPath
+from viewer.model.state.optics import SetAperture
 from viewer.model.state.scene import Source
 
-IDLE_S = 5.0
+MOVES = 150
+STEP_PX = 2
+EVERY_S = 1 / 60
+
+
+@dataclass(frozen=True)
+class Drag:
+    """What was seen of one drag.
+
+    latency_frames, latency_ms: of each viewpoint shown. draw_ms: of each picture. left_over: frames after the last move
+    until the picture had caught up.
+    """
+
+    latency_frames: list[int]
+    latency_ms: list[float]
+    draw_ms: list[float]
+    left_over: int
 
 
 def main() -> None:
-    read_at: list[float] = []
-    load = scene_worker.load_photo
-
-    def timed_load(*arguments: Any) -> LoadedPhoto:
-        loaded = load(*arguments)
-        read_at.append(time.perf_counter())
-        return loaded
-
-    scene_worker.load_photo = timed_load
-    photo = resource_folder("assets") / "motorcycle" / "motorcycle.png"
+    parser = parser_of(__doc__)
+    parser.add_argument("--apertures", default="0,4")
+    parser.add_argument("--idle", type=float, default=5.0, help="seconds")
+    options = parser.parse_args()
     with private_display():
-        started = time.perf_counter()
-        app = App(initial_state(OpenPath(Source(str(photo)))))
+        began = time.perf_counter()
+        app = App(initial_state(OpenPath(Source(str(DEMO)))))
         try:
-            while app.scene_view.pictures_drawn == 0:
-                app.step()
-            shown = time.perf_counter()
-            print(
-                f"first frame: {(shown - read_at[0]) * 1e3:.0f} ms after photo and disparity are read,"
-                f" {(shown - started) * 1e3:.0f} ms after the window was asked for;"
-                f" torch imported: {'torch' in sys.modules}",
-                flush=True,
-            )
-            all_views(app, shown)
-            idle(app)
+            emit(report(app, began, [float(aperture) for aperture in options.apertures.split(",")], options.idle))
         finally:
             app.close()
 
 
-def all_views(app: App, since: float) -> None:
-    """Turn the loop until every view is on the screen and nothing is left to do."""
-    while not (app.state.progress.is_complete and app.wait_s > 0 and app.scene_view.shows_all_views()):
+def report(app: App, began: float, apertures: list[float], idle_s: float) -> Iterator[str]:
+    yield head("what", "figure", "measured", "holds")
+    while app.scene_view.pictures_drawn == 0:
         app.step()
-    frames, total = app.frames_shown, app.state.progress.total
-    print(f"all {total} views in the window: {time.perf_counter() - since:.1f} s, {frames} frames shown", flush=True)
-
-
-def idle(app: App) -> None:
+    torch = "torch" in sys.modules
+    yield row("first picture", "without torch", f"{time.perf_counter() - began:.2f} s", holds(not torch))
+    settle(app)
+    said = f"{time.perf_counter() - began:.1f} s, {app.frames_shown} frames shown"
+    yield row(f"all {app.state.progress.total} views", "", said, "")
+    for aperture in apertures:
+        app.do(SetAperture(aperture))
+        settle(app)
+        yield drag_row(aperture, drag(app), app)
+        settle(app)
     process, frames = psutil.Process(), app.frames_shown
-    before, start = process.cpu_times(), time.perf_counter()
-    while time.perf_counter() - start < IDLE_S:
+    before, since = process.cpu_times(), time.perf_counter()
+    while time.perf_counter() - since < idle_s:
         app.step()
-    after, seconds = process.cpu_times(), time.perf_counter() - start
-    used = after.user + after.system - before.user - before.system
-    print(f"idle for {seconds:.0f} s: {app.frames_shown - frames} frames, {used / seconds:.2%} of a core", flush=True)
+    after, frames = process.cpu_times(), app.frames_shown - frames
+    used = (after.user + after.system - before.user - before.system) / idle_s
+    yield row(f"idle for {idle_s:g} s", "no frames", f"{frames} frames, {used:.2%} of a core", holds(frames == 0))
+
+
+def settle(app: App) -> None:
+    """Turn the loop until it is settled."""
+    while not is_settled(app):
+        app.step()
+
+
+def is_settled(app: App) -> bool:
+    """Whether every view is on the screen and nothing is left to do."""
+    state = app.state
+    is_made = state.progress.is_complete and state.shown_generation == state.generation
+    return is_made and app.wait_s > 0 and app.scene_view.shows_all_views()
+
+
+def drag(app: App) -> Drag:
+    """Drag to and fro over the picture and watch when what was read is shown."""
+    picture = app.layout().picture
+    assert picture is not None
+    x, y = round(picture.x + picture.width / 2), round(picture.y + picture.height / 2)
+    moves = [["mousemove", str(x), str(y), "mousedown", "1"]]
+    for k in range(MOVES):
+        to = x + STEP_PX * (abs((k + 30) % 120 - 60) - 30)
+        moves.append(["mousemove", str(to), str(y + k % 7), "sleep", f"{EVERY_S:.4f}"])
+    hand = subprocess.Popen(["xdotool", *(word for move in moves for word in move)])
+    waiting: dict[ViewOffset, tuple[int, float]] = {}
+    frames, milliseconds, draws, turn = [], [], [], 0
+    while hand.poll() is None:
+        turn += 1
+        eye, drawn, began = app.state.optics.eye, app.scene_view.pictures_drawn, time.perf_counter()
+        app.step()
+        shown = app.scene_view.picture_drawn
+        if shown is not None and shown.optics.eye in waiting:
+            since, read_at = waiting[shown.optics.eye]
+            waiting = {other: read for other, read in waiting.items() if read[0] > since}
+            frames.append(turn - since + 1)
+            milliseconds.append((time.perf_counter() - read_at) * 1e3)
+        if app.scene_view.pictures_drawn > drawn:
+            draws.append(app.scene_view.report.draw_ms)
+        if app.state.optics.eye != eye:
+            waiting[app.state.optics.eye] = turn, began
+    left_over = 0
+    while app.scene_view.picture_drawn is None or app.scene_view.picture_drawn.optics.eye != app.state.optics.eye:
+        app.step()
+        left_over += 1
+    subprocess.run(["xdotool", "mouseup", "1"], check=True)
+    return Drag(frames, milliseconds, draws, left_over)
+
+
+def drag_row(aperture: float, seen: Drag, app: App) -> str:
+    picture = app.layout().picture
+    assert picture is not None
+    what = f"dragging, picture {picture.width:.0f}x{picture.height:.0f}, aperture {aperture:g}"
+    worst, latency, draws = max(seen.latency_frames), seen.latency_ms, seen.draw_ms
+    said = (
+        f"{worst} frames, {np.median(latency):.0f} ms (90 %: {np.quantile(latency, 0.9):.0f}); pictures"
+        f" {np.median(draws):.0f} ms (90 %: {np.quantile(draws, 0.9):.0f}); {seen.left_over} frames behind at the end"
+    )
+    return row(what, "latency <= 2 frames, no queue", said, holds(worst <= 2 and seen.left_over <= 2))
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.window", main)

@@ -1,1 +1,47 @@
-"""Inverse image-based rendering: one photo and its disparity become a 4D light field. No window, no GL."""
+"""Inverse image-based rendering: one photo and its disparity become a 4D light field. No window, no GL.
+
+The public Python interface; docs/python.md shows it by examples. `import iibr_core as iibr` loads nothing but names.
+Pictures are (H, W, 3), encoded by sRGB's curve: float32 with 1 = white, or uint8. Disparity is (H, W) float32, larger
+is closer. Light fields are (V, U, H, W, ...), v down, u right; their disparity is in px from view to view.
+"""
+
+from __future__ import annotations
+
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from iibr_core.interface.fields import FORMATS, LightField, View
+    from iibr_core.interface.judging import Comparison, compare, evaluate
+    from iibr_core.interface.scenes import Scene, estimate_depth, from_arrays, open
+    from iibr_core.runtime.tiling import Cancelled
+    from iibr_core.types import InputError
+
+_PLACES = {
+    "FORMATS": "interface.fields",
+    "LightField": "interface.fields",
+    "View": "interface.fields",
+    "Comparison": "interface.judging",
+    "compare": "interface.judging",
+    "evaluate": "interface.judging",
+    "Scene": "interface.scenes",
+    "estimate_depth": "interface.scenes",
+    "from_arrays": "interface.scenes",
+    "open": "interface.scenes",
+    "Cancelled": "runtime.tiling",
+    "InputError": "types",
+}
+__all__ = [
+    "FORMATS", "Cancelled", "Comparison", "InputError", "LightField", "Scene", "View", "compare", "estimate_depth",
+    "evaluate", "from_arrays", "open",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return resolve_name(f"{__name__}.{_PLACES[name]}:{name}")
+
+
+def __dir__() -> list[str]:
+    return __all__

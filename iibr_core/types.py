@@ -27,7 +27,7 @@ StoredColors = NDArray[np.uint8] | NDArray[np.float16]
 """(H, W, 3), encoded by sRGB's curve: uint8 for ordinary photos (255 = white), float16 for HDR ones (1 = white)."""
 
 
-Quality = Literal["fast", "balanced", "exact"]
+Quality = Literal["fast", "balanced"]
 """Where the ray transformer runs: nowhere, on ambiguous rays, everywhere."""
 
 DEFAULT_QUALITY: Quality = "balanced"
@@ -156,7 +156,8 @@ class Disparity:
     values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
     ("scene.pfm", "none"). inverse_metres: (slope, offset) of 1 / distance in metres over the values, None where only
     their order is known. unknown: (H, W) bool, where the source knew nothing and values were filled in; None: nowhere.
-    Raises InputError for values that are not finite, so that no later step has to check.
+    viewing_share: of TOTAL_PARALLAX that viewing plans for; a guess moves less. Raises InputError for values that are
+    not finite, so that no later step has to check.
     """
 
     values: FloatImage
@@ -164,6 +165,7 @@ class Disparity:
     notes: tuple[str, ...] = ()
     inverse_metres: tuple[float, float] | None = None
     unknown: NDArray[np.bool_] | None = None
+    viewing_share: float = 1.0
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.values).all():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 import pytest
 from hypothesis import settings
@@ -10,6 +11,10 @@ from hypothesis import settings
 # Before torch and BLAS load: their threads spin while they wait for each other, so that tiny arrays take up to 28 times
 # as long where others use the cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Where the caller ignores interruptions, as jobs in the background do, programs that are started here would, too.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The first example of a test may compile a kernel, which takes seconds; nothing is timed in a test anyway.
 settings.register_profile("untimed", deadline=None)

@@ -52,6 +52,8 @@ def _run() -> int:
     _on_interruption(_end_at_once)
     if os.name == "posix":
         _mend_standard_streams()
+    else:
+        _escape_unknown_characters()
     _settle_home()
     _ignore_warnings()
     if not 1 <= _whole_number(os.environ.get(NUMBA_THREADS) or "1") <= MOST_NUMBA_THREADS:
@@ -109,11 +111,12 @@ def _interrupt_again(lost: Any) -> None:
     if not isinstance(lost.exc_value, KeyboardInterrupt):
         sys.__unraisablehook__(lost)
         return
-    from signal import SIGINT
+    from signal import SIGINT, raise_signal
     from threading import Timer
 
-    # The system's own signal: it ends whatever the main thread waits for by then.
-    again = Timer(INTERRUPT_AGAIN_S, os.kill, (os.getpid(), SIGINT))
+    # The system's own signal: it ends whatever the main thread waits for by then. On Windows it would end the process.
+    is_posix = os.name == "posix"
+    again = Timer(INTERRUPT_AGAIN_S, *((os.kill, (os.getpid(), SIGINT)) if is_posix else (raise_signal, (SIGINT,))))
     again.daemon = True
     again.start()
 
@@ -180,6 +183,13 @@ def _mend_standard_streams() -> None:
     sys.stderr = _text_stream(_Diagnostics(2, "w", closefd=False), sys.stderr)
 
 
+def _escape_unknown_characters() -> None:
+    """The same for the streams as Python opened them; a program without a console has none."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def _text_stream(raw: io.FileIO, like: Any) -> io.TextIOWrapper:
     encoding = like.encoding if like else "utf-8"
     by_lines = like is None or like.line_buffering or like.write_through
@@ -231,7 +241,7 @@ def _settle_home() -> None:
     """Nothing is kept in the working folder: where HOME makes no sense the user database counts, and nowhere is home
     to users that it does not know.
     """
-    if not os.path.isabs(os.environ.get("HOME", os.sep)):
+    if "HOME" in os.environ and not os.path.isabs(os.environ["HOME"]):
         del os.environ["HOME"]
     if not os.path.isabs(os.path.expanduser("~")):
         os.environ["HOME"] = os.devnull

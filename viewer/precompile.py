@@ -1,25 +1,36 @@
 """Compiles the kernels that opening a photo needs, for an installation to bring along: nobody waits for them then.
 
-    python -P -m viewer.precompile iibr_core/_kernels
+    python -P -m viewer.precompile iibr_core/_kernels [COMMAND ...]
 
-They are compiled by doing the real work on small photos, from reading to the last view: only so are they compiled for
-just those arrays that they will meet. What training and evaluation need beside is compiled where it is used. Kernels
-that only ever become part of others are left out: where the others are compiled, nobody asks for them.
+As many processes as there are cores do the real work on small photos, from reading to the last view: only so are
+kernels compiled for just those arrays that they will meet. All keep them in that one folder, where each finds those of
+the others, and where what was left half done goes on. A command is run as soon as those of the first picture are
+there; the rest follows beside it.
+
+What training and evaluation need beside is compiled where it is used. Kernels that only ever become part of others are
+left out: where the others are compiled, nobody asks for them.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import shutil
+import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import wait
 from dataclasses import replace
-from multiprocessing import get_context
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Any, get_args
+
+import psutil
+
+from iibr_core.runtime.compiling import COMPILING
+from iibr_core.runtime.machine import core_count
+from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
+from iibr_core.types import InputError, Quality
 
 if TYPE_CHECKING:
     from viewer.model.state.scene import Source
@@ -27,74 +38,140 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 PART = (slice(150, 310), slice(200, 400))
 """Of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
-MADE_OF = "made_of.sha256"
-"""Beside the kernels, written after all of them: the digest of their sources."""
+MADE_OF = f"made_of.py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
+"""Beside the kernels, written after all of them: of what. One for each Python, whose kernels lie side by side."""
 GLOSSY_PIXELS = 250_000
 """So many that normals are smoothed, as those of large photos are."""
+LOOK_S = 0.5
+"""How often it is asked whether to stop."""
+LOWEST_PRIORITY: int = psutil.IDLE_PRIORITY_CLASS if sys.platform == "win32" else 19
 
 
 def main() -> None:
-    """Write the compiled kernels into the folder named on the command line, in place of what is there."""
-    write_kernels(Path(sys.argv[1]).absolute())
-
-
-def write_kernels(folder: Path) -> None:
-    """Compile, for the kind of processor that `kernel_cache` settles on, and keep what a second process reads that does
-    the same. Where this installation has brought along what was made of the same sources, that is taken.
-    """
-    from iibr_core.runtime.kernel_cache import PRECOMPILED
-
-    made_of = digest_of_sources()
-    if (PRECOMPILED / MADE_OF).is_file() and (PRECOMPILED / MADE_OF).read_text() == made_of:
-        if folder != PRECOMPILED:
-            shutil.rmtree(folder, ignore_errors=True)
-            shutil.copytree(PRECOMPILED, folder, ignore=shutil.ignore_patterns(MADE_OF))
-            (folder / MADE_OF).write_text(made_of)
-        return
+    """Fill the folder named on the command line, and run the command that follows it."""
+    folder, *command = sys.argv[1:]
+    environment = dict(os.environ)
     for name in [name for name in os.environ if name.startswith("NUMBA_")]:
         del os.environ[name]
     os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"  # a library that not every machine has
-    shutil.rmtree(folder, ignore_errors=True)
-    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as processes:
-        processes.submit(_work_with, folder).result()
-        read = processes.submit(_work_with, folder).result()
-    for path in folder.rglob("*.nb?"):
-        if str(path) not in read:
+    window: list[subprocess.Popen[bytes]] = []
+
+    def begin() -> None:
+        others = psutil.Process().children()
+        if command:
+            window.append(subprocess.Popen(command, env=environment))
+            for process in (psutil.Process(), *others):
+                process.nice(LOWEST_PRIORITY)
+
+    try:
+        write_kernels(Path(folder).absolute(), begin, lambda: bool(window) and window[0].poll() is not None)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        begin()
+    except (Cancelled, KeyboardInterrupt):
+        pass
+    sys.exit(window[0].wait() if window else 0)
+
+
+def write_kernels(folder: Path, begin: Callable[[], None] = lambda: None, should_stop: ShouldStop = never) -> None:
+    """Have all kernels in the folder, compiled for the kind of processor that `kernel_cache` settles on, and none that
+    nobody reads, or of other sources. begin: is called once those of the first picture are there.
+
+    Raises InputError where no process can be started, Cancelled once should_stop is true after that.
+    """
+    mark, sources = folder / MADE_OF, digest_of_sources()
+    made_of = f"{sources}\n{_runtime()}\n"
+    if _text(mark) == made_of:
+        begin()
+        return
+    print(COMPILING, file=sys.stderr)
+    mark.unlink(missing_ok=True)
+    _take_steps(folder, begin, should_stop)
+    read = _take_steps(folder, lambda: None, should_stop)
+    marks = [path for path in folder.glob("made_of.*") if _text(path).startswith(sources)]
+    for path in folder.rglob("*.*"):
+        is_others = path in marks or any(f"{other.suffix}." in path.name for other in marks)
+        if path.is_file() and str(path) not in read and not is_others:
             path.unlink()
-    (folder / MADE_OF).write_text(made_of)
+    mark.write_text(made_of)
 
 
 def digest_of_sources(root: Path = ROOT) -> str:
     """Of all that decides which kernels there are, and what becomes of them."""
+    digest = hashlib.sha256()
+    for path in sorted(path for room in ("iibr_core", "viewer") for path in (root / room).rglob("*.py")):
+        digest.update(f"{path.relative_to(root).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()
+
+
+def _runtime() -> str:
     from iibr_core.runtime.kernel_cache import numba
 
-    parts = [sys.version, numba.__version__, str(numba.core.config.CPU_NAME)]
-    for path in sorted(path for room in ("iibr_core", "viewer") for path in (root / room).rglob("*.py")):
-        parts += [str(path.relative_to(root)), hashlib.sha256(path.read_bytes()).hexdigest()]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    return f"{' '.join(sys.version.split())}; numba {numba.__version__}; {numba.core.config.CPU_NAME}"
 
 
-def _work_with(folder: Path) -> set[str]:
-    """Do all that needs kernels, in a process that has compiled nothing yet, with those in the folder; add what had to
-    be compiled. Returns the files that were read.
-    """
-    read = set()
-    sys.addaudithook(lambda event, arguments: read.add(str(arguments[0])) if event == "open" else None)
+def _text(path: Path) -> str:
+    return path.read_text() if path.is_file() else ""
+
+
+def _take_steps(folder: Path, begin: Callable[[], None], should_stop: ShouldStop) -> set[str]:
+    """Each step in whichever process is free. Returns the files of kernels that were read or written."""
+    from viewer.app.batch.processes import local_workers
+
+    with local_workers(core_count(), 1) as workers:
+        steps = [workers.executor.submit(_work_in, folder, step) for step in STEPS]
+        steps[0].result()
+        begin()
+        while not should_stop():
+            if not wait(steps, LOOK_S).not_done:
+                return set[str]().union(*(step.result() for step in steps))
+    raise Cancelled
+
+
+_used: set[str] = set()
+"""The files that this process has read, or put in their place."""
+
+
+def _note_use(event: str, arguments: tuple[Any, ...]) -> None:
+    if event in ("open", "os.rename"):
+        _used.add(str(arguments[event == "os.rename"]))
+
+
+@cache
+def _begin_to_fill(folder: Path) -> None:
+    from iibr_core.runtime.kernel_cache import fill
+
+    fill(folder)
+    sys.addaudithook(_note_use)
+
+
+def _work_in(folder: Path, step: Callable[[Path], None]) -> set[str]:
+    """Do what needs kernels, with those in the folder; add what has to be compiled."""
+    _begin_to_fill(folder)
     with tempfile.TemporaryDirectory() as scratch:
-        kept = Path(scratch) / "kernels"
-        os.environ["NUMBA_CACHE_DIR"] = str(kept)
-        from iibr_core.runtime import kernel_cache
+        step(Path(scratch))
+    return _used
 
-        kernel_cache.PRECOMPILED = folder
-        for source in _photos(Path(scratch)):
-            _open(source)
-        _paint()
-        _look_around(source)
-        _find_gloss(source)
-        _draw_at_own_size(source)
-        _open(_views_alone(Path(scratch)))
-        _collect(kept, folder)
-    return read
+
+def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Source:
+    """A part of the demo photo as a file."""
+    import numpy as np
+
+    from iibr_core.formats.images.photo import read_photo, write_image
+    from iibr_core.formats.maps.reader import read_map
+    from iibr_core.formats.maps.writer import write_map
+    from viewer.model.demo import demo_photo
+    from viewer.model.state.scene import Source
+
+    photo = scratch / ("photo.exr" if is_hdr else "photo.png")
+    colors = read_photo(demo_photo()).pixels[PART]
+    write_image(photo, 4 * colors if is_hdr else np.round(255 * colors).astype(np.uint8))
+    if is_mapped:
+        # A pixel beside the photo, and with a hole: rims of measured maps are moved to it.
+        disparity = np.roll(read_map(demo_photo().with_name("motorcycle_disparity.pfm"))[PART], 1, axis=1)
+        disparity[:4, :4] = np.nan
+        write_map(scratch / "photo_disparity.pfm", disparity)
+    return Source(str(photo))
 
 
 def _open(source: Source) -> None:
@@ -106,14 +183,46 @@ def _open(source: Source) -> None:
         pass
 
 
-def _paint() -> None:
+def _show_first_picture(scratch: Path) -> None:
+    from viewer.background.scene_worker import SceneRequest, results_of
+    from viewer.model.state.optics import CENTRE
+
+    next(results_of(SceneRequest(0, _photo(scratch)), lambda: False, lambda: CENTRE))
+
+
+def _make_views(scratch: Path) -> None:
+    """Without what comes before the first picture."""
+    from iibr_core.depth.choice import DepthChoice
+
+    _open(replace(_photo(scratch), depth=DepthChoice(refine=0.0)))
+
+
+def _open_in(scratch: Path, quality: Quality) -> None:
+    _open(replace(_photo(scratch), quality=quality))
+
+
+def _open_smaller(scratch: Path) -> None:
+    _open(replace(_photo(scratch), max_pixels=160 * 200 // 2))
+
+
+def _open_guessed(scratch: Path) -> None:
+    from iibr_core.depth.choice import DepthChoice
+
+    _open(replace(_photo(scratch, is_mapped=False), depth=DepthChoice(start="rough")))
+
+
+def _open_hdr(scratch: Path) -> None:
+    _open(_photo(scratch, is_hdr=True))
+
+
+def _paint(scratch: Path) -> None:
     """What the first stroke of the depth brush needs."""
     from viewer.background.loaded_photo import prepare_brush
 
     prepare_brush()
 
 
-def _look_around(source: Source) -> None:
+def _look_around(scratch: Path) -> None:
     """What a camera needs that leaves the plane of the views."""
     import numpy as np
 
@@ -121,29 +230,30 @@ def _look_around(source: Source) -> None:
     from iibr_core.types import Camera
     from viewer.background.loaded_photo import load_photo
 
-    loaded = load_photo(source)
+    loaded = load_photo(_photo(scratch))
     size = loaded.photo.size
     camera = Camera(np.eye(3), np.zeros(3), size, (float(size.width),) * 2, (size.width / 2, size.height / 2), "")
     turned = steered(camera, 0.2, 0.2, 0.2)
     FreeViews(loaded.photo.pixels, inverse_depth_of(loaded.disparity.values, None), camera, [turned]).view(turned)
 
 
-def _find_gloss(source: Source) -> None:
+def _find_gloss(scratch: Path) -> None:
     """What the window waits for when a surface becomes glossy, with a light that is to be found in the photo, too."""
     from iibr_core.rendering.gloss.settings import Gloss, GlossLight
     from viewer.background.gloss import GlossRequest, answer
     from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
-    from viewer.cli.demo import demo_photo
+    from viewer.model.demo import demo_photo
     from viewer.model.state.optics import CENTRE
+    from viewer.model.state.scene import Source
 
-    large = replace(source, path=str(demo_photo()), max_pixels=GLOSSY_PIXELS)
+    large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
     ready = next(results_of(SceneRequest(0, large), lambda: False, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     gloss = Gloss(light=GlossLight(color=(0.0, 0.0, 0.0)), photo_shines=True)
     answer(GlossRequest(gloss, ready.scene, ready.centre))
 
 
-def _draw_at_own_size(source: Source) -> None:
+def _draw_at_own_size(scratch: Path) -> None:
     """What a picture at the photo's own size needs, with all that the photo hides, through a lens."""
     import numpy as np
 
@@ -153,7 +263,7 @@ def _draw_at_own_size(source: Source) -> None:
     from viewer.model.layout import ScreenSize
     from viewer.model.state.optics import CENTRE, Optics
 
-    small = replace(source, max_pixels=16_000)
+    small = replace(_photo(scratch), max_pixels=16_000)
     loaded = load_photo(small)
     plan = make_plan(small, loaded, 1.0)
     ready = next(results_of(SceneRequest(0, small, loaded=loaded, plan=plan), lambda: False, lambda: CENTRE))
@@ -163,7 +273,7 @@ def _draw_at_own_size(source: Source) -> None:
     FullPicture(ready.scene, plan, loaded, Optics(aperture_diameter=3.0), ScreenSize(width, height), smaller).draw()
 
 
-def _views_alone(scratch: Path) -> Source:
+def _search_views(scratch: Path) -> None:
     """A light field without disparity: `iibr depth` looks for it in the same way."""
     import numpy as np
 
@@ -175,47 +285,23 @@ def _views_alone(scratch: Path) -> Source:
     texture = np.random.default_rng(0).integers(0, 255, (96, 96, 3), np.uint8)
     for row, column in np.ndindex(3, 3):
         write_image(folder / f"v{row}_u{column}.png", np.roll(texture, (row, column), (0, 1)))
-    return Source(str(folder))
+    _open(Source(str(folder)))
 
 
-def _photos(scratch: Path) -> Iterator[Source]:
-    """A part of the demo photo as files of every kind that is computed with in another way, and in every quality."""
-    import numpy as np
-
-    from iibr_core.depth.choice import DepthChoice
-    from iibr_core.depth.search import open_with_depth
-    from iibr_core.formats.images.photo import write_image
-    from iibr_core.formats.maps.writer import write_map
-    from iibr_core.types import Quality
-    from viewer.cli.demo import demo_photo
-    from viewer.model.state.scene import Source
-
-    demo = open_with_depth(demo_photo(), DepthChoice(refine=0.0))
-    # A pixel beside the photo, and with a hole: rims of measured maps are moved to it.
-    colors, disparity = demo.photo.pixels[PART], np.roll(demo.disparity.values[PART], 1, axis=1)
-    disparity[:4, :4] = np.nan
-    photo, unmapped, hdr = (scratch / name for name in ("photo.png", "unmapped.png", "hdr.exr"))
-    write_image(photo, np.round(255 * colors).astype(np.uint8))
-    write_image(unmapped, np.round(255 * colors).astype(np.uint8))
-    write_image(hdr, 4 * colors)
-    for mapped in (photo, hdr):
-        write_map(mapped.with_name(f"{mapped.stem}_disparity.pfm"), disparity)
-    for quality in get_args(Quality):
-        yield Source(str(photo), quality=quality)
-    yield Source(str(photo), max_pixels=colors.size // 6)
-    yield Source(str(unmapped), DepthChoice(start="rough"))
-    yield Source(str(hdr))
-
-
-def _collect(kept: Path, folder: Path) -> None:
-    """From where Numba keeps them, under digests of the places of the sources, to folders named like the package's."""
-    from iibr_core.runtime.kernel_cache import PACKAGE, numba
-
-    locator = numba.core.caching._CacheLocator
-    for place in (PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir())):
-        compiled = kept / locator.get_suitable_cache_subpath(str(place / "any.py"))
-        if compiled.is_dir():
-            shutil.copytree(compiled, folder / place.relative_to(PACKAGE), dirs_exist_ok=True)
+STEPS: tuple[Callable[[Path], None], ...] = (
+    _show_first_picture,
+    _make_views,
+    _search_views,
+    _paint,
+    _look_around,
+    _find_gloss,
+    _open_guessed,
+    *(partial(_open_in, quality=quality) for quality in get_args(Quality)),
+    _open_smaller,
+    _open_hdr,
+    _draw_at_own_size,
+)
+"""The first picture first; steps that begin together compile little that is the same."""
 
 
 if __name__ == "__main__":

@@ -1,159 +1,188 @@
 """Measures speed against error for every switch, and writes tables and plots: speed.md, speed.svg, speed.png.
 
-    python -m benchmarks.speed --out out/bench [--data DATA [--yardsticks BENCH]]          # make bench
+    python -m benchmarks.speed --out out/bench [--data DATA] [--repeats 3] [--quick]          # make bench
 
-Without DATA, which holds scenes as `iibr evaluate` takes them, a made-up scene with known views and the demo photo are
-measured. BENCH holds scripts that judge from outside, judge_views.py and plain_refocus.py. Machines differ and are
-shared: quote medians and ratios.
+Without DATA a drawn scene with known views is measured. --quick: no soft maps, no large fields: to see that it works.
+Machines differ and are shared: quote medians and ratios.
 """
 
 from __future__ import annotations
 
-import os
 import platform
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from functools import partial
 
-import typer
+import numpy as np
 
-from iibr_core.types import ImageSize, InputError, Quality, ReportProgress, image_size
-from viewer.cli.options import MaxPixels
+from benchmarks.harness.report import parser_of, start
+from benchmarks.harness.scenes import (
+    FIELD,
+    BenchScene,
+    data_scenes,
+    drawn_scene,
+    judged_of,
+    require_scenes,
+    soften,
+    squares_scene,
+)
+from benchmarks.harness.timing import (
+    cost_of,
+    field_costs,
+    in_turns,
+    make_field,
+    median_cost,
+    median_ratio,
+    peak_bytes,
+)
+from benchmarks.speed.drawing import measure_drawing, pinhole_renderer
+from benchmarks.speed.report import Bench, Figures, Measured, SpeedTarget, write_bench
+from benchmarks.speed.variants import (
+    LEAST_STORED_SIDE,
+    REFERENCE,
+    VARIANTS,
+    Draw,
+    Variant,
+    evaluated_views,
+    field_cost,
+    is_possible,
+)
+from iibr_core.evaluation.metrics import bounded_psnr, flip
+from iibr_core.generation.cost_model import CORES
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import PlanOverrides, plan_for_viewing, plan_literal
+from iibr_core.generation.relief import measure_relief
+from iibr_core.types import TOTAL_PARALLAX, ImageSize, InputError, Quality, ReportProgress, image_size
 from viewer.cli.terminal import show_progress
+from viewer.gpu.context import GLContext
+from viewer.gpu.headless_context import create_headless
 
-if TYPE_CHECKING:
-    from benchmarks.speed.figures import SceneFigures
-    from benchmarks.speed.prediction import BenchInput, Prediction
-    from benchmarks.speed.rendering_figures import DrawingFigures
-    from benchmarks.speed.report import Bench
-    from benchmarks.speed.targets import SpeedTarget
-    from benchmarks.speed.variants import BenchScene
-    from viewer.gpu.context import GLContext
-
-TARGET_SIZE, TARGET_REACH = ImageSize(512, 512), 4
+DRAWN_SIZE, DRAWN_PX = ImageSize(256, 256), 2.0
+USUAL_SIZE = ImageSize(512, 512)
+MEGAPIXEL_SIDE, SQUARES = 1024, 16
+FIELD_S, MEGAPIXEL_S, MOST_MEMORY, FLAT_CHEAPER = 1.5, 5.0, 2.5, 20
+BEHIND_FRONT_DB = 0.1
+AS_GOOD_DB, MOST_SLOWER = 0.05, 1.25
+"""A variant this little worse is as good; the plan's choice may take so many times as long."""
+TIMED: tuple[Quality, ...] = ("fast", "balanced")
 
 
-def bench(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for speed.md, speed.svg and speed.png.")],
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="A scene with true views and disparity, or a folder of such.",
-            show_default="a made-up scene, and the demo photo",
-        ),
-    ] = None,
-    repeats: Annotated[int, typer.Option(min=1, help="Rounds; figures are their medians.")] = 3,
-    max_pixels: MaxPixels = None,
-    yardsticks: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of judge_views.py and plain_refocus.py.", show_default=False),
-    ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Small series, no soft maps, no window: to see that it works.")
-    ] = False,
-) -> None:
-    """Measure speed against error for every switch, and how cost grows with what a scene asks for.
-
-    Example: python -m benchmarks.speed --data data --out docs
-    """
-    if not out.is_dir():
-        raise InputError(f"{out}: is no folder; --out names one that exists")
-    from benchmarks.speed.inputs import demo_input, made_up_scenes, scenes_of_folder
-    from benchmarks.speed.prediction import whole_field
-    from benchmarks.speed.processes import require_yardsticks
-    from benchmarks.speed.report import write_bench
-
-    require_yardsticks(yardsticks, data)
-    scenes = scenes_of_folder(data, max_pixels, not quick) if data else made_up_scenes(not quick)
-    inputs = [whole_field(scene) for scene in scenes if not scene.is_soft] + ([] if data else [demo_input()])
-    for path in write_bench(out, measure(scenes, inputs, repeats, quick, yardsticks, data)):
+def main() -> None:
+    parser = parser_of(
+        __doc__, "data", "repeats", out={"required": True, "metavar": "DIR", "help": "folder to write to"}
+    )
+    parser.add_argument("--quick", action="store_true")
+    options = parser.parse_args()
+    if not options.out.is_dir():
+        raise InputError(f"{options.out}: is no folder; --out names one that exists")
+    if options.data:
+        scenes = require_scenes(options.data, list(data_scenes(options.data, with_soft=not options.quick)))
+    else:
+        own = drawn_scene(0, DRAWN_SIZE, DRAWN_PX, FIELD, judged_of(FIELD))
+        scenes = [own] if options.quick else [own, soften(own)]
+    with headless_gl() as gl, show_progress("measuring") as show:
+        bench = measure(scenes, options.repeats, gl, options.quick, show)
+    for path in write_bench(options.out, bench):
         print(path)
 
 
 def measure(
-    scenes: list[BenchScene],
-    inputs: list[BenchInput],
-    repeats: int,
-    quick: bool,
-    yardsticks: Path | None,
-    data: Path | None,
+    scenes: Sequence[BenchScene], repeats: int, gl: GLContext | None, quick: bool, show: ReportProgress
 ) -> Bench:
-    """Everything, with a bar on stderr. scenes: with true views. inputs: fields that are made in several ways.
-
-    What the plan predicts is judged on scenes that no constant was fitted to; on the first input if it must be quick.
-    """
-    from benchmarks.prediction import judged_scenes
-    from benchmarks.provenance import made_by
-    from benchmarks.speed.checks import view_agreement
-    from benchmarks.speed.prediction import predict
-    from benchmarks.speed.processes import window_lines, yardstick_lines
-    from benchmarks.speed.report import Bench
-    from benchmarks.speed.scaling import growth, series
-
-    qualities: tuple[Quality, ...] = ("fast", "balanced") if quick else ("fast", "balanced", "exact")
-    with headless_gl() as gl, show_progress("measuring") as show:
-        figures, drawings = measure_scenes(scenes, repeats, gl, show)
-        unseen = inputs[:1] if quick else list(judged_scenes(data))
-        predicted = tuple(f for one in unseen for f in predict([one], qualities, repeats, show))
-        growths = tuple(growth(name, points, repeats, show) for name, points in series(quick).items())
-        targets = tuple(all_targets(scenes, inputs, figures, predicted, 0 if quick else repeats, show))
-        show(0, 0, "whether views agree")
-        agreements = tuple((one.name, view_agreement(one)) for one in inputs)
-        window = () if quick else window_lines()
-        outside = yardstick_lines(yardsticks, data) if yardsticks and data else ()
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}" + (f", {gl.renderer}" if gl else "")
-    words = made_by("benchmarks.speed")
-    return Bench(figures, drawings, predicted, growths, targets, machine, words, agreements, window, outside)
-
-
-def measure_scenes(
-    scenes: list[BenchScene], repeats: int, gl: GLContext | None, report_progress: ReportProgress
-) -> tuple[tuple[SceneFigures, ...], tuple[DrawingFigures, ...]]:
-    """Every variant of the core on each scene, and of the renderer on those with views enough to leave some out."""
-    from benchmarks.speed.figures import measure_scene
-    from benchmarks.speed.rendering import measure_drawing, pinhole_renderer
-    from benchmarks.speed.variants import LEAST_STORED_SIDE, VARIANTS
-
+    """Every variant of the core on each scene, of the renderer on those with views enough to leave some out."""
     with nullcontext() if gl is None else pinhole_renderer(gl) as draw:
-        figures = tuple(measure_scene(scene, VARIANTS, repeats, report_progress, draw) for scene in scenes)
-    if gl is None:
-        return figures, ()
-    large = [scene for scene in scenes if not scene.is_soft and 2 * scene.reach + 1 >= LEAST_STORED_SIDE]
-    return figures, tuple(f for scene in large for f in measure_drawing(gl, scene, repeats, report_progress))
-
-
-def all_targets(
-    scenes: list[BenchScene],
-    inputs: list[BenchInput],
-    figures: tuple[SceneFigures, ...],
-    predicted: tuple[Prediction, ...],
-    repeats: int,
-    report_progress: ReportProgress,
-) -> Iterator[SpeedTarget]:
-    """Figures that have a target. repeats: 0 leaves out those that take long."""
-    from benchmarks.speed.checks import invariance_targets
-    from benchmarks.speed.processes import first_picture_target
-    from benchmarks.speed.targets import field_targets, front_targets, prediction_targets
-
+        figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
     own = [scene for scene in scenes if not scene.is_soft]
-    usual = next((s for s in own if image_size(s.photo) == TARGET_SIZE and s.reach == TARGET_REACH), None)
-    if usual is not None and repeats:
-        yield from field_targets(usual, repeats, report_progress)
-        yield first_picture_target(usual)
-    yield from front_targets([one for one in figures if not one.is_soft])
-    yield from prediction_targets(predicted)
-    report_progress(0, 0, "other orders, other bands")
-    yield from invariance_targets(inputs[-1])
+    large = [scene for scene in own if gl and 2 * scene.reach + 1 >= LEAST_STORED_SIDE]
+    drawings = tuple(each for scene in large for each in measure_drawing(gl, scene, repeats, show))
+    usual = [one for one in own if image_size(one.photo) == USUAL_SIZE and one.grid == FIELD]
+    targets = [] if quick else [target for one in usual[:1] for target in field_targets(one, repeats, show)]
+    targets += front_targets([one for one in figures if not one.is_soft])
+    machine = f"{platform.machine()}, {platform.system()}" + (f", {gl.renderer}" if gl else "")
+    return Bench(figures, drawings, tuple(targets), f"{machine}.")
+
+
+def measure_scene(
+    scene: BenchScene, variants: Sequence[Variant], repeats: int, show: ReportProgress, draw: Draw | None = None
+) -> Figures:
+    """Every possible variant on one scene, timed in turns. draw: what fills in where views are left out."""
+    possible = [variant for variant in variants if is_possible(variant, scene, draw is not None)]
+    errors = {}
+    for k, variant in enumerate(possible):
+        show(k, len(possible), f"{scene.name}: error of {variant.name}")
+        made = evaluated_views(variant, scene, draw)
+        each = [(bounded_psnr(image, scene.truth[at]), flip(image, scene.truth[at])) for at, image in made.items()]
+        errors[variant.name] = [float(mean) for mean in np.mean(each, axis=0)]
+    ways = {variant.name: partial(field_cost, variant, scene) for variant in possible}
+    costs = in_turns(ways, repeats, lambda done, total, name: show(done, total, f"{scene.name}: {name}"))
+    measured = []
+    for variant in possible:
+        own, memory = costs[variant.name], peak_bytes(field_cost, variant, scene)
+        ratio = median_ratio(own, costs[REFERENCE.name])
+        measured.append(Measured(variant.name, median_cost(own), ratio, *errors[variant.name], peak_bytes=memory))
+    height, width = image_size(scene.photo)
+    planned = planned_variant(scene, possible)
+    found = Figures(scene.name, "", tuple(measured), planned, scene.is_soft)
+    about = (
+        f"{len(scene.field)} views of {width}x{height}, {len(scene.truth)} judged. The plan would choose *{planned}*,"
+        f" {found.behind_front_db:.2f} dB behind the best that takes no longer."
+    )
+    return replace(found, about=about)
+
+
+def planned_variant(scene: BenchScene, variants: Sequence[Variant]) -> str:
+    """That of the plan's quality, with as few stored views as it finds enough for this parallax."""
+    full = 2 * scene.reach
+    moved_px = measure_relief(scene.disparity).range * full
+    strength = max(moved_px / (TOTAL_PARALLAX * scene.photo.shape[1]), 1e-6)
+    side = plan_for_viewing(*scene.given, PlanOverrides(depth_strength=strength)).grid.columns
+    chosen = Variant("", plan_literal(*scene.given, scene.grid).quality)
+    plain = [variant for variant in variants if replace(variant, name="", every=1) == chosen and variant.every > 0]
+    enough = [variant for variant in plain if full // variant.every + 1 >= min(side, full + 1)]
+    return max(enough, key=lambda variant: variant.every, default=REFERENCE).name
+
+
+def field_targets(scene: BenchScene, repeats: int, show: ReportProgress) -> Iterator[SpeedTarget]:
+    """Of a real field of 9x9 views of 512x512, of one of 1 MP, and of a flat photo."""
+    large = squares_scene(MEGAPIXEL_SIDE, 2.0, SQUARES)
+    named = {f"9x9 of {USUAL_SIZE}, {scene.name}": scene, large.name: large}
+    fields = {f"{name}, {quality}, warm": (one, quality) for name, one in named.items() for quality in TIMED}
+    costs = field_costs(fields, repeats, show)
+    for what, cost in costs.items():
+        alone, most_s = cost.cpu_s / CORES, FIELD_S if fields[what][0] is scene else MEGAPIXEL_S
+        said = f"{alone:.2f} s of processor time over {CORES} cores ({cost.wall_s:.2f} s by the clock)"
+        yield SpeedTarget(what, f"<= {most_s:g} s", said, alone <= most_s)
+    ratio = peak_bytes(make_field, large, "balanced") / plan_literal(*large.given, large.grid).field_bytes
+    is_met = ratio <= MOST_MEMORY if np.isfinite(ratio) else None
+    yield SpeedTarget(f"{large.name}, peak memory over the field's", f"<= {MOST_MEMORY:g}", f"{ratio:.2f}", is_met)
+    photo, flat = replace(scene, disparity=np.zeros_like(scene.disparity)).given
+    plan = plan_for_viewing(photo, flat)
+    flat_s = median_cost([cost_of(lambda: list(generate(photo, flat, plan))) for _ in range(5 * repeats)]).cpu_s
+    cheaper = next(iter(costs.values())).cpu_s / max(flat_s, 1e-6)
+    target = f">= {FLAT_CHEAPER} times cheaper"
+    yield SpeedTarget(f"a flat photo against {scene.name}", target, f"{cheaper:.0f} times", cheaper >= FLAT_CHEAPER)
+
+
+def front_targets(scenes: Sequence[Figures]) -> Iterator[SpeedTarget]:
+    """On each scene, how far the plan's choice is behind the best variant that takes no longer, and how much slower it
+    is than the fastest that is as good.
+    """
+    for scene in scenes:
+        behind, as_good = scene.behind_front_db, scene.fastest_as_good(AS_GOOD_DB)
+        slower = scene.choice.ratio / as_good.ratio
+        what = f"the plan's default against the front at equal time, {scene.what}"
+        said = f"{behind:.2f} dB (*{scene.planned}*)"
+        yield SpeedTarget(what, f"<= {BEHIND_FRONT_DB:g} dB behind", said, behind <= BEHIND_FRONT_DB)
+        what = f"the plan's default against the fastest within {AS_GOOD_DB:g} dB, {scene.what}"
+        said = f"{slower:.2f} times its time (*{as_good.name}*)"
+        yield SpeedTarget(what, f"<= {MOST_SLOWER:g} times", said, slower <= MOST_SLOWER)
 
 
 @contextmanager
 def headless_gl() -> Iterator[GLContext | None]:
     """What draws without a display; None where there is no OpenGL."""
-    from viewer.gpu.headless_context import create_headless
-
     try:
         gl = create_headless()
     except InputError as error:
@@ -166,14 +195,5 @@ def headless_gl() -> Iterator[GLContext | None]:
         gl.release()
 
 
-def main() -> None:
-    """Run the command line; bad input ends in one line and exit code 2."""
-    try:
-        typer.run(bench)
-    except InputError as error:
-        print(f"benchmarks.speed: {error}", file=sys.stderr)
-        sys.exit(2)
-
-
 if __name__ == "__main__":
-    main()
+    start("benchmarks.speed", main)

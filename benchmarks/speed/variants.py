@@ -4,28 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from PIL import Image
 
-from benchmarks.speed.measure import Cost, cost_of
+from benchmarks.harness.scenes import CENTRE, MOST_JUDGED, BenchScene
+from benchmarks.harness.scenes import bench_scenes as bench_scenes
+from benchmarks.harness.timing import Cost, cost_of
 from iibr_core.color import encoded_from_stored, stored_from_encoded
-from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
-from iibr_core.evaluation.datasets import read_view
-from iibr_core.evaluation.trials import Trial, trial_input, trials_of
-from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, ImageSize, Quality, StoredColors, ViewOffset
 
-MOST_JUDGED = 12
-SOFT_PX = 2.0
-"""Estimated maps are soft at edges; true ones blurred by this sigma stand in for them."""
 LEAST_STORED_SIDE = 5
 """Fields with fewer views a side have none to leave out."""
 
@@ -39,6 +33,7 @@ Draw = Callable[[Stored, Iterable[ViewOffset]], list[FloatImage]]
 class Variant:
     """One way to make a field. refined: strength of the refinement. shrink: of width and height. every: of the views
     across and down, store one in so many and let the viewer fill in; 0: centre and corners only.
+    asks_every_ray: the transformer, not of contested rays only.
     """
 
     name: str
@@ -49,13 +44,14 @@ class Variant:
     shrink: int = 1
     is_half_float: bool = False
     every: int = 1
+    asks_every_ray: bool = False
 
 
 REFERENCE = Variant("fast")
 VARIANTS = (
     REFERENCE,
     Variant("balanced", "balanced"),
-    Variant("exact", "exact"),
+    Variant("exact", "balanced", asks_every_ray=True),
     *(Variant(f"K = {k} candidates", slots=k) for k in (1, 2, 3, 8)),
     *(Variant(f"balanced, {k} hypotheses", "balanced", hypotheses=k) for k in (3, 9)),
     Variant("no refinement", refined=0.0),
@@ -72,63 +68,16 @@ VARIANTS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class BenchScene:
-    """A field to make: photo (H, W, 3), disparity (H, W), true views by offset, offsets of every view of the field.
-
-    is_soft: whether the disparity was blurred.
-    """
-
-    name: str
-    photo: FloatImage
-    disparity: FloatImage
-    truth: Mapping[ViewOffset, FloatImage]
-    field: tuple[ViewOffset, ...]
-    is_soft: bool = False
-
-    @property
-    def reach(self) -> int:
-        """Views from the centre to the side."""
-        return int(max(abs(part) for at in self.field for part in at))
-
-
-def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> list[BenchScene]:
-    """The scene with its own disparity, and with that made soft. Raises InputError where it has none or is no grid."""
-    trial = trials_of(scene, "auto", None)[0]
-    given = trial_input(trial, "auto", DepthChoice(), max_pixels)
-    offsets = {index: trial.offset(index) for index in trial.judged}
-    reach = max(round(max(abs(part) for part in at)) for at in offsets.values())
-    field = tuple(ViewOffset(float(t), float(s)) for t in range(-reach, reach + 1) for s in range(-reach, reach + 1))
-    judged = _evenly_spaced(trial)
-    truth = {offsets[k]: read_view(scene.views[k], max_pixels) for k in judged}
-    own = BenchScene(scene.name, given.photo, given.maps[0].values, truth, field)
-    return [own, soften(own)] if with_soft else [own]
-
-
-def soften(scene: BenchScene) -> BenchScene:
-    """The scene with its disparity blurred."""
-    return replace(scene, name=f"{scene.name}, soft map", disparity=blur(scene.disparity, SOFT_PX), is_soft=True)
-
-
-def _evenly_spaced(trial: Trial) -> list[int]:
-    """Judged views: the corners, and eight between that fields with views left out do not store; all of few."""
-    if len(trial.judged) <= MOST_JUDGED:
-        return list(trial.judged)
-    at = {k: np.array(trial.offset(k)) for k in trial.judged}
-    low, high = np.min(list(at.values()), axis=0), np.max(list(at.values()), axis=0)
-    shares = ((1.0, 1.0), (0.75, 0.25), (0.25, 0.75))
-    wanted = [(a * t, b * s) for a, b in shares for t in (low[0], high[0]) for s in (low[1], high[1])]
-    return list(dict.fromkeys(min(at, key=lambda k: float(np.hypot(*(at[k] - place)))) for place in wanted))
-
-
 def stored_offsets(variant: Variant, scene: BenchScene) -> list[ViewOffset]:
     """Which views of the field a variant makes, the centre's not counted."""
-    reach, centre = scene.reach, ViewOffset(0.0, 0.0)
-    if variant.every == 0:
-        chosen = [at for at in scene.field if abs(at.t) == abs(at.s) == reach]
-    else:
-        chosen = [at for at in scene.field if at.t % variant.every == 0 and at.s % variant.every == 0]
-    return [at for at in chosen if at != centre]
+    return [at for at in scene.field if at != CENTRE and is_stored(at, scene.reach, variant.every)]
+
+
+def is_stored(at: ViewOffset, reach: int, every: int) -> bool:
+    """Whether a field that stores every so manieth view has this one; 0: the centre and the corners."""
+    if every == 0:
+        return at == CENTRE or abs(at.t) == abs(at.s) == reach
+    return at.t % every == 0 and at.s % every == 0
 
 
 def is_possible(variant: Variant, scene: BenchScene, has_drawing: bool) -> bool:
@@ -140,9 +89,7 @@ def field_cost(variant: Variant, scene: BenchScene) -> Cost:
     """Of the whole field: setting up is timed, and a few views, from which the time of all follows."""
     makers: list[ViewMaker] = []
     with ExitStack() as open_until_done:
-        cost = cost_of(
-            lambda: makers.append(open_until_done.enter_context(_maker(variant, scene.photo, scene.disparity, scene)))
-        )
+        cost = cost_of(lambda: makers.append(open_until_done.enter_context(_maker(variant, scene))))
         (maker,) = makers
         outer = {at for at in maker.outer} if variant.quality == "fast" else set()
         rest = [at for at in stored_offsets(variant, scene) if at not in outer]
@@ -156,7 +103,7 @@ def field_cost(variant: Variant, scene: BenchScene) -> Cost:
 def evaluated_views(variant: Variant, scene: BenchScene, draw: Draw | None) -> dict[ViewOffset, FloatImage]:
     """The judged views of a variant, sRGB-encoded, at the scene's size."""
     wanted = list(scene.truth)
-    with _maker(variant, scene.photo, scene.disparity, scene) as maker:
+    with _maker(variant, scene) as maker:
         if variant.every == 1:
             made = [encoded_from_stored(_to_stored(maker.view(variant.quality, at).colors, variant)) for at in wanted]
         else:
@@ -166,23 +113,22 @@ def evaluated_views(variant: Variant, scene: BenchScene, draw: Draw | None) -> d
                 at: (_to_stored(view.colors, variant), view.disparity)
                 for at, view in zip(offsets, maker.views(variant.quality, offsets))
             }
-            stored[ViewOffset(0.0, 0.0)] = (
-                _to_stored(scene.photo, variant),
-                _refine(variant, scene.photo, scene.disparity),
-            )
+            stored[CENTRE] = _to_stored(scene.photo, variant), _refine(variant, scene.photo, scene.disparity)
             made = draw(stored, wanted)
     return {at: _resize(image, scene.photo.shape[:2]) for at, image in zip(wanted, made)}
 
 
-def _maker(variant: Variant, photo: FloatImage, disparity: FloatImage, scene: BenchScene) -> ViewMaker:
+def _maker(variant: Variant, scene: BenchScene) -> ViewMaker:
+    photo, disparity = scene.photo, scene.disparity
     if variant.shrink > 1:
         size = (max(photo.shape[0] // variant.shrink, 1), max(photo.shape[1] // variant.shrink, 1))
         ratio = np.float32(size[1] / photo.shape[1])
         photo, disparity = _resize(photo, size), resample_surfaces(disparity, ImageSize(*size)) * ratio
     disparity = _refine(variant, photo, disparity)
     return ViewMaker(
-        photo, disparity, scene.field, (variant.quality,), slots=variant.slots, hypotheses=variant.hypotheses
-    )
+        photo, disparity, scene.field, (variant.quality,),
+        slots=variant.slots, hypotheses=variant.hypotheses, every=variant.asks_every_ray,
+    )  # fmt: skip
 
 
 def _refine(variant: Variant, photo: FloatImage, disparity: FloatImage) -> FloatImage:

@@ -34,11 +34,7 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.trials import trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
-from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.generation.view_maker import ViewMaker
-from iibr_core.inpainting.patch import fill_patches
-from iibr_core.rendering.ray_set import NO_MARGINS
-from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.training.degradation import degrade
 from iibr_core.types import FloatImage, ViewOffset, ignore_progress
 
@@ -86,39 +82,18 @@ class Switch:
             yield
 
 
-def _do_not_split(colors: FloatImage, disparity: FloatImage, *_: object) -> tuple[FloatImage, ...]:
-    """Of `split_mixed_pixels`: every pixel is one surface's."""
-    return colors, colors, np.full_like(disparity, np.nan), np.zeros_like(disparity)
-
-
 DEFAULT = Switch("default")
 NOTHING_SHARED = Switch(
     "every view fills its own holes", swaps={"generation.view_maker.render_outer_views": lambda *_, **__: iter(())}
 )
 SWITCHES = (
     DEFAULT,
-    *(Switch(f"quality {quality}", replace(DEFAULT_VARIANT, quality=quality)) for quality in ("fast", "exact")),
+    Switch("quality fast", replace(DEFAULT_VARIANT, quality="fast")),
+    Switch("exact: T is asked for every ray", replace(DEFAULT_VARIANT, asks_every_ray=True)),
     *(Switch(f"{k} candidates a ray (5)", replace(DEFAULT_VARIANT, slots=k)) for k in (1, 3, 6)),
     *(Switch(f"{k} hypotheses for the transformer (6)", replace(DEFAULT_VARIANT, hypotheses=k)) for k in (3, 9)),
     Switch("no refinement of the map", replace(DEFAULT_VARIANT, refined=0.0)),
-    Switch("refinement leaves rims", swaps={"depth.edges.refine.settle_rims": lambda _, values, *__: values}),
-    Switch("mixed pixels stay whole", swaps={"rendering.view_synthesis.split_mixed_pixels": _do_not_split}),
-    Switch("rims hide what is behind them", swaps={"rendering.view_synthesis.WHOLE": 0.0}),
-    *(
-        Switch(f"occluded: less than {share} covered (0.2)", swaps={"rendering.view_synthesis.LEAST_COVERED": share})
-        for share in (0.01, 0.5)
-    ),
-    Switch(
-        "no canvas beyond the frame", swaps={"generation.view_maker.margins_beyond_frame": lambda *_: NO_MARGINS}
-    ),
     NOTHING_SHARED,
-    Switch(
-        "inpainting: patch",
-        swaps={
-            "generation.view_maker.render_outer_views": partial(render_outer_views, inpainter=fill_patches),
-            "generation.view_maker.ViewSynthesis": partial(ViewSynthesis, inpainter=fill_patches),
-        },
-    ),
 )  # fmt: skip
 
 

@@ -1,25 +1,17 @@
-"""What every report of a table begins with, and its place."""
+"""Reports of tables: their place, and what they begin with."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
-from benchmarks.provenance import made_by
+from benchmarks.harness.report import DOCS, title
+from benchmarks.harness.report import markdown as markdown
 
-FOLDER = Path(__file__).parents[2] / "docs" / "tables"
-MACHINE = "2 cores of an x86-64 server, no GPU"
-
-
-def write_report(name: str, title: str, parts: Iterable[str], path: Path | None = None) -> None:
-    """docs/tables/NAME.md, or path: title, command, commit and machine, then the parts."""
-    head = f"# {title}\n\n{made_by(f'benchmarks.tables.{name}')}. {MACHINE}.\n"
-    path = path or FOLDER / f"{name}.md"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join([head, *(f"{part}\n" for part in parts)]), "utf-8")
+FOLDER = DOCS / "tables"
 
 
-def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of words."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+def write_report(name: str, words: str, parts: Iterable[str], path: Path | None = None) -> None:
+    """docs/tables/NAME.md, or path."""
+    text = "\n".join([title(words, f"benchmarks.tables.{name}"), *(f"{part}\n" for part in parts)])
+    (path or FOLDER / f"{name}.md").write_text(text, "utf-8")

@@ -40,3 +40,10 @@ class DisparityMap:
 
 
 Estimate = RelativeInverseDepth | MetricDepth | DisparityMap
+
+
+def values_of(estimate: Estimate) -> FloatImage:
+    """Its array (H, W), whatever it means."""
+    match estimate:
+        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
+            return values

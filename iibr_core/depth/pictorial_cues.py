@@ -1,9 +1,9 @@
 """A rough guess at depth without any model: the nearer things are, the lower they stand in the picture, and the more
 edges lie between them and its upper border.
 
-Two cues are kept: the height in the picture, and how much change of colour lies on the way from the upper border, which
-shows what is far. Sharpness, haze, saturation, brightness and a prior for the middle did not help
-on all photos with known depth.
+Both cues count the same: the height in the picture, and how much change of colour lies on the way from the upper
+border, which shows what is far. Sharpness, haze, saturation, brightness, a prior for the middle, the way from the lower
+border and from the sides did not help on all photos with known depth.
 """
 
 from __future__ import annotations
@@ -25,8 +25,6 @@ DETAIL_PX = 4
 """Radius of three box blurs there: finer detail is texture."""
 STEP_COST = 0.0005
 """Of one pixel of way, against 1 for the change from black to white in one channel."""
-WAY_SHARE = 2.0
-"""How much the way counts against the height."""
 SWEEPS = 3
 """To and fro; more change nothing that can be seen."""
 GUIDE_PX = 8
@@ -38,8 +36,8 @@ GUIDE_CONTRAST = 0.03
 def estimate_from_cues(photo: Photo, should_stop: ShouldStop = never) -> RelativeInverseDepth:
     """Rough inverse depth (H, W) of a photo, finite; 0 everywhere where the picture gives no hint (one row of pixels).
 
-    On teddy, moebius, motorcycle and antinous its correlation with the true disparity is 0.5 to 0.86 (docs/depth.md).
-    Raises Cancelled once should_stop is true.
+    Of pairs of points that differ in depth it orders 86 % rightly, the height alone 82 % (docs/depth.md). Raises
+    Cancelled once should_stop is true.
     """
     pixels = np.clip(photo.pixels, 0, 1)
     small = _resize(pixels, _small_size(photo.size), "box", should_stop)
@@ -49,7 +47,9 @@ def estimate_from_cues(photo: Photo, should_stop: ShouldStop = never) -> Relativ
     raise_if_stopped(should_stop)
     way = _way_from_top(smooth)
     raise_if_stopped(should_stop)
-    depth = _standardise(np.indices(way.shape, np.float32)[0]) + WAY_SHARE * _standardise(way)
+    # Longer than usual tells little more: what stands upright before a plain sky then hardly leans.
+    edges_crossed = way / np.maximum(way + np.median(way), STEP_COST)
+    depth = _standardise(np.indices(way.shape, np.float32)[0]) + _standardise(edges_crossed)
     return RelativeInverseDepth(_guided_upsample(depth, small.mean(axis=2), pixels, should_stop))
 
 

@@ -4,6 +4,7 @@ order, and says so. What fails is followed by the next; only a file or a model t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOri
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.images import picture_file
 from iibr_core.depth.embedded.reader import read_embedded
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth, values_of
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
@@ -40,6 +41,8 @@ from iibr_core.types import (
 
 USUAL_GRID = GridShape(9, 9)
 """What estimates without a scale are made to suit where the grid is not yet known."""
+GUESS_SHARE = 0.6
+"""Of the usual parallax, for guessed depth: what is wrong moves less."""
 
 NOT_USED: dict[DepthKind, str] = {
     "file": "The map beside the photo was not used",
@@ -77,8 +80,10 @@ def open_with_depth(
     grid: GridShape | None = None,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
+    asks_model: bool = True,
 ) -> PhotoWithDepth:
-    """Read a photo and find its disparity; every photo gets one.
+    """Read a photo and find its disparity; every photo gets one. asks_model: else a guess takes a model's place, which
+    `ask_model` may replace later.
 
     A photo that the camera blurred is replaced by the sharp picture beside it, where its own depth comes with one.
     Raises InputError for a bad photo, for a bad file or model that `choice` names, and where it asks for a model and
@@ -91,6 +96,8 @@ def open_with_depth(
         return _finish(search.of_file(Path(choice.file)), choice, grid, should_stop)
     failures: tuple[str, ...] = ()
     for kind, find in search.sources():
+        if kind == "model" and not asks_model:
+            continue
         try:
             found = find()
             if found is not None:
@@ -101,6 +108,24 @@ def open_with_depth(
                 raise
             failures += (f"{NOT_USED[kind]}: {error}",)
     return _flat(photo, failures)
+
+
+def ask_model(
+    path: Path,
+    photo: Photo,
+    choice: DepthChoice,
+    grid: GridShape | None = None,
+    should_stop: ShouldStop = never,
+) -> PhotoWithDepth:
+    """A photo that was read from `path`, its disparity estimated by the model that `choice` names, or the usual one.
+
+    Raises InputError where there is none or it cannot be used, Cancelled where should_stop says so.
+    """
+    choice = replace(choice, start="model")
+    search = _DepthSearch(path, photo, choice, math.prod(photo.size), should_stop, ignore_progress)
+    found = search.model()
+    assert found is not None
+    return _finish(found, choice, grid, should_stop)
 
 
 def sketch_depth(path: Path, photo: Photo, choice: DepthChoice, should_stop: ShouldStop = never) -> PhotoWithDepth:
@@ -143,8 +168,8 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         return None
 
     def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
-        from iibr_core.depth.models.catalog import model_to_use
-        from iibr_core.depth.models.estimate import estimate_with
+        from iibr_core.depth.estimators.catalog import model_to_use
+        from iibr_core.depth.estimators.estimate import estimate_with
 
         model = model_to_use(choice)
         if model is None:
@@ -223,12 +248,12 @@ class _DepthSearch:
         return _FoundDepth(self.photo, DepthOrigin("embedded", f"the photo's two views ({layout})"), estimate)
 
     def model(self) -> _FoundDepth | None:
-        from iibr_core.depth.models.catalog import model_to_use
+        from iibr_core.depth.estimators.catalog import model_to_use
 
         model = model_to_use(self.choice)
         if model is None:
             return None
-        from iibr_core.depth.models.estimate import estimate_with
+        from iibr_core.depth.estimators.estimate import estimate_with
 
         self.go_on()
         estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)
@@ -259,7 +284,8 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, sho
         values = fill_disparity_by_color(photo.pixels, values, should_stop)
     if choice.refine > 0:
         values = refine(photo.pixels, values, choice.refine, holes, should_stop)
-    return PhotoWithDepth(photo, Disparity(values, origin.words, notes, inverse_metres, holes), origin)
+    share = GUESS_SHARE if origin.kind == "rough" else 1.0
+    return PhotoWithDepth(photo, Disparity(values, origin.words, notes, inverse_metres, holes, share), origin)
 
 
 def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:
@@ -285,7 +311,7 @@ def _all_in_focus_photo(photo: Photo, data: bytes, orientation: int, max_pixels:
 
 def _rotate(estimate: Estimate, size: ImageSize, orientation: int) -> Estimate:
     """The estimate, turned upright as the photo was. Some writers turn the map already; others' maps fit no way."""
-    values = _values(estimate)
+    values = values_of(estimate)
     for candidate in (upright(values, orientation), values):
         if _is_alike(candidate.shape, size):
             return _with_values(estimate, candidate)
@@ -295,7 +321,7 @@ def _rotate(estimate: Estimate, size: ImageSize, orientation: int) -> Estimate:
 
 def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
     """The estimate for a picture of another (height, width), surface by surface; lengths in pixels are scaled along."""
-    if _values(estimate).shape == size:
+    if values_of(estimate).shape == size:
         return estimate
     match estimate:
         case RelativeInverseDepth(values):
@@ -306,12 +332,6 @@ def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
         case DisparityMap(px_per_view):
             ratio = np.float32(size.width / px_per_view.shape[1])
             return DisparityMap(resample_surfaces(px_per_view, size) * ratio)
-
-
-def _values(estimate: Estimate) -> FloatImage:
-    match estimate:
-        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
-            return values
 
 
 def _with_values(estimate: Estimate, values: FloatImage) -> Estimate:

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ from iibr_core.types import (
 if TYPE_CHECKING:
     from iibr_core.evaluation.lpips import Lpips
 
-QUALITIES: tuple[Quality, ...] = ("fast", "balanced", "exact")
+QUALITIES: tuple[Quality, ...] = get_args(Quality)
 IDENTITY, REFERENCE, TRUTH = "identity", "reference warp", "truth"
 SAME_ROW = 0.05
 """Views whose rows differ by less, in view steps, make an EPI together."""

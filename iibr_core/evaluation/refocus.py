@@ -36,6 +36,13 @@ class Focus:
     disparity: float
     radius: float
 
+    @property
+    def margin_px(self) -> int:
+        """Of the picture, beyond which not all views show something. Views up to half a step outside the aperture
+        count; two pixels more for interpolation.
+        """
+        return math.ceil(abs(self.disparity) * (self.radius + 0.5)) + 2
+
 
 @dataclass(frozen=True)
 class RefocusFigures:
@@ -123,25 +130,20 @@ class FocalStack:
 def shear(view: FloatImage, offset: ViewOffset, focus: Focus) -> FloatImage:
     """The view (H, W, 3) moved so that what lies in focus is where the given view has it, see `within`."""
     for axis, at in enumerate(offset):
-        size, margin = view.shape[axis], _margin(focus)
+        size, margin = view.shape[axis], focus.margin_px
         view = _shift(view, axis, margin - focus.disparity * at, size - 2 * margin)
     return view
 
 
 def within(image: FloatImage, focus: Focus) -> FloatImage:
     """The part of the given view that all views of the aperture show when they are sheared for this focus."""
-    margin = _margin(focus)
+    margin = focus.margin_px
     return image[margin : image.shape[0] - margin, margin : image.shape[1] - margin]
-
-
-def _margin(focus: Focus) -> int:
-    """Views up to half a step outside the aperture count; two pixels more for interpolation."""
-    return math.ceil(abs(focus.disparity) * (focus.radius + 0.5)) + 2
 
 
 def _is_worth_it(focus: Focus, image: FloatImage) -> bool:
     """Whether enough of the picture lies within all views."""
-    return bool(min(image.shape[:2]) - 2 * _margin(focus) >= LEAST_PX)
+    return bool(min(image.shape[:2]) - 2 * focus.margin_px >= LEAST_PX)
 
 
 def _shift(image: FloatImage, axis: int, start: float, length: int) -> FloatImage:

@@ -2,8 +2,7 @@
 
 Nothing is ever written onto, into or over what is read; over other things only where that was allowed. Links are
 followed. A place that was free when it was asked for is taken only while it still is. What is not finished lies beside
-its place under a short hidden name, locked while its process lives; whoever writes there next removes what nobody holds
-any more, and puts back what had been moved aside.
+its place under a short hidden name, see `unfinished`.
 """
 
 from __future__ import annotations
@@ -11,22 +10,24 @@ from __future__ import annotations
 import errno
 import os
 import re
-import shutil
 import stat
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from secrets import token_hex
 
 from iibr_core.formats.files import entries_of, is_folder, reason_of, status_of
+from iibr_core.formats.unfinished import (
+    CLAIMS,
+    NEW,
+    OLD,
+    TEMPORARY_NAME,
+    make_temporary,
+    remove_around,
+    remove_leftovers,
+    unlock,
+)
 from iibr_core.types import InputError
 
-try:
-    import fcntl
-except ImportError:  # not on this system: then nothing is locked, and nothing removed for others
-    fcntl = None  # type: ignore[assignment]
-
-TEMPORARY_NAME = re.compile(r"\.iibr-[0-9a-f]{16}(\.\w{1,15})?")
 MOST_NAME_BYTES = 255
 MOST_PATH_BYTES = 4000
 """Of the 4096 that Linux takes: a temporary name needs some."""
@@ -35,11 +36,6 @@ TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
 """What a folder's place says where something is there."""
 FOLDER_LEVELS = 3
 """How deep the pictures of data sets lie below the folder that is named: scene, subfolder, picture."""
-NEW, OLD = "new", "old"
-_NEW_PLACES: set[Path] = set()
-"""Where nothing was and nothing may be replaced, for as long as this process has not written there: what another one
-puts there meanwhile stays.
-"""
 
 
 class AlreadyThereError(InputError):
@@ -66,7 +62,7 @@ def require_file_place(path: Path, inputs: Iterable[Path] = (), may_replace: boo
             raise InputError(f"{path}: is read here ({read}), and no input is overwritten; choose another name")
     if status is not None and not may_replace:
         raise AlreadyThereError(f"{path}: is there already; give --force to replace it, or choose another name")
-    _note_place(real, may_replace)
+    _claim_place(real, may_replace)
 
 
 def require_folder_place(
@@ -90,7 +86,7 @@ def require_folder_place(
     if status is not None and not may_replace and entries_of(real):
         raise AlreadyThereError(f"{folder}: is there already; give --force to replace it, or choose another folder")
     if is_whole:
-        _note_place(real, may_replace)
+        _claim_place(real, may_replace)
 
 
 def _require_possible_folder(folder: Path, real: Path, is_whole: bool) -> None:
@@ -131,7 +127,7 @@ def require_files_in(
         if is_folder(folder):
             require_file_place(folder / name, inputs, may_replace)
         else:
-            _note_place(_real_place(folder / name), may_replace)
+            _claim_place(_real_place(folder / name), may_replace)
 
 
 def require_no_link(path: Path, folder: Path) -> None:
@@ -155,9 +151,9 @@ def open_to_append(path: Path) -> int:
     with suppress(OSError):
         status = os.lstat(path)
     _require_single_file(path, status)
-    flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    here = (getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))  # the last: on Windows
     try:
-        descriptor = os.open(path, flags, 0o666)
+        descriptor = os.open(path, sum(here, os.O_RDWR | os.O_APPEND | os.O_CREAT), 0o666)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
     try:
@@ -195,7 +191,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
     suffix = real.suffix if TEMPORARY_NAME.fullmatch(f".iibr-{'0' * 16}{real.suffix}") else ""
     temporary, lock = None, None
     try:
-        temporary, lock = _make_temporary(real.parent, lambda new: new.touch(exist_ok=False), suffix)
+        temporary, lock = make_temporary(real.parent, lambda new: new.touch(exist_ok=False), suffix)
         yield temporary
         _put_file(temporary, real)
     except FileExistsError as error:
@@ -206,7 +202,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
         if temporary is not None:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
-        _unlock(lock)
+        unlock(lock)
 
 
 class UnfinishedFolder:
@@ -226,7 +222,7 @@ class UnfinishedFolder:
         try:
             self._real.parent.mkdir(parents=True, exist_ok=True)
             remove_leftovers(self._real.parent)
-            self._around, self._lock = _make_temporary(self._real.parent, Path.mkdir)
+            self._around, self._lock = make_temporary(self._real.parent, Path.mkdir)
             self.path = self._around / NEW / self._real.name
             self.path.mkdir(parents=True)
         except BaseException as error:
@@ -243,7 +239,7 @@ class UnfinishedFolder:
         """
         assert self._around is not None
         try:
-            if self._real in _NEW_PLACES:
+            if self._real in CLAIMS:
                 with suppress(FileNotFoundError):
                     self._real.rmdir()
             elif os.path.lexists(self._real):
@@ -251,9 +247,9 @@ class UnfinishedFolder:
                 (self._around / OLD).mkdir()
                 self._real.rename(self._around / OLD / self._real.name)
             self.path.rename(self._real)
-            _NEW_PLACES.discard(self._real)
+            CLAIMS.release(self._real)
         except OSError as error:
-            if self._real in _NEW_PLACES and error.errno in TAKEN:
+            if self._real in CLAIMS and error.errno in TAKEN:
                 raise AlreadyThereError(_taken(self.folder)) from error
             raise InputError(
                 f"{self.folder}: cannot be replaced ({error.strerror or error}); choose another place"
@@ -263,42 +259,31 @@ class UnfinishedFolder:
         """Remove what is temporary, and folders made for it; what was moved aside and not replaced comes back."""
         if self._around is not None:
             with suppress(OSError):
-                _remove_around(self._around)
-        _unlock(self._lock)
+                remove_around(self._around)
+        unlock(self._lock)
         self._lock = None
         for parent in self._made_parents:
             with suppress(OSError):  # not empty: the folder is in it
                 parent.rmdir()
 
 
-def remove_leftovers(folder: Path) -> None:
-    """Remove what processes that were killed while they wrote left in a folder; put back what they had moved aside."""
-    found: list[Path] = []
-    with suppress(OSError), os.scandir(folder) as entries:
-        found = [Path(entry.path) for entry in entries if TEMPORARY_NAME.fullmatch(entry.name)]
-    for path in found:
-        lock = _lock(path, waits=False)
-        if lock is None:
-            continue
-        with suppress(OSError):
-            if stat.S_ISDIR(os.fstat(lock).st_mode):
-                _remove_around(path)
-            else:
-                path.unlink()
-        _unlock(lock)
+def release_place(path: Path) -> None:
+    """Nothing will be written there after all: others may. Nothing happens where it was written."""
+    with suppress(InputError):
+        CLAIMS.release(_real_place(path))
 
 
-def _note_place(real: Path, may_replace: bool) -> None:
-    """Remember whether what is written there must not replace anything."""
+def _claim_place(real: Path, may_replace: bool) -> None:
+    """What is written there must not replace anything, unless it may."""
     if may_replace:
-        _NEW_PLACES.discard(real)
+        CLAIMS.release(real)
     else:
-        _NEW_PLACES.add(real)
+        CLAIMS.take(real)
 
 
 def _put_file(temporary: Path, real: Path) -> None:
     """Rename a file to its place. Raises FileExistsError where that is taken and must not be replaced."""
-    if real in _NEW_PLACES:
+    if real in CLAIMS:
         try:
             os.link(temporary, real)
         except FileExistsError:
@@ -306,57 +291,13 @@ def _put_file(temporary: Path, real: Path) -> None:
         except OSError:  # a file system without hard links
             real.open("xb").close()
             temporary.replace(real)
-        _NEW_PLACES.discard(real)
+        CLAIMS.release(real)
     else:
         temporary.replace(real)
 
 
 def _taken(path: Path) -> str:
     return f"{path}: another program has written it meanwhile, and it is kept; choose another name"
-
-
-def _remove_around(around: Path) -> None:
-    """Remove the folder around a new and an old one. The old one goes back unless the new one took its place."""
-    old = next(iter((around / OLD).glob("*")), None)
-    if old is not None and os.path.lexists(around / NEW / old.name):
-        if os.path.lexists(around.parent / old.name):
-            return  # somebody made another one meanwhile: both are kept
-        old.rename(around.parent / old.name)
-    shutil.rmtree(around, ignore_errors=True)
-
-
-def _make_temporary(folder: Path, make: Callable[[Path], None], suffix: str = "") -> tuple[Path, int | None]:
-    """A new file or folder in `folder`, and its lock. Its name does not depend on what it becomes: that may be long."""
-    while True:
-        path = folder / f".iibr-{token_hex(8)}{suffix}"
-        make(path)
-        lock = _lock(path, waits=True)
-        if lock is not None or os.path.lexists(path):
-            return path, lock
-        # else taken for a leftover before it was locked
-
-
-def _lock(path: Path, waits: bool) -> int | None:
-    """A descriptor that keeps `path` locked while it is open; None where others hold it, it is gone, or there are no
-    locks. A lock, not a process's number: that would mean nothing to another machine or container.
-    """
-    if fcntl is None:
-        return None
-    descriptor = None
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
-        if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
-            return descriptor
-    except OSError:
-        pass
-    _unlock(descriptor)
-    return None
-
-
-def _unlock(descriptor: int | None) -> None:
-    if descriptor is not None:
-        os.close(descriptor)
 
 
 def _real_place(path: Path) -> Path:

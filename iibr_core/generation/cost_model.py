@@ -41,8 +41,8 @@ class Workload(NamedTuple):
     """What there is to do, in pixels and rays of all views together.
 
     source_pixels: made rays of, in all images of the ray set. view_pixels: each gets candidates, weights, a colour.
-    rough_pixels: those of them where no smooth surface shows, so that rays are splatted. ambiguous_rays, soft_rays,
-    plain_rays: that the transformer is asked for; where surfaces meet, near soft edges, and rays that are neither.
+    rough_pixels: those of them where no smooth surface shows, so that rays are splatted. ambiguous_rays, soft_rays:
+    that the transformer is asked for; where surfaces meet, and near soft edges.
     """
 
     source_pixels: float
@@ -50,10 +50,9 @@ class Workload(NamedTuple):
     rough_pixels: float
     ambiguous_rays: float
     soft_rays: float
-    plain_rays: float
 
 
-NANOSECONDS = Workload(53.0, 60.0, 446.0, 1747.0, 1923.0, 870.0)
+NANOSECONDS = Workload(53.0, 60.0, 446.0, 1747.0, 1923.0)
 """What each piece of work takes one core."""
 
 
@@ -72,14 +71,13 @@ class CostEstimates(NamedTuple):
 
     fast: CostEstimate
     balanced: CostEstimate
-    exact: CostEstimate
 
     def of(self, quality: Quality) -> CostEstimate:
         """Those of one quality."""
-        return self[get_args(Quality).index(quality)]
+        return self.fast if quality == "fast" else self.balanced
 
 
-NO_COST = CostEstimates(*3 * [CostEstimate(0.0, 0)])
+NO_COST = CostEstimates(*2 * [CostEstimate(0.0, 0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,8 +176,7 @@ def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: 
     if quality != "fast":
         asked = pixels * _sum_over_views(statistics.ambiguous_share, grid)
         soft = min(pixels * _sum_over_views(statistics.soft_share, grid), asked)
-    plain = pixels * views - asked if quality == "exact" else 0
-    return Workload(sources, pixels * (views + twice), rough, asked - soft, soft, plain)
+    return Workload(sources, pixels * (views + twice), rough, asked - soft, soft)
 
 
 def _sum_over_views(share: Callable[[float], float], grid: GridShape) -> float:
@@ -196,7 +193,7 @@ def _inpainted_views(statistics: ParallaxStatistics, grid: GridShape) -> int:
 
 def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> int:
     """Memory while views are made, see `making_bytes`."""
-    asked = {"fast": 0.0, "balanced": statistics.ambiguous_share(1.0), "exact": 1.0}[quality]
+    asked = statistics.ambiguous_share(1.0) if quality == "balanced" else 0.0
     images = 2 + _inpainted_views(statistics, grid)
     holes = statistics.hole_share if statistics.has_disocclusion else 0.0
     return making_bytes(Making(statistics.step.size, math.prod(statistics.canvas), images, holes, asked, quality))

@@ -24,8 +24,8 @@ class FieldWork:
         """costs: of the field. views: outer and inner ones. by_model: a diffusion model fills their holes."""
         self.quality = quality
         self.inner = costs.of(quality).seconds / costs.fast.seconds if costs.fast.seconds > 0 else 1.0
-        self.finish_inner = self.inner if quality == "exact" else max(self.inner - 1.0, 0.0)
-        self.finish_outer = {"fast": 0.0, "balanced": self.finish_inner + REMADE, "exact": self.inner}[quality]
+        self.finish_inner = max(self.inner - 1.0, 0.0)
+        self.finish_outer = self.finish_inner + REMADE if quality == "balanced" else 0.0
         self.outer = OUTER_BY_MODEL if by_model else OUTER_WORK
         self._done = 0.0
         self._total = views[0] * (self.outer + self.finish_outer) + views[1] * self.inner

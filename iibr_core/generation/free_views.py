@@ -129,7 +129,7 @@ class FreeViews:
         disparity = inverse_depth * np.float32(self.scale_px)
         self._step = rounding_step(disparity)
         farthest = farthest_views(reach.outer)
-        colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, farthest, should_stop)
+        colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, should_stop)
         x, y = camera.centre_px
         centre_px = x + reach.margins.left, y + reach.margins.top
         self._camera = replace(camera, size=image_size(disparity), centre_px=centre_px)

@@ -54,13 +54,13 @@ def generate(
 
     disparity is the field's (`plan.field_disparity(given)`). should_stop is asked every few milliseconds; once it
     is true the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
-    weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray, "exact" asks it for
-    every ray. inpaint: as `load_inpainter` takes it. aids: what it may ask.
+    weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray. inpaint: as
+    `load_inpainter` takes it. aids: what it may ask.
 
     draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
     views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
     transformer's say, again nearest first, and nothing else is made again. Outer views, whose drafts are kept anyway,
-    do so whatever it is. None: every view comes once, final, in balanced and exact quality the outer ones last.
+    do so whatever it is. None: every view comes once, final, in balanced quality the outer ones last.
 
     Raises ValueError if photo and disparity differ in size, InputError if the trained weights cannot be read or there
     is no such way of inpainting.
@@ -95,7 +95,7 @@ def _generate_views(
         return
     transformer, inpainter = transformer_for(work.quality), load()
     rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter)
-    with ViewSynthesis(should_stop, transformer, work.quality == "exact", inpainter=inpainter) as synthesis:
+    with ViewSynthesis(should_stop, transformer, inpainter=inpainter) as synthesis:
         views = StoredViews(synthesis, rays, grid, photo.is_hdr, should_stop)
         inner = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
         # What is left to be done for views that are there, or in the ray set.
@@ -111,7 +111,7 @@ def _generate_views(
             images, share = len(rays), work.add(work.outer)
             if transformer is None or draft_bytes is not None:
                 yield replace(views.update(offset, view, is_final=transformer is None), share=share)
-        room = draft_bytes or 0 if work.quality == "balanced" else 0
+        room = draft_bytes or 0 if transformer is not None else 0
 
         def start(offset: ViewOffset) -> Draft:
             if room > 0:

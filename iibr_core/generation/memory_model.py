@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from iibr_core.rendering.ambiguity import EVERY_COST
 from iibr_core.runtime.machine import (
     MAPPED_BYTES,
     MOST_USUAL_SHARE,
@@ -86,7 +85,7 @@ def making_bytes(making: Making) -> int:
     view for each core, or the one whose holes are filled.
     """
     pixels, asks = making.pixels, making.quality != "fast"
-    band = min(pixels, MOST_BAND_PIXELS // (EVERY_COST if making.quality == "exact" else 1))
+    band = min(pixels, MOST_BAND_PIXELS)
     in_flight = THREADS * (pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + making.ambiguous_share * AMBIGUOUS_BYTES))
     filling = pixels * (WORKING_BYTES + making.hole_share * HOLE_BYTES)
     rays = making.images * (RAY_BYTES + (STATISTICS_BYTES if asks else 0)) + DETAIL_BYTES

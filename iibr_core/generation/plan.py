@@ -51,8 +51,8 @@ STEP_PX = 8.0
 quarter of the views costs a third of a decibel (docs/speed.md).
 """
 MOST_LONGER, MOST_LONGER_S = 0.5, 0.25
-"""What the transformer gains, a tenth of a decibel, hardly depends on how many rays it is asked for; its time does
-(docs/transformer.md). It is not asked if that takes longer by this share of the closed form's time, and by so much
+"""What the transformer gains, a tenth of a decibel, hardly depends on how many rays it is asked for; its time does.
+It is not asked if that takes longer by this share of the closed form's time, and by so much
 processor time.
 """
 MOST_VIEWS_A_SIDE = 9
@@ -136,7 +136,8 @@ def plan_for_viewing(
     parallax_px = 0.0
     if relief.range > 0:
         carried_px = MOST_NOISE_PX * relief.range / relief.noise if relief.noise > 0 else np.inf
-        parallax_px = min(TOTAL_PARALLAX * width, carried_px) * abs(wanted.depth_strength)
+        usual_px = TOTAL_PARALLAX * disparity.viewing_share * width
+        parallax_px = min(usual_px, carried_px) * abs(wanted.depth_strength)
     reasons = []
     if wanted.grid is not None:
         grid = wanted.grid

@@ -31,10 +31,11 @@ class ViewMaker:
         should_stop: Callable[[], bool] = lambda: False,
         slots: int = 5,
         hypotheses: int = HYPOTHESES,
+        every: bool = False,
     ) -> None:
         """photo: (H, W, 3) sRGB-encoded. disparity: (H, W), px per view step. offsets: all that will be asked for.
 
-        slots, hypotheses: see ViewSynthesis.
+        slots, hypotheses, every: see ViewSynthesis.
         """
         self._should_stop, self._slots = should_stop, slots
         self.outer = outer_views(offsets)
@@ -42,9 +43,7 @@ class ViewMaker:
         self._rays = rays_of_photo(photo, disparity, farthest_views(self.outer), len(self.outer), should_stop, margins)
         self._first: dict[ViewOffset, tuple[RenderedView, float]] = {}
         self._syntheses = {
-            quality: ViewSynthesis(
-                should_stop, transformer_for(quality), quality == "exact", slots, hypotheses=hypotheses
-            )
+            quality: ViewSynthesis(should_stop, transformer_for(quality), every, slots, hypotheses=hypotheses)
             for quality in qualities
         }
 

@@ -1,6 +1,6 @@
 """The photo continued beyond its frame, once, so that all views show the same there.
 
-Surfaces go on along their outlines, and lines straight on. Other colours are those that a surface has where it leaves,
+The nearest surface of the frame goes on, and lines go straight on. Other colours are those that a surface has there,
 averaged along the frame ever wider the farther out: who can tell which of them goes on. They get the fine texture of
 what lies as far inside.
 """
@@ -12,8 +12,6 @@ from math import hypot, log2
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.background import SURFACE_PX
-from iibr_core.inpainting.leaving_surfaces import follow_surfaces
 from iibr_core.inpainting.rim_lines import find_lines, line_weight
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -37,13 +35,11 @@ def extend_beyond_frame(
     colors: FloatImage,
     disparity: FloatImage,
     margins: Margins,
-    farthest_views: float,
     should_stop: ShouldStop = never,
 ) -> tuple[FloatImage, FloatImage]:
     """The photo's colors (H, W, 3) and disparity (H, W) in the middle of larger ones, which are filled around it.
 
-    margins: so many pixels on each side. farthest_views: surfaces are one that part by less than SURFACE_PX so many
-    view steps away. Raises Cancelled once should_stop is true.
+    margins: so many pixels on each side. Raises Cancelled once should_stop is true.
     """
     size = image_size(disparity)
     if not any(margins):
@@ -54,12 +50,9 @@ def extend_beyond_frame(
     means = _means_along_frame(colors.reshape(-1, 3)[frame], max(margins))
     lines = np.empty((len(frame), 2), np.float32)
     find_lines(colors, disparity, disparity, frame, np.inf, lines)
-    continued = follow_surfaces(disparity, margins, SURFACE_PX / farthest_views)
 
     def band(first: int, last: int) -> None:
-        _extend_rows(
-            colors, disparity, frame, continued, means, margins.top, margins.left, first, last, grown, surfaces
-        )
+        _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
         _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
 
     in_bands(band, larger, should_stop)
@@ -118,7 +111,7 @@ def _texture(colors, y, x, c):
 
 
 @kernel
-def _extend_rows(colors, disparity, frame, continued, means, top, left, first, last, grown, surfaces):
+def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfaces):
     height, width = disparity.shape
     for row in range(first, last):
         for column in range(grown.shape[1]):
@@ -129,9 +122,7 @@ def _extend_rows(colors, disparity, frame, continued, means, top, left, first, l
                 for c in range(3):
                     grown[row, column, c] = colors[y, x, c]
                 continue
-            # The place on the frame whose surface goes on.
-            place, level = continued[row, column], _level(away)
-            y, x = frame[place] // width, frame[place] % width
+            place, level = _place_on_frame(height, width, y, x), _level(away)
             surfaces[row, column] = disparity[y, x]
             k = min(int(level), len(means) - 2)
             part = np.float32(level - k)

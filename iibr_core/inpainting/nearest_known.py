@@ -39,7 +39,7 @@ def nearest_known(
     known = np.empty((len(pixels), len(DIRECTIONS)), np.int64)
 
     def look(k: int) -> None:
-        _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known[:, k])
+        _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known, k)
 
     in_pieces(look, range(len(DIRECTIONS)), should_stop, threads)
     return known
@@ -84,8 +84,8 @@ def _mark(known, is_rim):
 
 
 @kernel
-def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):
-    """What `_nearest_known` returns, for one direction.
+def _nearest_known_towards(hole, pixels, number, step_x, step_y, known, k):
+    """What `nearest_known` returns, for direction k: a column of it would be another kind of array where N is 1.
 
     pixels: flat indices of the hole pixels, ascending. Holes pass on what the next pixel in that direction found, so
     the cost does not depend on the holes' size.
@@ -98,10 +98,10 @@ def _nearest_known_towards(hole, pixels, number, step_x, step_y, known):
         i = n if downwards else total - 1 - n
         # The neighbour: off the frame, a hole that passes on what it found, or known.
         y, x = pixels[i] // width + step_y, pixels[i] % width + step_x
-        known[i] = -1
+        known[i, k] = -1
         if not (0 <= x < width and 0 <= y < height):
             continue
         if hole[y, x]:
-            known[i] = known[number[y, x]]
+            known[i, k] = known[number[y, x], k]
             continue
-        known[i] = y * width + x
+        known[i, k] = y * width + x

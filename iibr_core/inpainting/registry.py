@@ -8,10 +8,7 @@ from pkgutil import resolve_name
 from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
 from iibr_core.types import InputError
 
-INPAINTERS = {
-    "background": "iibr_core.inpainting.background:background_inpainter",
-    "patch": "iibr_core.inpainting.patch:patch_inpainter",
-}
+INPAINTERS = {"background": "iibr_core.inpainting.background:background_inpainter"}
 """Name -> "module:function" of a factory without arguments."""
 
 MODEL_INPAINTERS = {"diffusion": "iibr_core.inpainting.diffusion:diffusion_inpainter"}

@@ -11,5 +11,3 @@ AMBIGUOUS_PX = 1.5
 """Where a step of disparity moves its sides apart by more than this, surfaces meet: some rays there are ambiguous."""
 AMBIGUOUS_AROUND_PX = 1.5
 """Near a soft edge a surface that lands near by makes a ray ambiguous if its parallax differs by this."""
-EVERY_COST = 8
-"""How many times as long a band takes where the transformer is asked for every ray."""

@@ -74,11 +74,15 @@ def largest_tile(size: ImageSize, lens: LargeLens, disparity_px: float) -> Image
     """What is read of a photo of (height, width) to draw a tile of it, at most. disparity_px: its greatest, either way,
     px of it per view step.
     """
+    around_px = _around_px(size, lens, disparity_px)
+    return ImageSize(*(min(side, TILE_PX + 2 * around_px) for side in size))
+
+
+def _around_px(size: ImageSize, lens: LargeLens, disparity_px: float) -> int:
+    """What is read around a tile, at most."""
     views = max([1.0, *(abs(axis) for offset in lens.offsets for axis in offset)])
     around_px = AROUND_PX + math.ceil(min(max(size), abs(views * disparity_px)))
-    if lens.share > 0:
-        around_px += math.ceil(min(max(size), _moved_px(lens))) + TAPS
-    return ImageSize(*(min(side, TILE_PX + 2 * around_px) for side in size))
+    return around_px + (math.ceil(min(max(size), _moved_px(lens))) + TAPS if lens.share > 0 else 0)
 
 
 def _moved_px(lens: LargeLens) -> float:
@@ -103,10 +107,13 @@ def draw_large(
     """
     light, tiles = np.zeros((*part.size, 3), np.float32), tiles_of(part)
     sharp = [_has_sharp(photo, lens, tile) for tile in tiles]
-    done, total = 0, len(tiles) * (lens.share < 1) + sum(sharp) * len(lens.samples)
-    for tile, is_sharp in zip(tiles, sharp):
+    around_px = _around_px(photo.size, lens, float(np.abs(photo.disparity).max(initial=0.0)))
+    read = [math.prod(tile.grown(around_px, whole(photo.size)).size) for tile in tiles]
+    views = [(lens.share < 1) + is_sharp * len(lens.samples) for is_sharp in sharp]
+    done, total = 0, sum(pixels * count for pixels, count in zip(read, views))
+    for tile, is_sharp, pixels in zip(tiles, sharp, read):
         for _ in _draw_tile(photo, lens, tile, is_sharp, synthesis, should_stop, light[tile.inside(part).slices]):
-            done += 1
+            done += pixels
             report_progress(done, total, DRAWING)
     if smaller is not None:
         bring_to(light, smaller, part, photo.size, should_stop)

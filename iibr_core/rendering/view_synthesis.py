@@ -17,7 +17,6 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background, goes_on_in_front
 from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
-from iibr_core.rendering.ambiguity import EVERY_COST
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, AmbiguousRays, UndecidedRays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
@@ -38,6 +37,8 @@ from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
 
 EDGE_PX = 1.0
 """A step of disparity mixes two surfaces if it opens a gap of at least this many pixels in the outermost view."""
+EVERY_COST = 8
+"""How many times as long a band takes where the transformer is asked for every ray."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -56,7 +57,7 @@ def rays_of_photo(
     farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
     margins: so far beyond its frame the photo is continued. Raises Cancelled once should_stop is true.
     """
-    colors, disparity = extend_beyond_frame(colors, disparity, margins, farthest_views, should_stop)
+    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop)
     centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
     detail = measure_detail(colors, should_stop)

@@ -1,6 +1,6 @@
 """Memory that is freed goes back to the system: glibc keeps it, in a heap of its own for nearly every thread.
 
-Measured by `python -m benchmarks.memory day` and `speed`, after 150 photos, on two cores: 657 MiB by glibc's own ways,
+Measured by benchmarks/memory.py of commit ee2b9f0, after 150 photos, on two cores: 657 MiB by glibc's own ways,
 391 with two heaps that are trimmed (1.07 of the processor time, 0.93 to 1.08), 329 with a fixed mmap threshold (1.47).
 Where the C library has no such calls, nothing happens.
 """

@@ -25,6 +25,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from iibr_core.runtime.compiling import note_kernel
+
 
 @contextmanager
 def _as_if_missing(*packages: str) -> Iterator[None]:
@@ -99,8 +101,38 @@ class _Nowhere(numba.core.caching._CacheLocator):  # type: ignore[misc, name-def
         return cls()
 
 
+class _Along(_Nowhere):
+    """PRECOMPILED itself, while it is filled."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def ensure_cache_path(self) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Along:
+        return cls(_folder_along(py_func))
+
+
 class _Implementation(numba.core.caching.CompileResultCacheImpl):  # type: ignore[misc, name-defined]
     _locator_classes = (*numba.core.caching.CompileResultCacheImpl._locator_classes, _Nowhere)
+
+
+def _folder_along(function: Callable[..., Any]) -> Path:
+    return PRECOMPILED.joinpath(*function.__module__.split(".")[1:-1])
+
+
+def fill(folder: Path) -> None:
+    """Have this process keep and find its kernels in a folder that is to come along, instead of where Numba keeps them.
+    To be called before any kernel is imported.
+    """
+    global PRECOMPILED
+    PRECOMPILED = folder
+    _Implementation._locator_classes = (_Along,)
 
 
 class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-defined]
@@ -119,8 +151,7 @@ class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-
         self._file_name = _LINE_NUMBER.sub("", self._impl.filename_base)
         stamp = sources_hash(Path(inspect.getfile(function)).resolve())
         self._cache_file = _CheckedFiles(self.cache_path, self._file_name, stamp)
-        folder = PRECOMPILED.joinpath(*function.__module__.split(".")[1:-1])
-        self._precompiled = _CheckedFiles(str(folder), self._file_name, stamp)
+        self._precompiled = _CheckedFiles(str(_folder_along(function)), self._file_name, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled kernel for a signature; None where there is none, or a damaged one."""
@@ -129,7 +160,10 @@ class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-
         except Exception:  # damaged bytes raise whatever they like when they are unpickled
             self.flush()
             found = None
-        return self._load_precompiled(sig, target_context) if found is None else found
+        if found is None:
+            found = self._load_precompiled(sig, target_context)
+            note_kernel(came_along=found is not None)
+        return found
 
     def _load_precompiled(self, sig: Any, target_context: Any) -> Any:
         with suppress(Exception):

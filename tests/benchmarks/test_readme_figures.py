@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import readme_figures
-from benchmarks.provenance import current_commit
+from benchmarks.harness.report import current_commit
 from benchmarks.readme_figures import (
     ROOT,
     faults_of_report,

@@ -13,22 +13,37 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.prediction import fitted_scenes, judged_scenes
-from benchmarks.speed.figures import MeasuredVariant, SceneFigures, measure_scene
-from benchmarks.speed.measure import Cost, exponent, in_turns, median_cost, median_ratio, on_the_front, peak_bytes
-from benchmarks.speed.plot import plot_panels
-from benchmarks.speed.prediction import Prediction, fit_nanoseconds, is_near, make_field, predict, whole_field
-from benchmarks.speed.rendering_figures import DrawingFigures, MeasuredDrawing
-from benchmarks.speed.report import Bench, markdown_of, means, panels, write_bench
-from benchmarks.speed.scaling import Point, growth, made_up_scene
-from benchmarks.speed.targets import SpeedTarget, front_targets, prediction_targets
+from benchmarks.harness.plots import on_the_front, plot_panels
+from benchmarks.harness.report import holds, markdown
+from benchmarks.harness.scenes import (
+    FIELD,
+    BenchScene,
+    bench_scenes,
+    drawn_scene,
+    judged_of,
+    photo_scene,
+    soften,
+    squares_scene,
+    write_photo,
+)
+from benchmarks.harness.timing import (
+    COMMAND_LINE,
+    Cost,
+    in_turns,
+    make_field,
+    median_cost,
+    median_ratio,
+    peak_bytes,
+    run,
+)
+from benchmarks.prediction import Prediction, fit_nanoseconds, fitted_scenes, is_near, judged_scenes, predict, sum_up
+from benchmarks.speed.__main__ import front_targets, measure_scene
+from benchmarks.speed.report import Bench, Figures, Measured, SpeedTarget, markdown_of, means, panels, write_bench
 from benchmarks.speed.variants import (
     REFERENCE,
     VARIANTS,
-    BenchScene,
     Stored,
     Variant,
-    bench_scenes,
     evaluated_views,
     field_cost,
     is_possible,
@@ -38,7 +53,7 @@ from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.generation.cost_model import CORES, NANOSECONDS, Workload
 from iibr_core.generation.plan import ScenePlan, plan_literal
-from iibr_core.types import FloatImage, Quality, ViewOffset
+from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, view_of_square, write_grid
 
 SMALL = (
@@ -67,7 +82,7 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> list[BenchScene]:
 
 
 @pytest.fixture(scope="module")
-def figures(scenes: list[BenchScene]) -> tuple[SceneFigures, ...]:
+def figures(scenes: list[BenchScene]) -> tuple[Figures, ...]:
     variants = [*SMALL, Variant("every 2nd view stored, balanced", "balanced", every=2)]
     return tuple(measure_scene(scene, variants, 2, quiet, true_drawing) for scene in scenes)
 
@@ -90,15 +105,6 @@ def test_rounds_go_through_all_ways_in_turn() -> None:
     found = in_turns({name: lambda name=name: way(name) for name in "ab"}, 3, quiet)  # type: ignore[misc]
     assert "".join(order) == "ababab"
     assert [cost.wall_s for cost in found["b"]] == [2, 4, 6]
-
-
-@pytest.mark.parametrize("power", [0.0, 0.5, 1.0, 2.0])
-def test_exponents_of_known_powers(power: float) -> None:
-    x = [1.0, 3.0, 10.0, 50.0]
-    assert exponent(x, [7 * value**power for value in x]) == pytest.approx(power)
-    assert exponent([0.0, *x], [5.0, *(value**power for value in x)]) == pytest.approx(power)
-    assert math.isnan(exponent([1.0, 1.0], [2.0, 3.0]))
-    assert math.isnan(exponent([1.0, 2.0], [math.nan, 3.0]))
 
 
 def test_the_front_is_what_nothing_beats() -> None:
@@ -154,8 +160,8 @@ def test_every_variant_makes_views_of_the_scenes_size(scenes: list[BenchScene], 
     assert cost.wall_s > 0
 
 
-def test_what_is_left_out_shows(figures: tuple[SceneFigures, ...]) -> None:
-    own = {m.variant.name: m for m in figures[0].measured}
+def test_what_is_left_out_shows(figures: tuple[Figures, ...]) -> None:
+    own = {m.name: m for m in figures[0].measured}
     assert own["fast"].ratio == 1
     assert own["half width"].psnr_db < own["fast"].psnr_db
     assert figures[0].planned in own
@@ -164,20 +170,20 @@ def test_what_is_left_out_shows(figures: tuple[SceneFigures, ...]) -> None:
 
 
 def test_the_plan_beside_what_was_measured(scenes: list[BenchScene]) -> None:
-    fast, balanced = predict([whole_field(scenes[0])], ("fast", "balanced"), 1, quiet)
+    fast, balanced = predict(scenes[0], ("fast", "balanced"), 1)
     assert 0 < fast.predicted_s < balanced.predicted_s
     assert min(fast.measured_s, balanced.measured_s) > 0
     assert balanced.predicted_bytes > fast.predicted_bytes > 25 * HEIGHT * WIDTH * 7
     assert fast.time_ratio == fast.predicted_s / fast.measured_s
-    assert len(make_field(whole_field(scenes[0]), "fast")) == 25
+    assert len(make_field(scenes[0], "fast")) == 25
 
 
 def test_constants_are_recovered_from_what_they_predicted() -> None:
-    true = Workload(20.0, 80.0, 300.0, 2000.0, NANOSECONDS.soft_rays, NANOSECONDS.plain_rays)
+    true = Workload(20.0, 80.0, 300.0, 2000.0, NANOSECONDS.soft_rays)
     rng = np.random.default_rng(0)
     found = []
     for _ in range(12):
-        work = Workload(*(float(amount) for amount in rng.uniform(1e7, 1e8, 4)), 0.0, 0.0)
+        work = Workload(*(float(amount) for amount in rng.uniform(1e7, 1e8, 4)), 0.0)
         seconds = sum(amount * each for amount, each in zip(work, true)) * 1e-9 / CORES
         found.append(Prediction("", "fast", 1.0, seconds, 1.0, 1.0, work))
     assert fit_nanoseconds(found) == pytest.approx(true, rel=1e-6)
@@ -185,21 +191,16 @@ def test_constants_are_recovered_from_what_they_predicted() -> None:
 
 def test_near_is_within_a_quarter() -> None:
     assert [is_near(ratio) for ratio in (0.7, 0.8, 1.2, 1.3, math.nan)] == [False, True, True, False, None]
-    work = Workload(*6 * [0.0])
-    near, off = (
-        Prediction("a", "fast", 1.0, 1.1, 5.0, 5.0, work),
-        Prediction("b", "fast", 1.0, 2.0, 5.0, math.nan, work),
-    )
-    time, memory = prediction_targets([near, off])
-    assert (time.is_met, memory.is_met) == (False, True)
-    assert time.measured.startswith("1 of 2")
+    assert sum_up("a", [0.9, 2.0, math.nan]) == "- a: 1 of 2 within 25%, from 0.90 to 2.00"
+    assert sum_up("a", []) == "- a: 0 of 0 within 25%"
+    assert [holds(is_so) for is_so in (True, False, None)] == ["yes", "**no**", "not known here"]
 
 
-def test_the_plans_choice_is_judged_on_every_scene(figures: tuple[SceneFigures, ...]) -> None:
+def test_the_plans_choice_is_judged_on_every_scene(figures: tuple[Figures, ...]) -> None:
     found = list(front_targets(figures))
     for scene, behind, slower in zip(figures, found[::2], found[1::2], strict=True):
-        assert scene.name in behind.what
-        assert scene.name in slower.what
+        assert scene.what in behind.what
+        assert scene.what in slower.what
         assert behind.is_met == (scene.behind_front_db <= 0.1)
 
 
@@ -208,16 +209,16 @@ def test_the_plans_choice_is_judged_on_every_scene(figures: tuple[SceneFigures, 
     [(2.0, 30.0, True, False), (2.0, 30.2, True, True), (1.2, 30.0, True, True), (2.0, 29.8, False, False)],
 )
 def test_a_choice_fails_that_is_slower_than_one_as_good(time, psnr_db, is_good_enough, is_fast_enough) -> None:
-    fast = MeasuredVariant(Variant("fast"), Cost(1.0, 1.0), 1.0, 0.0, 30.0, 0.1)
-    choice = MeasuredVariant(Variant("balanced", "balanced"), Cost(time, time), time, 0.0, psnr_db, 0.1)
-    scene = SceneFigures("scene", (10, 10), 9, 8, (fast, choice), "balanced")
+    fast = Measured("fast", Cost(1.0, 1.0), 1.0, 30.0, 0.1)
+    choice = Measured("balanced", Cost(time, time), time, psnr_db, 0.1)
+    scene = Figures("scene", "", (fast, choice), "balanced")
     behind, slower = front_targets([scene])
     assert (behind.is_met, slower.is_met) == (is_good_enough, is_fast_enough)
-    assert scene.fastest_as_good(0.05).variant.name == ("balanced" if psnr_db > 30.05 else "fast")
+    assert scene.fastest_as_good(0.05).name == ("balanced" if psnr_db > 30.05 else "fast")
 
 
-@pytest.mark.parametrize(("quality", "is_met"), [("fast", True), ("exact", False)])
-def test_a_plan_that_chose_exact_here_would_be_found_out(
+@pytest.mark.parametrize(("quality", "is_met"), [("fast", True), ("balanced", False)])
+def test_a_plan_that_chose_balanced_here_would_be_found_out(
     quality: Quality, is_met: bool, scenes: list[BenchScene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Errors as they are; times as the plan predicts them."""
@@ -225,13 +226,12 @@ def test_a_plan_that_chose_exact_here_would_be_found_out(
     def planned(*given: Any) -> ScenePlan:
         return replace(plan_literal(*given), quality=quality)
 
-    monkeypatch.setattr("benchmarks.speed.figures.plan_literal", planned)
-    variants = [REFERENCE, Variant("exact", "exact")]
+    monkeypatch.setattr("benchmarks.speed.__main__.plan_literal", planned)
+    variants = [REFERENCE, Variant("balanced", "balanced")]
     found = measure_scene(scenes[0], variants, 1, quiet)
-    field = whole_field(scenes[0])
-    costs = plan_literal(field.photo, field.disparity, field.grid).costs
-    seconds = {m.variant.name: costs.of(m.variant.quality).seconds for m in found.measured}
-    timed = tuple(replace(m, ratio=seconds[m.variant.name] / seconds["fast"]) for m in found.measured)
+    costs = plan_literal(*scenes[0].given, scenes[0].grid).costs
+    seconds = {variant.name: costs.of(variant.quality).seconds for variant in variants}
+    timed = tuple(replace(m, ratio=seconds[m.name] / seconds["fast"]) for m in found.measured)
     _, slower = front_targets([replace(found, measured=timed)])
     assert found.planned == quality
     assert slower.is_met == is_met
@@ -242,66 +242,86 @@ def test_nothing_is_judged_that_constants_are_fitted_to(tmp_path: Path) -> None:
     fitted, judged = list(fitted_scenes(data)), list(judged_scenes(data))
     assert any(given.name.startswith("square") for given in fitted)
     assert judged
-    pictures = {given.photo.pixels.tobytes() for given in fitted}
-    assert not any(given.photo.pixels.tobytes() in pictures for given in judged)
+    pictures = {given.photo.tobytes() for given in fitted}
+    assert not any(given.photo.tobytes() in pictures for given in judged)
 
 
-def test_made_up_scenes_have_what_is_asked_for() -> None:
-    photo, disparity = made_up_scene(64, 4.0, 5)
-    assert photo.size == (64, 64)
-    assert 0 <= photo.pixels.min() < photo.pixels.max() <= 1
-    assert disparity.values.min() == 0
-    assert 2 <= disparity.values.max() <= 4
-    assert not made_up_scene(64, 4.0, 0)[1].values.any()
-    np.testing.assert_array_equal(made_up_scene(64, 4.0, 5)[0].pixels, photo.pixels)
+def test_squares_are_as_near_and_as_many_as_asked_for() -> None:
+    scene = squares_scene(64, 4.0, 5, GridShape(3, 3))
+    assert image_size(scene.photo) == (64, 64)
+    assert scene.grid == (3, 3)
+    assert 0 <= scene.photo.min() < scene.photo.max() <= 1
+    assert scene.disparity.min() == 0
+    assert 2 <= scene.disparity.max() <= 4
+    assert not squares_scene(64, 4.0, 0).disparity.any()
+    np.testing.assert_array_equal(squares_scene(64, 4.0, 5).photo, scene.photo)
 
 
-def test_growth_is_fitted_to_the_measured_points() -> None:
-    points = [Point(float(side**2), side, 3, 2.0, 4) for side in (24, 64)]
-    found = growth("pixels", points, 1, quiet)
-    assert [x for x, _, _ in found.points] == [24**2, 64**2]
-    assert found.time_exponent == pytest.approx(exponent([24.0**2, 64.0**2], [s for _, s, _ in found.points]))
+def test_a_drawn_scene_has_true_views_of_every_quarter() -> None:
+    own = drawn_scene(0, ImageSize(64, 64), 2.0, FIELD, judged_of(FIELD))
+    assert (own.is_soft, soften(own).is_soft) == (False, True)
+    assert own.reach == 4
+    assert own.grid == FIELD
+    assert len(own.truth) == 12
+    assert {(t, s) for t in (-4.0, 4.0) for s in (-4.0, 4.0)} <= own.truth.keys() <= set(own.field)
+    assert {(np.sign(at.t), np.sign(at.s)) for at in own.truth} == {(-1, -1), (-1, 1), (1, -1), (1, 1)}
+    assert np.abs(own.disparity).max() <= 2.0
+    assert not any(psnr(view, own.photo) > 60 for view in own.truth.values())
 
 
-def bench_of(figures: tuple[SceneFigures, ...]) -> Bench:
+@pytest.mark.parametrize("extension", [".png", ".jpg", ".exr"])
+def test_a_written_photo_is_read_with_its_map(tmp_path: Path, extension: str) -> None:
+    path = write_photo(tmp_path / f"a{extension}", (300, 400))
+    scene = photo_scene(path)
+    assert scene is not None
+    assert image_size(scene.photo) == (300, 400)
+    assert np.ptp(scene.disparity) > 0
+    assert photo_scene(write_photo(tmp_path / f"b{extension}", (60, 80), with_map=False)) is None
+
+
+def test_a_process_is_measured_and_its_code_told() -> None:
+    ended = run((*COMMAND_LINE, "--help"))
+    assert ended.code == 0
+    assert ended.cost.wall_s > 0
+    assert ended.peak_mib > 10
+    assert run((*COMMAND_LINE, "no-command")).code == 2
+
+
+def bench_of(figures: tuple[Figures, ...]) -> Bench:
     targets = (
         SpeedTarget("a", "<= 1", "2", False),
         SpeedTarget("b", ">= 1", "2", True),
         SpeedTarget("c", "d", "–", None),
     )
     drawn = tuple(
-        MeasuredDrawing(name, Cost(1, ratio), ratio, 9, 40 + ratio, 0.01) for name, ratio in (("once", 1), ("all", 5))
+        Measured(name, Cost(1, ratio), ratio, 40 + ratio, 0.01, 9) for name, ratio in (("once", 1), ("all", 5))
     )
-    predicted = (Prediction("a scene", "fast", 1.0, 2.0, 3e6, math.nan, Workload(*6 * [0.0])),)
-    growths = (growth("pixels", [Point(1.0, 16, 3, 1.0, 1)], 1, quiet),)
-    drawings = (DrawingFigures("a picture", drawn),)
-    return Bench(figures, drawings, predicted, growths, targets, "a machine", "Made by `make bench`")
+    return Bench(figures, (Figures("Drawing: a picture", "", drawn),), targets)
 
 
-def test_tables_name_every_variant_and_mark_the_front(figures: tuple[SceneFigures, ...]) -> None:
+def test_tables_name_every_variant_and_mark_the_front(figures: tuple[Figures, ...]) -> None:
     text = markdown_of(bench_of(figures))
-    for title in ("## Mean over scenes, maps as they are", "## Mean over scenes, soft maps", "## Growth", "## Targets"):
+    for title in ("## Mean over scenes, maps as they are", "## Mean over scenes, soft maps", "## Targets"):
         assert title in text
     for scene in figures:
-        part = text.split(f"## {scene.name}\n")[1].split("##")[0]
+        part = text.split(f"## {scene.what}\n")[1].split("##")[0]
         for measured in scene.measured:
-            (line,) = [row for row in part.splitlines() if row.startswith(f"| {measured.variant.name} |")]
-            assert ("●" in line) == (measured.variant.name in scene.front)
-    assert text.index("## Mean") < text.index(f"## {figures[0].name}")  # the first table is the one to show
+            (line,) = [row for row in part.splitlines() if row.startswith(f"| {measured.name} |")]
+            assert ("●" in line) == (measured.name in scene.front)
+    assert text.index("## Mean") < text.index(f"## {figures[0].what}")  # the first table is the one to show
     assert "| all | ● | 5.00 |" in text.split("## Drawing: a picture")[1]
-    assert "| a scene | fast | 1.00 | 2.00 | 0.50 | off |" in text
     assert "nan" not in text
-    assert "| missed |" in text
+    assert "| a | <= 1 | 2 | **no** |" in text
+    assert markdown(("a", "b"), [(1, "c")]) == "| a | b |\n| --- | --- |\n| 1 | c |"
 
 
-def test_means_are_geometric_for_time(figures: tuple[SceneFigures, ...]) -> None:
-    (half,) = [mean for mean in means(figures) if mean.name == "half width"]
-    ratios = [m.ratio for scene in figures for m in scene.measured if m.variant.name == "half width"]
-    assert half.ratio == pytest.approx(math.sqrt(math.prod(ratios)))
-    assert half.scenes == 2
+def test_means_are_geometric_for_time(figures: tuple[Figures, ...]) -> None:
+    ratios = [m.ratio for scene in figures for m in scene.measured if m.name == "half width"]
+    assert len(ratios) == 2
+    assert means(figures)["half width"][0] == pytest.approx(math.sqrt(math.prod(ratios)))
 
 
-def test_plots_are_pictures(figures: tuple[SceneFigures, ...], tmp_path: Path) -> None:
+def test_plots_are_pictures(figures: tuple[Figures, ...], tmp_path: Path) -> None:
     svg, png = plot_panels(panels(bench_of(figures)), ("svg", "png"))
     assert svg.startswith(b"<?xml")
     assert b"<svg" in svg

@@ -7,22 +7,25 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.harness.report import start
 from benchmarks.speed.__main__ import main
 from tests.iibr_core.known_scenes import write_grid
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
     monkeypatch.setattr(sys, "argv", ["speed", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
+    try:
+        start("benchmarks.speed", main)
+    except SystemExit as ended:
+        return int(ended.code or 0)
+    return 0
 
 
 def test_it_writes_tables_and_plots(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     """On a 5x5 field, so that the viewer draws what variants leave out."""
-    monkeypatch.setattr("benchmarks.speed.variants.MOST_JUDGED", 3)
+    monkeypatch.setattr("benchmarks.harness.scenes.MOST_JUDGED", 3)
     write_grid(tmp_path / "square", 5)
     out = tmp_path / "docs"
     out.mkdir()
@@ -30,8 +33,8 @@ def test_it_writes_tables_and_plots(
     assert capsys.readouterr().out.splitlines() == [str(out / f"speed.{kind}") for kind in ("md", "svg", "png")]
     text = (out / "speed.md").read_text()
     assert "| every 2nd view stored |" in text
-    assert "## The plan beside what was measured" in text
-    assert "## Growth" in text
+    assert "## Drawing: square, pinhole between views" in text
+    assert "## Targets" in text
 
 
 @pytest.mark.parametrize(

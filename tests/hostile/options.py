@@ -73,8 +73,8 @@ _screenshot = [
         ("--size", ("", "12", "0x5", "axb", "99999x1", f"{HUGE}x1")),
         ("--backend", ("", "vulkan")),
         ("--gloss", ("", "missing", "photo.png", "map.pfm")),
-        ("--quality", ("", "best", "Exact")),
-        ("--inpaint", ("", "magic", "diffusion", "diffusion:", "patch:folder")),
+        ("--quality", ("", "best", "exact")),
+        ("--inpaint", ("", "magic", "diffusion", "diffusion:", "patch")),
         ("--depth-strength", ("", "nan", "1e300")),
         ("--focus-disparity", ("", "inf")),
     )
@@ -135,7 +135,7 @@ _generate = [
         (("--grid", "3", "--photo-pose", "1"), "--photo-pose"),
         (("--poses", "poses.json", "--photo-pose", "0"), "--photo-pose"),
         (("--poses", "poses.json", "--photo-pose", "9"), "--photo-pose 9"),
-        (("--poses", "poses.json", "--quality", "exact", "--format", "hci"), "--format and --quality"),
+        (("--poses", "poses.json", "--quality", "fast", "--format", "hci"), "--format and --quality"),
         (("--poses", "missing"), "missing"),
         (("--poses", "folder"), "poses_bounds.npy"),
         (("--poses", "text.txt"), "text.txt"),
@@ -175,13 +175,6 @@ _inpainters = [
         "generate --inpaint with an empty folder",
         ("generate", "photo.png", "--disparity", "map.pfm", *COMMANDS["generate"], "--inpaint", "diffusion:folder"),
         says="folder",
-    ),
-    Case(
-        "screenshot --inpaint patch",
-        ("screenshot", "photo.png", "-o", "new.png", "--inpaint", "patch"),
-        0,
-        "",
-        ("new.png",),
     ),
 ]
 

@@ -19,7 +19,7 @@ from torch import nn
 
 from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
-from iibr_core.depth.models import estimate_cache
+from iibr_core.depth.estimators import estimate_cache
 from iibr_core.formats import files
 from iibr_core.formats.images.oiio_reader import read_raster
 from iibr_core.formats.images.photo import read_photo, write_image

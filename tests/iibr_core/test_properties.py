@@ -86,7 +86,7 @@ def test_a_view_offset_of_zero_gives_the_photo_back(seed):
 def test_at_a_view_offset_of_zero_the_transformer_errs_at_split_pixels_only(seed):
     """No field is made of such a view, for the photo itself stands there; half a share of a pixel is what it costs."""
     pixels, disparity = scene(seed)
-    view = rendered(pixels, disparity, ViewOffset(0.0, 0.0), transformer=transformer_for("exact"))
+    view = rendered(pixels, disparity, ViewOffset(0.0, 0.0), transformer=transformer_for("balanced"))
     coverage = split_mixed_pixels(pixels, disparity, EDGE_PX / 2.0)[3]
     error = np.abs(view.colors - pixels).max(axis=2)
     assert error[coverage == 0].max() <= 1e-4
@@ -136,7 +136,7 @@ def test_weights_sum_to_one(seed, offset):
     assert weights.min() >= 0
     shown = resample_colors(rays, found, weights)[1:]
     ambiguous = find_ambiguous_rays(rays, found, weights, shown, (0, HEIGHT), every=True)
-    decided = transformer_for("exact")(ambiguous)
+    decided = transformer_for("balanced")(ambiguous)
     assert np.abs(decided.sum(axis=1) - 1).max(initial=0) <= 1e-5
     assert decided.min(initial=0) >= 0
 
@@ -202,7 +202,7 @@ def test_a_moved_photo_against_its_twin_in_doubles(seed, down, right):
     assert np.abs(view.colors - np.maximum(exact, 0))[inner].max() <= 4e-6
 
 
-@pytest.mark.parametrize("quality", ["fast", "exact"])
+@pytest.mark.parametrize("quality", ["fast", "balanced"])
 def test_error_falls_with_the_noise_of_the_disparity(quality):
     """Before a depth edge too, where the photo shows. What is inpainted is chosen among patches: it stays near, and
     without noise nothing differs.

@@ -18,7 +18,7 @@ from benchmarks import plucker
 from iibr_core import color
 from iibr_core.depth import pictorial_cues, scaling, search, subject
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.edges import blur_fit, crumbs, edge_blur, refine, rim_noise, rim_sides, rims, soft_outlines
+from iibr_core.depth.edges import blur_fit, edge_blur, refine, rim_sides, rims, soft_outlines
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
@@ -31,7 +31,7 @@ from iibr_core.formats.light_fields import hci, registry, views
 from iibr_core.formats.maps import disparity_file, resample
 from iibr_core.generation import cost_model, dense_field, free_views, outer_views, plan, relief
 from iibr_core.generation import light_field as generating
-from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes, leaving_surfaces
+from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes
 from iibr_core.rendering import (
     candidates,
     coherent_cells,
@@ -149,7 +149,7 @@ def in_use(asked):
 
 def decided(value):
     return hypothesis_colors.blend_hypotheses(
-        rays(value), contest(value), generating.transformer_for("exact")(contest(value))
+        rays(value), contest(value), generating.transformer_for("balanced")(contest(value))
     )
 
 
@@ -157,7 +157,7 @@ def field(photo_given, values):
     """Plan and views, by the transformer too."""
     disparity = Disparity(values, "wild")
     made = plan.plan_literal(photo_given, disparity, GRID)
-    return [made, *generating.generate(photo_given, made.field_disparity(disparity), made, quality="exact")]
+    return [made, *generating.generate(photo_given, made.field_disparity(disparity), made, quality="balanced")]
 
 
 def completed(values):
@@ -258,7 +258,7 @@ FINITE = {
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
     "rendering.hypothesis_colors.blend_hypotheses": lambda v, _: decided(v),
     "rendering.hypothesis_colors.bound_weights": lambda v, _: hypothesis_colors.bound_weights(
-        contest(v), generating.transformer_for("exact")(contest(v))
+        contest(v), generating.transformer_for("balanced")(contest(v))
     ),
     "rendering.hypothesis_features.describe_rays": lambda v, _: hypothesis_features.describe_rays(
         rays(v), undecided(v)
@@ -276,7 +276,7 @@ FINITE = {
         cost_model.measure_parallax(depths(1.0), v),
     ],
     "generation.cost_model.estimate_workload": lambda v, _: cost_model.estimate_workload(
-        cost_model.measure_parallax(depths(v), 4.0), GRID, "exact"
+        cost_model.measure_parallax(depths(v), 4.0), GRID, "balanced"
     ),
     "depth.scaling.inverse_metres_over": lambda v, _: np.array(
         scaling.inverse_metres_over(MetricDepth(depths(v)), scaling.disparity_from(MetricDepth(depths(v)), GRID))
@@ -319,27 +319,19 @@ FINITE = {
     "depth.edges.edge_blur.measure_edge_blur": lambda v, _: edge_blur.measure_edge_blur(
         image(0.5), np.nan_to_num(depths(v))
     ),
-    "depth.edges.crumbs.fill_crumbs": lambda v, _: [
-        crumbs.fill_crumbs(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
-        crumbs.fill_crumbs(image(v), np.where(np.eye(*SIZE), np.float32(9), depths(1.0)), 0.5, never),
-    ],
     "depth.edges.blur_fit.fit_to_blur": lambda v, _: [
         blur_fit.fit_to_blur(image(v), depths(1.0), depths(0.5), soft_cells(), 0.1),
         blur_fit.fit_to_blur(image(0.5), np.nan_to_num(depths(v)), np.nan_to_num(depths(v)), soft_cells(), 0.1),
+    ],
+    "depth.edges.soft_outlines.widen_fronts": lambda v, _: [
+        soft_outlines.widen_fronts(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
+        soft_outlines.widen_fronts(image(v), mixed_between_surfaces(), 0.5, never),
     ],
     "depth.edges.rims.settle_rims": lambda v, _: [
         rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),
         rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
     ],
     "depth.edges.rim_sides.step_distance": lambda v, _: rim_sides.step_distance(depths(v), 0.5),
-    "depth.edges.rim_noise.steady_rims": lambda v, _: [
-        rim_noise.steady_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
-        rim_noise.steady_rims(image(v), mixed_between_surfaces(), 0.5, never),
-    ],
-    "depth.edges.soft_outlines.widen_fronts": lambda v, _: [
-        soft_outlines.widen_fronts(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
-        soft_outlines.widen_fronts(image(v), mixed_between_surfaces(), 0.5, never),
-    ],
     "depth.edges.rim_sides.choose_sides": lambda v, _: [
         rim_sides.choose_sides(scene()[0].pixels, np.nan_to_num(known(v)), np.isnan(known(v)), 0.5, never),
         rim_sides.choose_sides(image(v), mixed_between_surfaces(), np.ones(SIZE, np.bool_), 0.5, never),
@@ -397,11 +389,8 @@ FINITE = {
         camera(), camera(position=np.array([0.0, v, 0.1]), focal_px=(v, 20.0)), 10.0
     ),
     "inpainting.beyond_frame.extend_beyond_frame": lambda v, _: beyond_frame.extend_beyond_frame(
-        np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2), 1.0
+        np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2)
     )[0],
-    "inpainting.leaving_surfaces.follow_surfaces": lambda v, _: leaving_surfaces.follow_surfaces(
-        known(v), Margins(1, 2, 3, 2), 1.0
-    ),
     "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
     "geometry.line_of_pixel": lambda v, _: plucker.line_of_pixel([v], [0.0], ViewOffset(0.0, 1.0)),
     "rendering.resampling.heaviest_candidate": lambda v, _: resampling.heaviest_candidate(
@@ -516,7 +505,6 @@ FINITE_BY_CONTRACT = {
     "inpainting.nearest_known.rims_of_holes": "of indices only",
     "inpainting.nearest_known.number_pixels": "of indices only",
     "inpainting.exemplars.copy_exemplars": "of rendered views only",
-    "inpainting.patch.fill_patches": "of rendered views only",
     "inpainting.rim_lines.mixed_beside": "of masks only",
     "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
     "depth.multi_view.matching.sweep": "of `matching_views`, whose lumas `luma_of` made finite",
@@ -524,14 +512,14 @@ FINITE_BY_CONTRACT = {
     "depth.multi_view.gradient_refinement.refine_by_gradients": "of `matching_views`, within a sweep's disparities",
     "depth.multi_view.guided_filter.GuidedFilter": "of what `luma_of` made finite",
     "generation.carried_disparity.carry_disparity": "of a Photo and a Disparity",
-    "depth.models.estimate.estimate_with": "of a Photo; what a model gives is cleaned by `disparity_from`",
-    "depth.models.transformers_models.input_for": "sizes only",
-    "depth.models.transformers_models.run_transformers": "of a Photo; `estimate_with` refuses non-finite results",
-    "depth.models.onnx_models.input_for": "sizes only",
-    "depth.models.onnx_models.run_onnx": "of a Photo; `estimate_with` refuses non-finite results",
-    "depth.models.preparation.affordable_pixels": "sizes only",
-    "depth.models.preparation.input_size": "sizes only",
-    "depth.models.preparation.network_input": "of a Photo, which is finite",
+    "depth.estimators.estimate.estimate_with": "of a Photo; what a model gives is cleaned by `disparity_from`",
+    "depth.estimators.transformers_models.input_for": "sizes only",
+    "depth.estimators.transformers_models.run_transformers": "of a Photo; `estimate_with` refuses non-finite results",
+    "depth.estimators.onnx_models.input_for": "sizes only",
+    "depth.estimators.onnx_models.run_onnx": "of a Photo; `estimate_with` refuses non-finite results",
+    "depth.estimators.preparation.affordable_pixels": "sizes only",
+    "depth.estimators.preparation.input_size": "sizes only",
+    "depth.estimators.preparation.network_input": "of a Photo, which is finite",
     "formats.images.photo.read_picture": "`read_photo` reads so",
     "formats.images.photo.encoded_colors": "`read_views` reads so",
     "formats.images.picture_source.part_of": "keeps what it gets, tests/iibr_core/formats/test_view_files.py",
@@ -551,21 +539,25 @@ FINITE_BY_CONTRACT = {
     "rendering.lens_light.bring_to": "of light that `draw_large` made, and of a drawn picture",
     "rendering.lens_light.mean_of_areas": "of light that `draw_large` made",
     "rendering.ray_set.RaySet": "NaN is no surface; infinity is refused by Disparity",
-    "depth.models.estimate_cache.store": "an Estimate, in which NaN is unknown",
+    "depth.estimators.estimate_cache.store": "an Estimate, in which NaN is unknown",
+    "depth.estimators.package_calls.prepare_by": "of a Photo; the package's NaN is unknown",
+    "depth.estimators.package_calls.positive": "what is not finite becomes unknown",
 }
 """Who promises the numbers, or where the case is tested."""
 
 READS_OR_TELLS = {
     "depth.embedded.apple": "appended_estimate",
+    "depth.estimates": "values_of",
     "depth.embedded.reader": "read_embedded embedded_in_jpeg",
-    "depth.models.estimate_cache": "cache_folder key_of load",
+    "depth.estimators.estimate_cache": "cache_folder key_of load store_seconds seconds_of",
     "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
-    "depth.models.config": "read_config package_for read_preparation",
-    "depth.models.catalog": "known_model model_to_use lacking_package cached_folder weight_files onnx_file bytes_of "
-    "fetch",
-    "depth.models.download": "verified_folder download require_unchanged",
-    "depth.models.package_models": "run_package",
-    "depth.multi_view.estimate": "sweep_bytes sweep_steps",
+    "depth.estimators.config": "folder_of safetensors_in mentions read_config read_preparation",
+    "depth.estimators.catalog": "known_model family_of model_to_use model_here state_of fetch",
+    "depth.estimators.download": "verified_folder download require_unchanged",
+    "depth.estimators.hub": "HubRefusal hub_cache read_json hub_answer chunks_of failures_told",
+    "depth.estimators.onnx_models": "weights_in",
+    "depth.estimators.words": "words_about",
+    "depth.multi_view.estimate": "map_work sweep_bytes sweep_steps",
     "depth.multi_view.every_view": "matched_views",
     "depth.multi_view.matching": "choose_views",
     "depth.embedded.images": "picture_file decode_map",
@@ -582,7 +574,8 @@ READS_OR_TELLS = {
     "formats.files": "reason_of shown_name printable status_of is_file is_folder ordinary_file file_within "
     "stays_within entries_of require_file open_binary read_text refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
-    "atomic_write UnfinishedFolder remove_leftovers require_own_folder require_no_link open_to_append",
+    "atomic_write UnfinishedFolder release_place require_own_folder require_no_link open_to_append",
+    "formats.unfinished": "Claims remove_leftovers remove_around make_temporary lock_of unlock",
     "formats.poses": "read_poses read_llff_poses",
     "formats.light_fields.numbered_grid": "read_numbered_grid NumberedGridWriter",
     "formats.light_fields.hci": "read_hci HciWriter",
@@ -636,30 +629,30 @@ READS_OR_TELLS = {
     "generation.outer_views": "outer_views outer_views_of_grid farthest_views",
     "generation.update_loop": "render_outer_views complete_ray_set",
     "inpainting.background": "background_inpainter",
-    "inpainting.patch": "patch_inpainter",
     "inpainting.protocol": "Inpainter",
     "inpainting.diffusion": "diffusion_inpainter large_gaps",
     "inpainting.registry": "load_inpainter require_inpainter",
     "runtime.allocator": "limit_arenas give_back_memory",
     "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes",
-    "runtime.kernel_cache": "KernelCache sources_hash",
+    "runtime.compiling": "tell_compiling note_kernel",
+    "runtime.kernel_cache": "KernelCache sources_hash fill",
     "runtime.resources": "resource_folder",
-    "runtime.extras": "is_installed require_extra",
+    "runtime.extras": "is_installed require_extra said_by",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
     "require_dense_field "
     "require_own_size require_free_views require_matching mebibytes Making making_bytes own_size_bytes",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands pieces_of",
-    "depth.search": "estimator_of read_shown_photo",
+    "depth.search": "ask_model estimator_of read_shown_photo",
     "rendering.large_views": "Part tiles_of whole",
     "rendering.view_synthesis": "ViewSynthesis",
     "types": "Camera ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 
-ELSEWHERE = ("training.", "evaluation.", "runtime.jit.", "depth.editing.")
-"""Packages whose own tests feed them such values: scenes of our own making, figures, pieces of kernels, edits."""
+ELSEWHERE = ("training.", "evaluation.", "interface.", "runtime.jit.", "depth.editing.")
+"""Packages whose own tests feed them such values: drawn scenes, figures, what users call, pieces of kernels, edits."""
 
 
 def plain(result):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ntpath
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 
 from iibr_core.formats.images.photo import read_photo, write_image
 from tests.viewer.conftest import write_scene
+from viewer import entry
 
 ROOT = Path(__file__).parents[2]
 START = (sys.executable, "-P", "-m", "viewer")
@@ -233,3 +235,12 @@ AS_NOBODY = (
 def test_where_no_thread_may_be_started_it_says_so(number: int, tmp_path: Path) -> None:
     limited = (*(AS_NOBODY if os.geteuid() == 0 else ()), "prlimit", f"--nproc={number}")
     assert "no more threads" in the_error(run("plan", write_scene(tmp_path), start=(*limited, *START)))
+
+
+def test_a_home_that_windows_does_not_name_is_no_mistake(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.setenv("USERPROFILE", "C:\\Users\\somebody")
+    with monkeypatch.context() as windows:
+        windows.setattr(os, "path", ntpath)
+        entry._settle_home()
+    assert "HOME" not in os.environ

@@ -6,36 +6,40 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import write_image
-from iibr_core.runtime import kernel_cache
+from iibr_core.runtime.compiling import COMPILING
+from iibr_core.runtime.tiling import Cancelled
+from tests.viewer.compile_one import compile_one
 from tests.viewer.conftest import write_scene
+from viewer import precompile
 from viewer.precompile import MADE_OF, digest_of_sources, write_kernels
 
 ROOT = Path(__file__).parents[2]
 
 
 def run_in(site: Path, *words: object, **environment: str) -> str:
-    """Run a module of the package in `site`; what it prints. Nothing that this process was told about Numba counts."""
+    """Run a module of the package in `site`; what it says. Nothing that this process was told about Numba counts."""
     own = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
     command = [sys.executable, "-P", "-m", *(str(word) for word in words)]
     env = own | {"PYTHONPATH": str(site)} | environment
     done = subprocess.run(command, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The package at a place where it was not compiled, and never wrote to."""
+    """The package at a place where nothing but its kernels was compiled."""
     folder = tmp_path_factory.mktemp("site")
     for name in ("iibr_core", "viewer", "shaders", "assets"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "_kernels"))
-    run_in(ROOT, "viewer.precompile", folder / "iibr_core" / "_kernels")
+    run_in(folder, "viewer.precompile", folder / "iibr_core" / "_kernels")
     return folder
 
 
@@ -46,7 +50,7 @@ def kernels_in(folder: Path) -> list[str]:
 def test_they_are_few_and_small(site: Path) -> None:
     files = [path for path in (site / "iibr_core" / "_kernels").rglob("*") if path.is_file()]
     assert 100 < len(files) < 400
-    assert {path.suffix for path in files} == {".nbi", ".nbc", ".sha256"}
+    assert {path.suffix for path in files} == {".nbi", ".nbc", Path(MADE_OF).suffix}
     assert sum(path.stat().st_size for path in files) < 12e6
 
 
@@ -61,19 +65,52 @@ def test_they_count_for_their_sources_only(tmp_path: Path) -> None:
     assert digest_of_sources(tmp_path) != before
 
 
-def test_a_copy_that_was_cut_off_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept, copy = tmp_path / "kept", tmp_path / "copy"
-    kept.mkdir()
-    (kept / MADE_OF).write_text(digest_of_sources())
-    (kept / "a.nbi").symlink_to("nowhere")
-    monkeypatch.setattr(kernel_cache, "PRECOMPILED", kept)
-    with pytest.raises(shutil.Error):
-        write_kernels(copy)
-    assert not (copy / MADE_OF).exists()
-    (kept / "a.nbi").unlink()
-    (kept / "a.nbi").write_bytes(b"code")
-    write_kernels(copy)
-    assert {path.name: path.read_text() for path in copy.iterdir()} == {"a.nbi": "code", MADE_OF: digest_of_sources()}
+@pytest.fixture
+def one_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(precompile, "STEPS", (compile_one,))
+
+
+@pytest.mark.usefixtures("one_step")
+def test_those_of_other_pythons_stay_where_the_sources_are_the_same(tmp_path: Path) -> None:
+    made_of = {"py398": "other sources", "py399": digest_of_sources()}
+    for python, text in made_of.items():
+        (tmp_path / f"made_of.{python}").write_text(f"{text}\n{python}")
+        (tmp_path / f"jit.linear.{python}.nbi").write_text("code")
+    (tmp_path / f"jit.gone.{MADE_OF.partition('.')[2]}.nbi").write_text("of a kernel that is no more")
+    write_kernels(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"made_of.py399", "jit.linear.py399.nbi", MADE_OF, "runtime"}
+    assert any(name.startswith("jit.linear_scalar.") for name in kernels_in(tmp_path / "runtime"))
+
+
+@pytest.mark.usefixtures("one_step")
+def test_what_is_complete_is_left_alone(tmp_path: Path) -> None:
+    write_kernels(tmp_path)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
+    begun: list[int] = []
+    write_kernels(tmp_path, lambda: begun.append(1))
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+    assert begun == [1]
+
+
+@pytest.mark.usefixtures("one_step")
+def test_what_was_left_half_done_goes_on(tmp_path: Path) -> None:
+    begun: list[list[str]] = []
+    with pytest.raises(Cancelled):
+        write_kernels(tmp_path, lambda: begun.append(kernels_in(tmp_path)), lambda: bool(begun))
+    there = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb?")}
+    assert len(begun) == 1
+    assert [path.name for path in sorted(there, key=lambda path: path.name)] == begun[0] != []
+    assert not (tmp_path / MADE_OF).exists()
+    write_kernels(tmp_path)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb?")} == there
+    assert (tmp_path / MADE_OF).exists()
+
+
+def test_a_command_tells_how_it_ended(site: Path) -> None:
+    words = (sys.executable, "-m", "viewer.precompile", site / "iibr_core" / "_kernels")
+    command = (sys.executable, "-c", "import os, sys; sys.exit(int(os.environ['NUMBA_OF_MINE']))")
+    environment = os.environ | {"NUMBA_OF_MINE": "7"}
+    assert subprocess.run([*words, *command], cwd=ROOT, env=environment, check=False).returncode == 7
 
 
 DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
@@ -84,13 +121,13 @@ DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
     [
         ("screenshot", DEMO, "--max-pixels", 60000, "--aperture", 4, "--size", "160x100", "-o", "picture.png"),
         ("generate", DEMO, "--max-pixels", 60000, "--grid", 3, "--out", "field", "--with-disparity"),
-        ("generate", "scene.png", "--grid", 3, "--out", "field", "--quality", "exact"),
+        ("generate", "scene.png", "--grid", 3, "--out", "field", "--quality", "balanced"),
         ("screenshot", "unmapped.png", "--view", "1,1", "-o", "picture.png"),
         ("screenshot", DEMO, "--max-pixels", 250000, "--gloss", "gloss.toml", "-o", "picture.png"),
         ("screenshot", "scene.png", "--max-pixels", 3000, "--full", "--aperture", 3, "-o", "picture.png"),
         ("depth", "views", "-o", "map.pfm"),
     ],
-    ids=["screenshot", "generate", "exact", "guessed", "gloss", "full", "depth"],
+    ids=["screenshot", "generate", "balanced", "guessed", "gloss", "full", "depth"],
 )
 def test_the_first_run_compiles_nothing(site: Path, tmp_path: Path, words: tuple[object, ...]) -> None:
     write_scene(tmp_path)
@@ -107,9 +144,16 @@ def test_the_first_run_compiles_nothing(site: Path, tmp_path: Path, words: tuple
     assert kernels_in(tmp_path / "kept") == []
 
 
-def test_another_processor_compiles_its_own(site: Path, tmp_path: Path) -> None:
+TERMINAL = {"FORCE_COLOR": "1"}
+"""What makes rich take stderr for one."""
+
+
+def test_another_processor_compiles_its_own_and_says_so(site: Path, tmp_path: Path) -> None:
     write_scene(tmp_path)
     words = ("generate", tmp_path / "scene.png", "--grid", 1, "--refine", "off", "--quality", "fast")
-    kept = tmp_path / "kept"
-    run_in(site, "viewer", *words, "--out", tmp_path / "field", NUMBA_CACHE_DIR=str(kept), NUMBA_CPU_NAME="generic")
-    assert kernels_in(kept) != []
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    run = partial(run_in, site, "viewer", *words, **kept, **TERMINAL)
+    assert COMPILING not in run("--out", tmp_path / "field")
+    assert kernels_in(tmp_path / "kept") == []
+    assert COMPILING in run("--out", tmp_path / "another", NUMBA_CPU_NAME="generic")
+    assert kernels_in(tmp_path / "kept") != []

@@ -17,6 +17,7 @@ FILE_KINDS: dict[ChoiceOf, str] = {
     "mask": "png jpg jpeg tif tiff bmp exr",
     "surroundings": "exr hdr png jpg jpeg tif tiff",
     "map": "pfm exr npy png tif tiff",
+    "model": "onnx",
 }
 """Endings of what is no folder."""
 
@@ -27,7 +28,8 @@ DIALOG_TITLES: dict[ChoiceOf, str] = {
     "surroundings": "Picture all around, equirectangular",
     "truth": "Ground truth: a folder of views",
     "map": "Open a disparity map for this photo",
-    "model": "Open the folder of a depth model",
+    "model": "Open a depth model: an ONNX file",
+    "model folder": "Open the folder of a depth model",
 }
 
 
@@ -55,7 +57,7 @@ class Dialog:
         if what not in FILE_KINDS:
             self._dialog = dialogs.select_folder(DIALOG_TITLES[what], start)
         else:
-            filters = ["Images", file_patterns(what), "All files", "*"]
+            filters = ["Models" if what == "model" else "Images", file_patterns(what), "All files", "*"]
             self._dialog = dialogs.open_file(DIALOG_TITLES[what], start, filters)
 
     def answer(self) -> str | None:

@@ -17,19 +17,20 @@ from viewer.model.reducers.lens import carry_optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WAITING_FOR_VIEWS, JobKind, JobProgress
 from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Scene
+from viewer.model.state.scene import Scene, Source
 
 Needs = Literal["shown", "scene", "views"]
 """What of the scene must be there before a job begins: what is on the screen; its photo and plan; all its views."""
-Lane = Literal["pictures", "exports"]
+Lane = Literal["pictures", "exports", "fills"]
 """Jobs of one lane follow each other: a picture need not wait for a long export."""
 
 
 @dataclass(eq=False)
 class Job:
     """state: of the window when it was asked for. needs: asked again as more of the scene is known. work: what it does,
-    in a thread; what comes of it is returned. takes_part: of the views will do where the user makes no more.
-    is_ours: path is not for the user's eyes.
+    in a thread; what comes of it is returned; None where it fills. takes_part: of the views will do where the user
+    makes no more. fills: the light field as it is to be, None of another kind. is_ours: path is not for the user's
+    eyes.
 
     generation: whose views it shows; request: makes the same once more, where is_left: the window does not make them.
     snapshot: None until it is there.
@@ -39,8 +40,9 @@ class Job:
     path: Path
     state: AppState
     needs: Callable[[Scene, Optics], Needs]
-    work: Callable[[ExportSource], list[Action]]
+    work: Callable[[ExportSource], list[Action]] | None = None
     takes_part: bool = False
+    fills: Source | None = None
     id: int = 0
     generation: int = 0
     request: SceneRequest | None = None
@@ -55,7 +57,7 @@ class Job:
     @property
     def lane(self) -> Lane:
         """Where it waits for its turn."""
-        return "exports" if self.kind == "export" else "pictures"
+        return "exports" if self.kind == "export" else "fills" if self.kind == "fill" else "pictures"
 
     @property
     def should_stop(self) -> Callable[[], bool]:
@@ -79,12 +81,14 @@ class Job:
         """For the window; changes at most a hundred times a stage, and with the seconds left."""
         name = "the picture" if self.kind == "copy" else self.path.name
         if self.is_given_up.is_set():
-            return JobProgress(self.id, self.kind, name, STOPPING)
+            return JobProgress(self.id, self.kind, name, STOPPING, fills=self.fills)
         if not self.is_running:
-            return JobProgress(self.id, self.kind, name, "" if self.snapshot or self.is_left else WAITING_FOR_VIEWS)
+            doing = "" if self.snapshot or self.is_left else WAITING_FOR_VIEWS
+            return JobProgress(self.id, self.kind, name, doing, fills=self.fills)
         done, total, doing = self._reported
         if doing != self._stage:
             self._stage, self._time_left = doing, TimeLeft()
         left_s = self._time_left.update(done, total)
         share = int(100 * done / total) / 100 if total else 0.0
-        return JobProgress(self.id, self.kind, name, doing, share, None if left_s is None else float(round(left_s)))
+        left_s = None if left_s is None else float(round(left_s))
+        return JobProgress(self.id, self.kind, name, doing, share, left_s, self.fills)

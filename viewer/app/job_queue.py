@@ -1,4 +1,5 @@
-"""Saves, copies and exports beside the window, in the order in which they were asked for, pictures apart from exports.
+"""Saves, copies, exports and fills beside the window, in the order in which they were asked for; of each lane the first
+is under way.
 
 Each works on a snapshot: the scene, its views and the lens as they were when it was asked for. Where the views are
 still being made, it waits for them; where the window leaves the scene before, the job makes them itself, in its turn.
@@ -11,6 +12,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
+from iibr_core.formats.outputs import release_place
 from iibr_core.runtime.tiling import Cancelled, raise_if_stopped
 from viewer.app.job import Job, Lane
 from viewer.app.job_scene import JobScenes
@@ -21,8 +23,10 @@ from viewer.background.scene_worker import SceneRequest
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.state.app_state import AppState
+from viewer.model.state.filling import ViewsFilled, is_same_field
 from viewer.model.state.jobs import JobProgress, JobsChanged
 from viewer.model.state.notices import Notice
+from viewer.model.state.scene import Source
 
 
 class JobQueue:
@@ -36,6 +40,7 @@ class JobQueue:
         self._threads: dict[Lane, FileWorker] = {
             "pictures": FileWorker("iibr-pictures", wake),
             "exports": FileWorker("iibr-exports", wake),
+            "fills": FileWorker("iibr-fills", wake),
         }
         self._jobs: list[Job] = []
         self._ids = count(1)
@@ -71,7 +76,10 @@ class JobQueue:
         loaded, plan = view.loaded, state.scene.plan
         if view.generation != job.generation or loaded is None or loaded.depth_settings != state.depth:
             loaded = plan = None  # what is loaded is not what was asked for
-        job.request = SceneRequest(0, source, state.depth_strength, loaded, state.depth, takes_drafts=False, plan=plan)
+        asks = state.scene.depth_model is not None
+        job.request = SceneRequest(
+            0, source, state.depth_strength, loaded, state.depth, takes_drafts=False, plan=plan, asks_model=asks
+        )
         self._jobs.append(job)
         self._prepare(job, state)
 
@@ -79,6 +87,18 @@ class JobQueue:
         """Give this one up; nothing happens where it is done."""
         for job in self._jobs:
             if job.id == id_:
+                job.is_given_up.set()
+
+    def add_fill(self, source: Source, state: AppState) -> None:
+        """Make the views between those of a light field, from its files: nothing of the window is needed."""
+        job = Job("fill", Path(source.path), state, lambda scene, optics: "scene", fills=source, is_left=True)
+        job.id, job.request = next(self._ids), SceneRequest(0, source, takes_drafts=False)
+        self._jobs.append(job)
+
+    def cancel_fills(self, source: Source) -> None:
+        """Give up what makes views between those of this light field: another choice was made."""
+        for job in self._jobs:
+            if job.fills is not None and is_same_field(job.fills, source):
                 job.is_given_up.set()
 
     def advance(self, state: AppState, budget_s: float) -> list[Action]:
@@ -165,6 +185,7 @@ class JobQueue:
     def _end(self, job: Job) -> None:
         self._jobs.remove(job)
         job.is_given_up.set()  # a thread that was lost left steps behind
+        release_place(job.path)
         if job.snapshot is not None:
             job.snapshot.release()
             job.snapshot = None
@@ -174,6 +195,6 @@ def _carry_out(job: Job, scenes: JobScenes) -> list[Action]:
     """In the thread: what comes of it; nothing where it was given up."""
     try:
         raise_if_stopped(job.should_stop)
-        return job.work(scenes.source_of(job))
+        return [ViewsFilled(scenes.fill(job))] if job.work is None else job.work(scenes.source_of(job))
     except Cancelled:
         return []

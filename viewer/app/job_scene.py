@@ -12,6 +12,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from iibr_core.runtime.tiling import raise_if_stopped
 from iibr_core.types import ViewUpdate
 from viewer.app.exports.source import ExportSource
 from viewer.app.job import Job
@@ -22,6 +23,7 @@ from viewer.background.scene_worker import SceneReady, ViewReady, results_of
 from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.refocus.render_settings import RenderSettings
+from viewer.model.state.filling import FilledField
 from viewer.model.state.optics import CENTRE
 from viewer.model.state.scene import Progress
 
@@ -54,6 +56,24 @@ class JobScenes:
 
         scene, report = snapshot.scene, partial(self._report, job)
         return ExportSource(scene, snapshot.loaded, optics, draw, report, job.should_stop, snapshot.centre)
+
+    def fill(self, job: Job) -> FilledField:
+        """Its light field with all the views between. Raises InputError where it has none, Cancelled once given up."""
+
+        def report(progress: Progress) -> None:
+            self._report(job, progress.share, 1.0, MAKING_VIEWS)
+
+        assert job.request is not None
+        views = []
+        with closing(results_of(job.request, job.should_stop, lambda: CENTRE, report)) as results:
+            ready = next(results)
+            assert isinstance(ready, SceneReady)
+            for made in results:
+                assert isinstance(made, ViewReady)
+                views.append(made.view)
+                report(made.progress)
+        raise_if_stopped(job.should_stop)
+        return FilledField(ready.scene, tuple(views))
 
     def _report(self, job: Job, done: float, total: float, doing: str) -> None:
         job.report(done, total, doing)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
 
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
@@ -113,3 +115,18 @@ def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys
         imgui.internal.close_popup_to_level(0, True)
         is_escape = False
     return Keys(ViewOffset(float(down), float(right)), is_escape, commands, repeats)
+
+
+def is_touched() -> bool:
+    """Whether any key or mouse button was pressed or the wheel turned in this frame; to move the mouse is none."""
+    from imgui_bundle import imgui
+
+    return any(imgui.is_key_pressed(key, False) for key in _named_keys())
+
+
+@cache
+def _named_keys() -> tuple[Any, ...]:
+    from imgui_bundle import imgui
+
+    first, end = imgui.Key.named_key_begin, imgui.Key.named_key_end
+    return tuple(key for key in imgui.Key if first <= key.value < end)

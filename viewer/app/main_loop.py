@@ -14,7 +14,7 @@ from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_look import FreeLook
 from viewer.app.gamepad import Gamepad, actions_from_gamepad
 from viewer.app.gloss_finder import GlossFinder
-from viewer.app.keys import actions_from_keys, read_keys
+from viewer.app.keys import actions_from_keys, is_touched, read_keys
 from viewer.app.pointer import (
     NO_POINTER,
     Pointer,
@@ -24,7 +24,7 @@ from viewer.app.pointer import (
     gesture_start,
     read_pointer,
 )
-from viewer.app.preferences_store import PREFERENCES_FILE, load_preferences, store_preferences
+from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
@@ -46,6 +46,7 @@ from viewer.model.actions import (
     PlaceWindow,
     Quit,
     Tick,
+    Touch,
     WorkerLost,
 )
 from viewer.model.free_camera import Poses
@@ -120,8 +121,6 @@ class App:
         """
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
-        if kept_in and not (kept_in / PREFERENCES_FILE).exists():
-            self.state = replace(self.state, prompt="welcome")  # the first start
         self._window_slot = WindowSlot(kept_in)
         preferences = self.state.preferences
         place = self._window_slot.shift(preferences.window)
@@ -180,7 +179,8 @@ class App:
         self._pointer = pointer = read_pointer(self._pointer)
         if pointer.step_x or pointer.step_y:
             self._pointer_moved_at = time.perf_counter()
-        actions = gesture_start(pointer, self.state)
+        actions: list[Action] = [Touch()] if self.state.awaits_touch and is_touched() else []
+        actions += gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
         texture = sharp or (self.scene_view.texture if picture else None)

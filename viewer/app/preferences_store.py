@@ -10,6 +10,7 @@ import json
 import math
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,14 @@ def load_preferences(state: AppState, folder: Path) -> AppState:
     except InputError as error:
         notices = (*notices, Notice(f"{error}; the list of recent files starts anew"))
     return dataclasses.replace(state, preferences=preferences, recent=recent, notices=notices)
+
+
+def last_opened(folder: Path) -> str | None:
+    """Path of what was open last, if it is still there."""
+    with suppress(InputError, OSError, ValueError):
+        path = next(iter(_recent(_read(folder / RECENT_FILE))), None)
+        return path if path is not None and os.path.exists(path) else None
+    return None
 
 
 def store_preferences(state: AppState, folder: Path) -> None:
@@ -157,6 +166,8 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "units": _units,
     "told_sessions": _yes_or_no,
     "told_aperture": _yes_or_no,
+    "told_drag": _yes_or_no,
+    "estimates_depth": _yes_or_no,
 }
 
 

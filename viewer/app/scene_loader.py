@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from iibr_core.types import InputError, ViewOffset
+from viewer.app.depth_finder import DepthFinder
+from viewer.background.depth_estimate import same_places
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed, ProgressReport
-from viewer.background.loaded_photo import prepare_brush, without_history
+from viewer.background.loaded_photo import LoadedPhoto, prepare_brush, without_history
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, WantedPhoto, photos_within_budget, read_whole_photo
 from viewer.background.scene_worker import (
     PhotosFound,
@@ -61,6 +63,7 @@ class SceneLoader:
         self._set_title = set_title
         self._worker = SceneWorker(wake)
         self._preview = DepthPreview(scene_view)
+        self._depth_finder = DepthFinder(scene_view, wake)
         self._brush_loader = FileWorker("iibr-brush", wake)
         self._has_brush = False
         self._submitted = 0
@@ -77,7 +80,7 @@ class SceneLoader:
 
     def take_results(self, state: AppState) -> list[Action]:
         """The worker's results, as actions, for about TAKE_BUDGET_S, at least one; the one place where they arrive."""
-        actions = self._show_sketch(state)
+        actions = self._show_sketch(state) + self._depth_finder.advance(state)
         end = time.perf_counter() + TAKE_BUDGET_S
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._take(result, state)
@@ -108,6 +111,7 @@ class SceneLoader:
     def close(self) -> None:
         """Stop making and reading."""
         self._worker.close()
+        self._depth_finder.close()
         self.sketches.close()
         self.ahead.close()
         self._brush_loader.close()
@@ -128,23 +132,28 @@ class SceneLoader:
             case PhotosFound():
                 return [OpenPath(source_beside(state.source, result.path)), ShowFilmstrip(True)]
         try:
-            return self._take_views(result)
+            return self._take_views(result, state)
         except InputError as error:  # no room on the graphics card: there is no use in more views
             self._worker.cancel()
             return [OpenFailed(result.generation, str(error))]
 
-    def _take_views(self, result: SceneReady | ViewReady) -> list[Action]:
+    def _take_views(self, result: SceneReady | ViewReady, state: AppState) -> list[Action]:
         if result.generation < self._scene_view.generation:
             return []  # the small picture of another photo is shown by now
         if isinstance(result, SceneReady):
-            before = self._scene_view.loaded
+            before, centre = self._scene_view.loaded, self._scene_view.centre
             self._scene_view.open(result)
             if before is None or result.loaded is None or result.loaded.photo is not before.photo:
                 self._preview.forget()
             self._inspection_view.open()
             self._set_title(f"{result.scene.name} - iibr")
             self._load_brush(result)
-            return [SceneOpened(result.generation, result.scene)]
+            is_deepened = before is not None and _has_other_depth(before, result.loaded)
+            before_px, now_px = centre.disparity if centre is not None else None, result.centre.disparity
+            same = None
+            if is_deepened and before_px is not None and now_px is not None:
+                same = same_places(before_px, now_px, state.focused_at)
+            return [SceneOpened(result.generation, result.scene, same)]
         self._scene_view.add(result.view)
         self._inspection_view.add(result.view)
         return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column))]
@@ -166,7 +175,7 @@ class SceneLoader:
 
     def _load(self, state: AppState, source: Source) -> None:
         """A new generation is a new job. The photo is read again only if another one was opened."""
-        loaded, plan = self._scene_view.loaded, None
+        loaded, plan = self._depth_finder.newest(self._scene_view.loaded), None
         if not self._reuses_photo(state):
             self._keep_left(state)
             self._worker.cancel()
@@ -176,8 +185,18 @@ class SceneLoader:
                 return
             loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (None, None)
         self._submitted, self._depth_settings = state.generation, depth_settings_for_worker(state)
+        filled = state.filled if state.filled is not None and state.filled.is_of(source) else None
         self._worker.submit(
-            SceneRequest(state.generation, source, state.depth_strength, loaded, self._depth_settings, plan=plan)
+            SceneRequest(
+                state.generation,
+                source,
+                state.depth_strength,
+                loaded,
+                self._depth_settings,
+                plan=plan,
+                filled=filled,
+                asks_model=False,
+            )
         )
 
     def _reuses_photo(self, state: AppState) -> bool:
@@ -214,6 +233,11 @@ class SceneLoader:
         else:
             is_begun = self.ahead.is_reading(photos[0])
             self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_settled, photos)])
+
+
+def _has_other_depth(before: LoadedPhoto, now: LoadedPhoto | None) -> bool:
+    """Whether the same photo's depth was found anew."""
+    return now is not None and now.photo is before.photo and now.found is not before.found
 
 
 def _is_whole(state: AppState) -> bool:

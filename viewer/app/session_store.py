@@ -73,7 +73,7 @@ class SessionStore:
             self._scene, self._is_known = scene, False
             self._submit(partial(_find, self._folder, scene))
         elif self._is_known and state.stroke is None:
-            self._follow(settings_of(state, scene.size))
+            self._follow(settings_of(state.at_rest, scene.size))
         return self._tell(state)
 
     def _tell(self, state: AppState) -> list[Action]:
@@ -87,7 +87,7 @@ class SessionStore:
     def close(self, state: AppState) -> None:
         """Keep what is there now, and wait until it is written."""
         if self._is_known and self._scene is not None and state.source is self._scene.source:
-            self._latest = settings_of(state, self._scene.size)
+            self._latest = settings_of(state.at_rest, self._scene.size)
         self._leave()
         self._files.close(cancels=False)
 
@@ -95,6 +95,8 @@ class SessionStore:
         now = time.monotonic()
         if self._kept is None:
             self._kept = self._latest = settings  # as it was opened: nothing to keep yet
+        elif self._latest == self._kept and settings.has_model_depth != self._kept.has_model_depth:
+            self._kept = self._latest = settings  # the user did nothing
         if settings != self._latest:
             self._latest, self._changed_at = settings, now
         elif settings != self._kept and now - self._changed_at > QUIET_S:

@@ -16,6 +16,7 @@ from viewer.app.exporter import add_export
 from viewer.app.image_export import settings_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_copy, add_save
+from viewer.app.reduced_motion import prefers_reduced_motion
 from viewer.app.save_places import inputs_of_scene
 from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
@@ -23,10 +24,11 @@ from viewer.background.jobs import Failed
 from viewer.background.model_download import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.background.photo_folder import list_photos
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, AskForPath, Notify, OpenPath, ShowPrompt, TaskTaken
+from viewer.model.actions import Action, AskForPath, Notify, OpenPath, ShowPrompt, Sway, TaskTaken, Touch
 from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportTask
+from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.inspection import GroundTruth, TruthRead
 from viewer.model.state.jobs import CancelJobTask
@@ -36,14 +38,22 @@ from viewer.model.state.model_download import (
     DownloadingChanged,
     GetModelTask,
     ListModelsTask,
-    ModelsPrompt,
+    ModelsListed,
 )
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import ApertureMask, SetApertureShape
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
-from viewer.model.state.scene import source_beside
-from viewer.model.state.tasks import ChoosePlaceTask, ChooseTask, ReadMaskTask, ReadTruthTask, SaveTask, Task
+from viewer.model.state.scene import Source, source_beside
+from viewer.model.state.tasks import (
+    ChoosePlaceTask,
+    ChooseTask,
+    MaySwayTask,
+    ReadMaskTask,
+    ReadTruthTask,
+    SaveTask,
+    Task,
+)
 
 
 class SideEffects:
@@ -104,6 +114,8 @@ class SideEffects:
                 self._submit(partial(_read_mask, self._masks[-1]))
             case ReadTruthTask(path):
                 self._submit(partial(read_truth, path))
+            case MaySwayTask():
+                self._submit(lambda: Touch() if prefers_reduced_motion() else Sway())
             case ReadFactsTask(path):
                 self._submit(partial(_read_facts, path))
             case ListFolderTask(path):
@@ -112,6 +124,8 @@ class SideEffects:
                 return add_save(task, state, self._inputs(state), self._jobs)
             case ExportTask():
                 return add_export(task, state, self._inputs(state), self._jobs)
+            case FillTask(source):
+                return self._fill(source, state)
             case CancelJobTask(id_):
                 self._jobs.cancel(id_)
             case WriteSidecarTask() if state.scene is not None and is_scene_open(state):
@@ -128,6 +142,14 @@ class SideEffects:
                 return add_copy(state, self._jobs)
             case PasteTask():
                 self._submit(partial(paste_picture, self._clipboard_text()))
+        return []
+
+    def _fill(self, source: Source, state: AppState) -> list[Action]:
+        """At once where the views are there; what was chosen before counts no longer."""
+        self._jobs.cancel_fills(source)
+        if source.filled_grid is None or (state.filled is not None and state.filled.is_of(source)):
+            return [OpenPath(source)] if source != state.source else []
+        self._jobs.add_fill(source, state)
         return []
 
     def _inputs(self, state: AppState) -> tuple[Path, ...]:
@@ -151,8 +173,8 @@ class SideEffects:
     def _take_downloads(self, state: AppState) -> list[Action]:
         actions: list[Action] = []
         while (result := self._downloads.next_result()) is not None:
-            actions += _actions_from_download(result, state)
-        if self._downloads.is_lost and state.downloading is not None:
+            actions += _actions_from_download(result)
+        if self._downloads.is_lost and state.models.downloading is not None:
             actions += [DownloadingChanged(None), Notify(Notice("The download stopped unexpectedly.", is_error=True))]
         return actions
 
@@ -180,10 +202,8 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
     match result.value:
         case ApertureMask() as mask:
             return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
-        case FolderListed() | FactsRead() as found:
+        case FolderListed() | FactsRead() | Sway() | Touch() | ModelsListed() as found:
             return [found]
-        case ModelsPrompt() as prompt:
-            return [ShowPrompt(prompt)]
         case Pasted(path):
             return [OpenPath(source_beside(state.source, path))]
         case GroundTruth() as truth:
@@ -193,17 +213,16 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
     raise AssertionError(f"nothing comes of {result.value!r}")
 
 
-def _actions_from_download(result: DownloadResult, state: AppState) -> list[Action]:
-    """A model that came is used at once, if it can be."""
+def _actions_from_download(result: DownloadResult) -> list[Action]:
+    """A model that came is used at once where that is wanted: see `wanted_model`."""
     match result:
         case Downloading() as downloading:
             return [DownloadingChanged(downloading)]
         case Failed(_, message):
             return [DownloadingChanged(None), Notify(Notice(message, is_error=True))]
-        case Downloaded(model):
-            said: list[Action] = [DownloadingChanged(None), Notify(Notice(f"{model.title} is here. {model.lacks}"))]
-            uses = state.source is not None and not model.lacks
-            return [*said, action_for_path("model", model.name, state)] if uses else said
+        case Downloaded(model, listed):
+            lacks = [Notify(Notice(f"{model.title} is here. It {model.lacks}"))] if model.lacks else []
+            return [listed, DownloadingChanged(None), *lacks]
     raise AssertionError(f"nothing comes of {result!r}")
 
 

@@ -45,7 +45,7 @@ class WindowSlot:
 
     def _take(self, folder: Path) -> None:
         for number in range(SLOTS):
-            descriptor = os.open(folder / f"window-{number}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            descriptor = os.open(folder / f"window-{number}.lock", os.O_RDWR | os.O_CREAT, 0o600)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:

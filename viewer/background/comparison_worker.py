@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,8 +138,8 @@ class ComparisonJob:
             if truth.shape != made.shape:
                 raise InputError(f"{request.truth.path}: its views have changed; choose the folder again")
             return _bytes_of(made, inputs.color_space), _bytes_of(truth)
-        fast, exact = (self._stored_view(request, inputs, quality, should_stop) for quality in ("fast", "exact"))
-        return _bytes_of(fast, inputs.color_space), _bytes_of(exact, inputs.color_space)
+        fast, balanced = (self._stored_view(request, inputs, quality, should_stop) for quality in get_args(Quality))
+        return _bytes_of(fast, inputs.color_space), _bytes_of(balanced, inputs.color_space)
 
     def _stored_view(
         self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality, should_stop: Callable[[], bool]
@@ -157,7 +157,7 @@ class ComparisonJob:
         if quality == "fast" and offset in self._outer:
             return self._outer[offset]
         transformer = transformer_for(quality)
-        with ViewSynthesis(should_stop, transformer, quality == "exact", inpainter=inpainter) as synthesis:
+        with ViewSynthesis(should_stop, transformer, inpainter=inpainter) as synthesis:
             return stored_colors(rays, offset, synthesis.render(rays, offset), loaded.photo.is_hdr, should_stop)
 
     def _entropy(

@@ -187,7 +187,7 @@ def _with_disparity(
         require_matching(field.budget, field.scene.name, image_size(coarse.values), coarse.range_px, offsets)
     except InputError as error:
         # The views can be looked at without.
-        scene = replace(field.scene, notes=(*field.scene.notes, f"{error}."))
+        scene = replace(field.scene, notes=(*field.scene.notes, f"{error}."), problems=(f"{error}.",))
         yield Showing(scene, (replace(view, share=1.0) for view in field.views), field.work.measuring("carrying"))
         return
     field.work.knows_search(coarse.times_dearer)

@@ -52,16 +52,17 @@ class LoadedPhoto:
     """A photo as read and its disparity, kept so that another plan does not read them again.
 
     disparity: what `depth_settings` made of what was `found`, by way of what was `refined`. origin: where it was found.
-    settings: text of the settings the photo was saved with by this program, "" without. models: names of the depth
-    models on this machine. levels: of what was refined. canvas: what the worker edits on; nobody else touches it.
-    own_size: of the photo as its file has it, upright. stamp: of that file, see `stamp_of`.
+    settings: text of the settings the photo was saved with by this program, "" without. model: name or path of the
+    depth model that its depth is from, None where it is from elsewhere. levels: of what was refined. canvas: what the
+    worker edits on; nobody else touches it. own_size: of the photo as its file has it, upright. stamp: of that file,
+    see `stamp_of`.
     """
 
     photo: Photo
     disparity: Disparity
     origin: DepthOrigin
     settings: str
-    models: tuple[str, ...]
+    model: str | None
     depth_settings: DepthSettings
     found: Disparity
     refined: Disparity
@@ -84,12 +85,13 @@ def load_photo(
     report_progress: Callable[[Progress], None] = lambda progress: None,
     depth_settings: DepthSettings | None = None,
     keeps_views: bool = True,
+    asks_model: bool = True,
 ) -> LoadedPhoto:
     """Read a photo and find its disparity, telling what is going on, not more often than people can see.
 
     depth_settings: what to make of the disparity, None for what the source says. keeps_views: its views will be shown:
-    the photo is then made as small as memory asks for, else refused. Raises InputError, and Cancelled once should_stop
-    is true.
+    the photo is then made as small as memory asks for, else refused. asks_model: see `open_with_depth`. Raises
+    InputError, and Cancelled once should_stop is true.
     """
     require_process(budget_of(source.depth.memory_bytes), keeps_views)
     from iibr_core.depth.search import open_with_depth
@@ -113,13 +115,27 @@ def load_photo(
         source.grid,
         should_stop,
         report_at_times,
+        asks_model,
     )
     found = replace(found, photo=replace(found.photo, notes=found.photo.notes + notes))
     give_back_memory()
     settings = settings_text_in(path)
     settings_wanted = depth_settings or DepthSettings(source.depth.refine)
     own_size = _turned_like(stored_size, found.photo.size)
-    return _prepare(found, settings, _models_here(), settings_wanted, (own_size, stamp), should_stop)
+    return _prepare(found, settings, source, settings_wanted, (own_size, stamp), should_stop)
+
+
+def deepen(source: Source, loaded: LoadedPhoto, refine: float, should_stop: ShouldStop = never) -> LoadedPhoto:
+    """The same photo with what a depth model makes of it, refined so far and not edited.
+
+    Raises InputError, and Cancelled once should_stop is true.
+    """
+    from iibr_core.depth.search import ask_model
+
+    choice = replace(source.depth, refine=NOT_YET)
+    found = ask_model(Path(source.path), loaded.photo, choice, source.grid, should_stop)
+    file = loaded.own_size, loaded.stamp
+    return _prepare(found, loaded.settings, source, DepthSettings(refine), file, should_stop)
 
 
 def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto | None:
@@ -142,7 +158,7 @@ def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto
     photo = Photo(encoded, focal_px_from_fov(encoded.shape[1]), path.stem, is_hdr=False)
     found = sketch_depth(path, photo, source.depth, should_stop)
     own_size = _turned_like(stored, photo.size)
-    return _prepare(found, "", (), DepthSettings(NOT_YET), (own_size, stamp), should_stop)
+    return _prepare(found, "", source, DepthSettings(NOT_YET), (own_size, stamp), should_stop)
 
 
 def inpainting_aids(
@@ -272,19 +288,21 @@ def prepare_brush() -> None:
 def _prepare(
     found: PhotoWithDepth,
     settings: str,
-    models: tuple[str, ...],
+    source: Source,
     depth_settings: DepthSettings,
     file: tuple[ImageSize, tuple[int, ...]],
     should_stop: ShouldStop,
 ) -> LoadedPhoto:
     from iibr_core.depth.editing.canvas import DepthCanvas
+    from iibr_core.depth.estimators.catalog import USUAL_MODEL
 
     values = found.disparity
     canvas = DepthCanvas(found.photo.pixels, values.values)
     as_found = DepthSettings(NOT_YET)
     levels = levels_of(values.values)
+    model = (source.depth.model or USUAL_MODEL) if found.origin.kind == "model" else None
     loaded = LoadedPhoto(
-        found.photo, values, found.origin, settings, models, as_found, values, values, levels, canvas, *file
+        found.photo, values, found.origin, settings, model, as_found, values, values, levels, canvas, *file
     )
     return apply_depth_settings(loaded, depth_settings, should_stop)
 
@@ -298,9 +316,3 @@ def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> Lo
         values = refine(loaded.photo.pixels, values, strength, loaded.found.unknown, should_stop)
     canvas = DepthCanvas(loaded.photo.pixels, values)
     return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)
-
-
-def _models_here() -> tuple[str, ...]:
-    from iibr_core.depth.models.catalog import KNOWN_MODELS, cached_folder, lacking_package
-
-    return tuple(model.name for model in KNOWN_MODELS if not lacking_package(model.package) and cached_folder(model))

@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from iibr_core.runtime.tiling import Cancelled
 from viewer.background.jobs import Failed, Job, JobThread
-from viewer.model.state.model_download import Downloading, ModelOffer, ModelsPrompt
+from viewer.model.state.model_download import Downloading, ModelOffer, ModelsListed
+
+if TYPE_CHECKING:
+    from iibr_core.depth.estimators.protocol import KnownModel
 
 BYTES_OF_MEGABYTE = 1e6
 
@@ -22,9 +27,10 @@ class ModelRequest:
 
 @dataclass(frozen=True)
 class Downloaded:
-    """What came."""
+    """What came, and what there is now."""
 
     model: ModelOffer
+    listed: ModelsListed
 
 
 DownloadResult = Downloading | Downloaded | Failed[str]
@@ -39,7 +45,7 @@ class ModelDownloads(JobThread[ModelRequest, DownloadResult]):
 
 
 def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResult]:
-    from iibr_core.depth.models.catalog import fetch, known_model
+    from iibr_core.depth.estimators.catalog import fetch, known_model
 
     model = known_model(job.request.name)
     told = Downloading(model.title, 0, model.megabytes)
@@ -55,19 +61,34 @@ def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResu
 
     with suppress(Cancelled):
         fetch(model, report, job.should_stop)
-        yield Downloaded(next(offer for offer in list_models().models if offer.name == model.name))
+        listed = list_models()
+        yield Downloaded(next(offer for offer in listed.known if offer.name == model.name), listed)
 
 
-def list_models() -> ModelsPrompt:
+def list_models() -> ModelsListed:
     """What can be had, and what is here. Takes half a second the first time."""
-    from iibr_core.depth.models.catalog import KNOWN_MODELS, cached_folder, lacking_package
+    from iibr_core.depth.estimators.catalog import KNOWN_MODELS
 
-    offers = []
-    for model in KNOWN_MODELS:
-        lacking = lacking_package(model.package)
-        lacks = f"It also needs the package {lacking}: {model.install}" if lacking is not None else ""
-        is_here = cached_folder(model) is not None
-        offers.append(
-            ModelOffer(model.name, model.title, model.megabytes, model.licence, model.repository, is_here, lacks)
-        )
-    return ModelsPrompt(tuple(offers))
+    return ModelsListed(tuple(map(_offer_of, KNOWN_MODELS)))
+
+
+def _offer_of(model: KnownModel) -> ModelOffer:
+    """What the window says of a model."""
+    from huggingface_hub import constants
+
+    from iibr_core.depth.estimators.catalog import state_of
+    from iibr_core.depth.estimators.words import words_about
+
+    state = state_of(model)
+    words = words_about(model, state)
+    return ModelOffer(
+        model.name,
+        model.title,
+        model.megabytes,
+        model.licence,
+        host=urlsplit(constants.ENDPOINT).netloc,
+        words=" ".join(filter(None, (f"{words.figures}.", words.good_for, words.needs))),
+        is_here=state.is_here,
+        lacks=f"needs {state.needs}" if state.needs else "",
+        is_recommended=model.is_recommended,
+    )

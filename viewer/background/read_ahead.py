@@ -36,8 +36,8 @@ class PhotoAhead:
 
 
 def read_whole_photo(wanted: WantedPhoto, should_stop: ShouldStop) -> PhotoAhead:
-    """All of a photo. Raises InputError, and Cancelled once should_stop is true."""
-    loaded = load_photo(wanted.source, should_stop)
+    """All of a photo, asking no depth model. Raises InputError, and Cancelled once should_stop is true."""
+    loaded = load_photo(wanted.source, should_stop, asks_model=False)
     plan = make_plan(wanted.source, loaded, wanted.depth_strength)
     return PhotoAhead(loaded, plan)
 

@@ -21,6 +21,7 @@ from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.runtime.compiling import tell_compiling
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
 from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
@@ -38,6 +39,7 @@ from viewer.background.photo_folder import first_photo
 from viewer.background.read_ahead import WantedPhoto
 from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import DepthSettings
+from viewer.model.state.filling import FilledField
 from viewer.model.state.optics import CENTRE
 from viewer.model.state.scene import Progress, Scene, Source
 
@@ -47,7 +49,8 @@ class SceneRequest:
     """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says.
 
     plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something
-    to look at soon; else each comes once, final.
+    to look at soon; else each comes once, final. filled: the same light field, where all its views are made already.
+    asks_model: else depth is guessed where a model would be asked.
     """
 
     generation: int
@@ -57,6 +60,8 @@ class SceneRequest:
     depth_settings: DepthSettings | None = None
     takes_drafts: bool = True
     plan: ScenePlan | None = None
+    filled: FilledField | None = None
+    asks_model: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +117,22 @@ class SceneWorker(JobThread[SceneRequest, SceneResult]):
             return iter((PhotosFound(job.request.generation, str(photo)),))
         if self._scene_work is not None:
             return iter(self._scene_work(job.request, job.should_stop, lambda: self.eye))
-        return results_of(job.request, job.should_stop, lambda: self.eye, report_progress)
+        results = results_of(job.request, job.should_stop, lambda: self.eye, report_progress)
+        return _telling_compiling(results, report_progress)
+
+
+def _telling_compiling(
+    results: Iterator[SceneReady | ViewReady], report_progress: Callable[[Progress], None]
+) -> Iterator[SceneReady | ViewReady]:
+    """The same results; meanwhile, kernels that must be compiled are told beside what is there."""
+    there = Progress()
+    with tell_compiling(lambda words: report_progress(replace(there, doing=words))):
+        for result in results:
+            if isinstance(result, ViewReady):
+                there = result.progress
+            else:
+                there = Progress(total=result.scene.grid.rows * result.scene.grid.columns)
+            yield result
 
 
 def _failure(request: SceneRequest, message: str) -> Failed[int]:
@@ -131,7 +151,9 @@ def results_of(
     be opened, Cancelled where should_stop says so while it is read.
     """
     try:
-        if is_light_field(Path(request.source.path)):
+        if request.filled is not None:
+            yield from _results_of_filled(request, request.filled)
+        elif is_light_field(Path(request.source.path)):
             yield from _results_of_light_field(request, should_stop, nearest_to, report_progress)
         else:
             yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
@@ -171,12 +193,13 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         is_hdr=loaded.photo.is_hdr,
         plan=plan,
         notes=loaded.photo.notes + loaded.disparity.notes + plan.notes,
+        problems=loaded.origin.failures,
         focal_px=_known_focal_px(loaded.photo),
         subject_disparity_px=subject_disparity(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
         depth_origin=loaded.origin,
         levels=loaded.levels,
-        depth_models=loaded.models,
+        depth_model=loaded.model,
         inverse_metres=loaded.disparity.inverse_metres if loaded.depth_settings.edits == UNEDITED else None,
         color_space=loaded.photo.color_space,
         own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
@@ -211,7 +234,7 @@ def _results_of_photo(
     source = request.source
     depth_settings = request.depth_settings or DepthSettings(source.depth.refine)
     loaded = (
-        load_photo(source, should_stop, report_progress, depth_settings)
+        load_photo(source, should_stop, report_progress, depth_settings, asks_model=request.asks_model)
         if request.loaded is None
         else apply_depth_settings(request.loaded, depth_settings, should_stop)
     )
@@ -239,6 +262,15 @@ def _results_of_photo(
 def _centre_view(loaded: LoadedPhoto, plan: ScenePlan) -> ViewUpdate:
     colors = stored_from_encoded(loaded.photo.pixels, loaded.photo.is_hdr)
     return ViewUpdate(*plan.grid.centre, colors, plan.field_disparity(loaded.disparity).values)
+
+
+def _results_of_filled(request: SceneRequest, filled: FilledField) -> Iterator[SceneReady | ViewReady]:
+    yield SceneReady(request.generation, replace(filled.scene, source=request.source), None, filled.views[0])
+    total = len(filled.views)
+    work = ViewsWork(total)
+    yield from _count_views(
+        request.generation, iter(filled.views), lambda there, drafts, share: work.advance((there, total), there, drafts)
+    )
 
 
 def _results_of_light_field(

@@ -10,18 +10,12 @@ from iibr_core.types import InputError
 from viewer.app.save_places import inputs_of
 from viewer.cli.options import SCREEN_SIZE
 from viewer.cli.terminal import show_progress
+from viewer.model.demo import demo_photo
 
 if TYPE_CHECKING:
     from viewer.model.state.scene import Source
 
 DEMO_FOLDER = Path("out")
-
-
-def demo_photo() -> Path:
-    """The photo that comes with the program; its disparity lies beside it."""
-    from iibr_core.runtime.resources import resource_folder
-
-    return resource_folder("assets") / "motorcycle" / "motorcycle.png"
 
 
 def demo() -> None:
@@ -36,7 +30,7 @@ def demo() -> None:
 
     source = Source(str(demo_photo()))
     try:
-        window = App(initial_state(OpenPath(source)), user_folder())
+        window = App(initial_state(OpenPath(source, is_demo=True)), user_folder())
     except InputError as error:
         _demo_pictures(source, str(error))
         return

@@ -53,9 +53,9 @@ def evaluate(
         typer.Option(
             "--quality",
             parser=quality_from_text,
-            metavar="fast|balanced|exact",
+            metavar="|".join(get_args(Quality)),
             help="Judge this one; may be given several times.",
-            show_default="all",
+            show_default="both",
         ),
     ] = None,
     depth_model: DepthModel = None,

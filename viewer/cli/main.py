@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from iibr_core.formats.unfinished import CLAIMS
 from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import InputError
 from viewer.cli.batch import batch
@@ -18,9 +19,9 @@ from viewer.cli.generate import generate
 from viewer.cli.models import models
 from viewer.cli.plan import plan
 from viewer.cli.screenshot import screenshot
-from viewer.cli.terminal import Commands
+from viewer.cli.terminal import Commands, print_notes
 from viewer.cli.train import train
-from viewer.cli.view import view
+from viewer.cli.view import open_window, view
 
 UsageError: Any = typer.BadParameter.__base__
 """Click's, wherever this typer keeps it."""
@@ -37,7 +38,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (evaluate, view, generate, screenshot, export, batch, depth, plan, train, demo):
+for command in (view, export, screenshot, generate, depth, batch, plan, demo, evaluate, train):
     app.command()(command)
 app.add_typer(models, name="models")
 
@@ -55,6 +56,8 @@ def main() -> None:
         _end(f"out of memory ({error}): lower --max-pixels, or the --grid", EXIT_BAD_INPUT)
     except (KeyboardInterrupt, typer.Abort):
         _end("interrupted", EXIT_INTERRUPTED)
+    finally:
+        CLAIMS.release_all()
 
 
 def _end(message: str, code: int) -> None:
@@ -77,9 +80,17 @@ def iibr(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show it.")
     ] = False,
 ) -> None:
-    """One photo becomes a light field you can hold: drag the viewpoint, click to refocus, open the aperture."""
-    if context.invoked_subcommand is None:
+    """One photo becomes a light field you can hold: drag the viewpoint, click to refocus, open the aperture.
+
+    `iibr photo.jpg` opens it, `iibr` what was open last.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    try:
+        open_window()
+    except InputError as error:
         print(context.get_help())
+        print_notes((str(error),))
 
 
 @app.command(hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})

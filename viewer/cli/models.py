@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from iibr_core.types import InputError
-
-if TYPE_CHECKING:
-    from iibr_core.depth.models.catalog import KnownModel
+from viewer.cli.terminal import show_progress
 
 EXIT_DECLINED = 1
 NOBODY_ANSWERS = "nobody answers whether to download it (end of input): say --yes"
@@ -26,12 +24,15 @@ def list_models(context: typer.Context) -> None:
     """
     if context.invoked_subcommand is not None:
         return
-    from iibr_core.depth.models.catalog import KNOWN_MODELS
+    from iibr_core.depth.estimators.catalog import KNOWN_MODELS, state_of
+    from iibr_core.depth.estimators.words import words_about
 
     names = max(len(model.name) for model in KNOWN_MODELS)
     for model in KNOWN_MODELS:
-        size = f"{model.megabytes:,} MB"
-        print(f"{model.name:{names}}  {size:>8}  {_state(model):12}  {model.licence}")
+        words = words_about(model, state_of(model))
+        print(f"{model.name:{names}}  {words.figures}, {words.place}")
+        for line in filter(None, (words.good_for, words.needs)):
+            print(f"{'':{names}}  {line}")
     print("Get one: iibr models get NAME. Use one: --depth-model NAME; any other: --depth-model FILE.onnx, or FOLDER.")
 
 
@@ -44,28 +45,26 @@ def get(
 
     Example: iibr models get depth-anything-v2-small
     """
-    from iibr_core.depth.models.catalog import bytes_of, cached_folder, fetch, known_model, lacking_package
+    from iibr_core.depth.estimators.catalog import fetch, known_model, model_here, state_of
+    from iibr_core.depth.estimators.words import words_about
 
     model = known_model(name)
-    folder = cached_folder(model)
-    if folder is not None:
-        print(f"{model.title} is here already: {folder}")
+    found = model_here(model)
+    if found is not None:
+        print(f"{model.title} is here already: {found.folder}")
         return
     if not yes and _is_at_end(sys.stdin.buffer):
         raise InputError(NOBODY_ANSWERS)
-    about = (
-        f"{model.title}: about {model.megabytes:,} MB from huggingface.co/{model.repository}, licence {model.licence}"
-    )
-    print(about, file=sys.stderr)
+    words = words_about(model, state_of(model))
+    about = f"{model.title}: {words.figures}; from huggingface.co/{model.repository}."
+    print(" ".join(filter(None, (about, words.good_for, words.needs))), file=sys.stderr)
     if not yes and not _agrees():
         print("Nothing was downloaded.", file=sys.stderr)
         raise typer.Exit(EXIT_DECLINED)
-    folder = fetch(model)
-    print(f"{folder} ({bytes_of(folder) / 1e6:,.0f} MB, commit {folder.name})")
+    with show_progress("downloading") as show:
+        fetched = fetch(model, show)
+    print(f"{fetched.folder} ({fetched.weight_bytes / 1e6:,.0f} MB, commit {model.commit})")
     print(f"Use it: iibr view PHOTO --depth-model {model.name}")
-    lacking = lacking_package(model.package)
-    if lacking is not None:
-        print(f"It also needs the package {lacking}: {model.install}")
 
 
 def _is_at_end(file: Any) -> bool:
@@ -81,12 +80,3 @@ def _agrees() -> bool:
             raise
         print(file=sys.stderr)  # the question stands in the line still
         raise InputError(NOBODY_ANSWERS) from error
-
-
-def _state(model: KnownModel) -> str:
-    from iibr_core.depth.models.catalog import cached_folder, lacking_package
-
-    if cached_folder(model) is None:
-        return "not here"
-    lacking = lacking_package(model.package)
-    return "here" if lacking is None else f"lacks {lacking}"

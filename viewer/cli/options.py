@@ -64,7 +64,7 @@ def quality_from_text(text: str) -> Quality:
     for quality in qualities:
         if text == quality:
             return quality
-    raise typer.BadParameter(f"{text!r} is no quality: give {', '.join(qualities[:-1])} or {qualities[-1]}")
+    raise typer.BadParameter(f"{text!r} is no quality: give {' or '.join(qualities)}")
 
 
 def inpainter_from_text(text: str) -> str:
@@ -127,7 +127,7 @@ def require_existing(source: Source) -> None:
 def require_model(choice: DepthChoice) -> None:
     """Raise InputError where a depth model is asked for that cannot be used."""
     if choice.asks_for_model:
-        from iibr_core.depth.models.catalog import model_to_use
+        from iibr_core.depth.estimators.catalog import model_to_use
 
         model_to_use(choice)
 
@@ -287,9 +287,9 @@ QualityChoice = Annotated[
     typer.Option(
         "--quality",
         parser=quality_from_text,
-        metavar="fast|balanced|exact",
-        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges, everywhere. By default"
-        " the plan chooses fast or balanced.",
+        metavar="|".join(get_args(Quality)),
+        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges.",
+        show_default="the plan's",
     ),
 ]
 

@@ -4,25 +4,38 @@ is the only line.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 from iibr_core.depth.choice import DepthOrigin
+from iibr_core.runtime.compiling import tell_compiling
 from iibr_core.runtime.time_left import TimeLeft, about_left
 from iibr_core.types import ReportProgress
 
 MAKING = "making views"
+RARELY_USED = ("evaluate", "train")
 
 
 class Commands(TyperGroup):
     """Typer ends without a word when it is interrupted, and takes the end of any file for an interruption; this one
-    aborts for the one only, and whoever runs it says so.
+    aborts for the one only, and whoever runs it says so. A path in place of a command is viewed.
     """
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names in the order in which help lists them: what few people use comes last."""
+        return sorted(super().list_commands(ctx), key=lambda name: name in RARELY_USED)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command's name, the command and its arguments. Raises UsageError where there is none of that name."""
+        is_viewed = args[0] not in self.commands and _is_path(args[0])
+        return super().resolve_command(ctx, ["view", *args] if is_viewed else args)
 
     def make_context(self, *args: Any, **options: Any) -> Any:
         """Read the command line. Raises typer.Abort for KeyboardInterrupt."""
@@ -33,6 +46,11 @@ class Commands(TyperGroup):
         """Run the command. Raises typer.Abort for KeyboardInterrupt, RuntimeError for EOFError."""
         with _interruption_aborts():
             return super().invoke(ctx)
+
+
+def _is_path(word: str) -> bool:
+    """Whether it names a file or a folder, or would if there were one."""
+    return os.path.exists(word) or bool(Path(word).suffix) or Path(word).name != word
 
 
 @contextmanager
@@ -91,7 +109,8 @@ def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., No
                 told=", ".join(told),
             )
 
-        yield show
+        with tell_compiling(lambda words: show(0, 0, words)):
+            yield show
 
 
 def untimed(show: Callable[..., None]) -> ReportProgress:

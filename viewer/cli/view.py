@@ -9,7 +9,6 @@ import typer
 
 from iibr_core.formats.light_fields.registry import is_light_field
 from iibr_core.types import InputError
-from viewer.cli.demo import demo_photo
 from viewer.cli.free_views import poses_of, require_poses_for
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
@@ -24,6 +23,19 @@ from viewer.cli.options import (
     require_utf8,
 )
 from viewer.cli.scene_options import SceneOptions, require_heeded
+from viewer.model.demo import demo_photo
+
+
+def open_window() -> None:
+    """The window with what was open last, if that is still there. Raises InputError where no window can be opened."""
+    from viewer.app.main_loop import initial_state, run
+    from viewer.app.preferences_store import last_opened, user_folder
+    from viewer.model.actions import OpenPath
+    from viewer.model.state.app_state import AppState
+    from viewer.model.state.scene import Source
+
+    last = last_opened(user_folder())
+    run(initial_state(OpenPath(Source(last))) if last is not None else AppState(), user_folder())
 
 
 @with_option_records

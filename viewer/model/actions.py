@@ -9,10 +9,11 @@ from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport, Hover
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.exporting import AskToExport
+from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.jobs import JobsChanged, QuitWhenDone
-from viewer.model.state.model_download import DownloadingChanged
+from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import LoopKind
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import LensAction, SetGlossBrush
@@ -56,6 +57,16 @@ class PauseMotion:
 
 
 @dataclass(frozen=True)
+class Sway:
+    """Let the viewpoint sway, where the demo waits for that and nobody has touched it yet."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The user has pressed a button or a key, or turned the wheel, whatever that was for: the demo holds still."""
+
+
+@dataclass(frozen=True)
 class Tick:
     """The clock shows this many seconds: a motion goes on."""
 
@@ -78,13 +89,6 @@ class SetDepthStrength:
 
     strength: float
     is_finished: bool
-
-
-@dataclass(frozen=True)
-class SetInpainter:
-    """Fill what the photo never saw in another way, one of `INPAINTERS`; the field is generated anew."""
-
-    name: str
 
 
 @dataclass(frozen=True)
@@ -121,9 +125,10 @@ class Redo:
 
 @dataclass(frozen=True)
 class OpenPath:
-    """Open a photo or a light-field folder instead of the present scene."""
+    """Open a photo or a light-field folder instead of the present scene. is_demo: show what can be done with it."""
 
     source: Source
+    is_demo: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,11 +142,26 @@ class ResumeWork:
 
 
 @dataclass(frozen=True)
+class SamePlaces:
+    """Field disparities of the same places of a photo, (before, now), where its depth was found anew.
+
+    pairs: over the whole range, in order of what was before. in_focus: of the place that was clicked to be sharp, None
+    where none was.
+    """
+
+    pairs: tuple[tuple[float, float], ...]
+    in_focus: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
 class SceneOpened:
-    """The worker has read and planned the scene of this generation; its views follow."""
+    """The worker has read and planned the scene of this generation; its views follow. same_places: where the photo that
+    is open has another depth now.
+    """
 
     generation: int
     scene: Scene
+    same_places: SamePlaces | None = None
 
 
 @dataclass(frozen=True)
@@ -319,7 +339,7 @@ class TellSessions:
     """Say that depth edits are kept: once, for whoever looks for a way to save them."""
 
 
-MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick
+MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Sway | Touch | Tick
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
 PreferencesAction = SetTheme | SetFontScale | SetUnits | ToggleSection | PlaceWindow
 
@@ -339,7 +359,6 @@ Action = (
     | SetZoom
     | FreeCameraAction
     | SetDepthStrength
-    | SetInpainter
     | FactsRead
     | TakeSettings
     | RestoreSession
@@ -360,8 +379,9 @@ Action = (
     | AskToSave
     | AskToExport
     | JobsChanged
+    | ViewsFilled
     | QuitWhenDone
-    | DownloadingChanged
+    | ModelAction
     | SetHover
     | Notify
     | DismissNotice

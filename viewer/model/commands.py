@@ -34,12 +34,14 @@ from viewer.model.actions import (
     ToggleSection,
     Undo,
 )
+from viewer.model.demo import demo_photo
 from viewer.model.dense_field import next_denser
 from viewer.model.free_camera import MoveCamera, StepPose
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
 from viewer.model.state.exporting import AskToExport
+from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import (
     COMPARISONS,
@@ -53,14 +55,14 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
-from viewer.model.state.model_download import ListModelsTask
+from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.motion import LOOPS, LoopKind
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetGloss
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
-from viewer.model.state.scene import source_beside, source_with_depth, source_with_map
+from viewer.model.state.scene import Source, source_beside, source_with_map
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask
 from viewer.model.zoom import SetZoom, Zoom
 
@@ -82,7 +84,7 @@ KEY_WORDS = {
 """Of ImGui's names for keys, those that people write otherwise."""
 COMPARE_WORDS: dict[Comparison, str] = {
     "photo": "Compare photo and picture",
-    "quality": "Compare fast and exact",
+    "quality": "Compare fast and balanced",
     "truth": "Compare with ground truth",
     "kept": "Compare with the kept state",
     "difference": "Difference to the kept state",
@@ -166,7 +168,7 @@ def _own_pixels(state: AppState) -> Action:
 
 def _fill_between(state: AppState) -> Action:
     denser = next_denser(state.scene) if state.scene is not None else None
-    return OpenPath(denser) if denser is not None else Notify(Notice(NOTHING_BETWEEN))
+    return DoTask(FillTask(denser)) if denser is not None else Notify(Notice(NOTHING_BETWEEN))
 
 
 def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
@@ -181,6 +183,7 @@ def _invert_depth(state: AppState) -> Action:
 COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
     Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
+    Command("See the demo", lambda state: OpenPath(Source(str(demo_photo())), is_demo=True)),
     Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
     Command("Copy the picture", _always(DoTask(CopyTask())), (Chord("c", ctrl=True),)),
     Command("Paste a picture, or the path of one", _always(DoTask(PasteTask())), (Chord("v", ctrl=True),)),
@@ -213,8 +216,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Invert depth", _invert_depth),
     Command("Reset depth edits", _always(ResetDepth())),
     Command("Open a depth map…", _always(DoTask(ChooseTask("map")))),
-    Command("Get a depth model…", _always(DoTask(ListModelsTask()))),
-    Command("Open a depth model…", _always(DoTask(ChooseTask("model")))),
+    Command("Get true depth", _always(GetDepth())),
+    Command("Depth models…", _always(ShowPrompt(ModelsPrompt()))),
     Command("Save the depth map…", _always(AskToSave("map"))),
     Command("EPI strips", lambda s: ShowEpis(not s.inspection.shows_epis), (Chord("e"),)),
     Command("All views", lambda s: ShowGrid(not s.inspection.shows_grid), (Chord("g"),)),
@@ -283,6 +286,6 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
             return DoTask(ReadTruthTask(path))
         case "map" if state.source is not None:
             return OpenPath(source_with_map(state.source, path))
-        case "model" if state.source is not None:
-            return OpenPath(source_with_depth(state.source, "model", path))
+        case "model" | "model folder" if state.source is not None:
+            return UseModel(path)
     return OpenPath(source_beside(state.source, path))

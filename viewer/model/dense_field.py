@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from iibr_core.types import GridShape
+from viewer.model.state.filling import is_same_field
+from viewer.model.state.jobs import STOPPING, JobProgress
 from viewer.model.state.scene import Scene, Source
 
 HALVINGS = 3
@@ -23,11 +26,16 @@ def with_views_between(scene: Scene, grid: GridShape) -> Source:
     return replace(scene.source, filled_grid=None if grid == scene.given_grid else grid)
 
 
-def chosen_grid(scene: Scene, asked: Source | None) -> GridShape:
-    """Of a light field that is open: the grid that was chosen last, perhaps before its views are there."""
-    if asked is None or scene.given_grid is None or asked.path != scene.source.path:
+def chosen_grid(scene: Scene, asked: Source | None, jobs: Iterable[JobProgress]) -> GridShape:
+    """Of a light field that is open: the grid that was chosen last, perhaps before its views are there.
+
+    asked: what is to be opened. jobs: those under way.
+    """
+    fills = [job.fills for job in jobs if job.fills is not None and job.doing != STOPPING]
+    chosen = next((fill for fill in reversed(fills) if is_same_field(fill, scene.source)), asked)
+    if chosen is None or scene.given_grid is None or not is_same_field(chosen, scene.source):
         return scene.grid
-    return asked.filled_grid or scene.given_grid
+    return chosen.filled_grid or scene.given_grid
 
 
 def next_denser(scene: Scene) -> Source | None:

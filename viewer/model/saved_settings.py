@@ -12,7 +12,7 @@ import dataclasses
 import json
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -44,12 +44,15 @@ Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
 
 
 class SourceText(msgspec.Struct, frozen=True, kw_only=True):
-    """What a picture keeps of a `Source`, by the names in its text: neither paths nor what is on one machine only."""
+    """What a picture keeps of a `Source`, by the names in its text: neither paths nor what is on one machine only.
+
+    quality: "exact" was written by earlier programs and counts as "balanced".
+    """
 
     disparity_scale: float
     grid: tuple[Views, Views] | None = None
     focus_disparity: float | None = None
-    quality: Quality | None
+    quality: Quality | Literal["exact"] | None
     refine: float = 1.0
 
 
@@ -67,6 +70,7 @@ class SettingsText(FormatText, frozen=True, kw_only=True):
     source: SourceText
     size_px: tuple[SidePx, SidePx]
     depth_edits: DepthEdits = UNEDITED
+    has_model_depth: bool = False
 
 
 def settings_text(settings: SavedSettings, folder: Path | None = None) -> str:
@@ -80,6 +84,8 @@ def settings_text(settings: SavedSettings, folder: Path | None = None) -> str:
     }
     if settings.depth_edits != UNEDITED:
         whole["depth_edits"] = settings.depth_edits
+    if settings.has_model_depth:
+        whole["has_model_depth"] = True
     # not by msgspec, which refuses numpy's numbers
     return json.dumps(whole, separators=(",", ":"), allow_nan=False, default=_json_value)
 
@@ -115,7 +121,8 @@ def settings_from_text(text: str, name: str, folder: Path | None = None, is_own:
     optics, refused = _with_own_files(read.optics, folder)
     source = _source_from_text(Source(""), read.source)
     size = ScreenSize(*read.size_px)
-    return SavedSettings(optics, read.depth_strength, source, size, read.depth_edits, unknown, refused)
+    edits, has_model = read.depth_edits, read.has_model_depth
+    return SavedSettings(optics, read.depth_strength, source, size, edits, unknown, refused, has_model)
 
 
 def read_settings(path: Path) -> SavedSettings:
@@ -230,7 +237,7 @@ def _source_from_text(source: Source, text: SourceText) -> Source:
         depth=dataclasses.replace(source.depth, file_scale=text.disparity_scale, refine=text.refine),
         grid=None if text.grid is None else GridShape(*text.grid),
         focus_disparity=text.focus_disparity,
-        quality=text.quality,
+        quality="balanced" if text.quality == "exact" else text.quality,
     )
 
 

@@ -10,7 +10,7 @@ import re
 from iibr_core.depth.choice import BETTER_WAYS
 from viewer.model.state.notices import Notice
 
-DEPTH_COMMANDS = ("Open a depth map…", "Get a depth model…", "Open a depth model…")
+DEPTH_COMMANDS = ("Depth models…", "Open a depth map…")
 """What helps where depth is guessed or missing, by the names of commands."""
 
 _WORDS = (

@@ -69,12 +69,13 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
     actions = _tools(state, layout)
     gap(layout, 2)
     if state.scene is None:
-        actions += _welcome(state, layout)
-        actions += _progress(state, layout)
+        is_reading = bool(progress_text(state.progress))
+        actions += _progress(state, layout) if is_reading else _recent(state.recent, state.source, layout)
     else:
         imgui.text_wrapped(state.scene.name)
         quiet(size_text(state.scene))
-        actions += depth_line(state, state.scene, layout) + _progress(state, layout)
+        depth_line(state.scene, layout)
+        actions += _progress(state, layout)
         if state.report is not None:
             quiet(report_text(state.report, state.progress.is_complete))
         actions += _presets(state.scene, layout)
@@ -119,7 +120,7 @@ def view_count_text(number: int) -> str:
 
 
 def size_text(scene: Scene) -> str:
-    """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, exact"."""
+    """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, fast"."""
     words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
     is_plain = scene.plan is None or scene.source.quality in (None, DEFAULT_QUALITY)
     return words if is_plain else f"{words}, {scene.source.quality}"
@@ -148,15 +149,6 @@ def _is_possible(name: str, state: AppState) -> bool:
         "Export…": state.scene is not None,
     }
     return needs.get(name, True)
-
-
-def _welcome(state: AppState, layout: Layout) -> list[Action]:
-    """What to do in an empty window, and what was open before."""
-    if progress_text(state.progress):
-        return []  # it says what is being read
-    imgui.text_wrapped("Drop a photo or a folder of views on this window to open it.")
-    gap(layout)
-    return _recent(state.recent, state.source, layout)
 
 
 def _recent(paths: tuple[str, ...], source: Source | None, layout: Layout) -> list[Action]:
@@ -235,7 +227,10 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout, pa
         "gloss": lambda: gloss_section(state, layout, palette),
         "depth": lambda: depth_section(state, scene, layout),
         "inspect": lambda: inspect_section(state, scene, layout),
-        "scene": lambda: [*scene_section(scene, state.source, state.facts, layout), *_recent_elsewhere(state, layout)],
+        "scene": lambda: [
+            *scene_section(scene, state.source, state.jobs, state.facts, layout),
+            *_recent_elsewhere(state, layout),
+        ],
     }
     is_open = section in state.preferences.open_sections
     toggled: list[Action] = [ToggleSection(section)] if heading(SECTION_WORDS[section], is_open, layout) else []

@@ -12,13 +12,14 @@ from viewer.model.inspection_request import NO_INSPECTION_TEXTURES, InspectionTe
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
+from viewer.ui.overlays.chips import chips
 from viewer.ui.overlays.filmstrip import filmstrip
-from viewer.ui.overlays.free_camera import free_camera_chip
 from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
 from viewer.ui.overlays.minimap import draw_minimap
 from viewer.ui.overlays.notices import notices
 from viewer.ui.overlays.prompts import prompts
 from viewer.ui.overlays.reticle import overlays
+from viewer.ui.overlays.welcome import welcome
 from viewer.ui.panel import panel
 from viewer.ui.style import pack_color, palette_of
 
@@ -47,8 +48,8 @@ def build_screen(
             if textures.minimap is not None:
                 draw_minimap(layout, textures.minimap)
     actions = filmstrip(state, layout, thumbnails)
-    actions += free_camera_chip(state, layout) + panel(state, layout)
-    return actions + notices(state, layout) + prompts(state, layout)
+    actions += chips(state, layout) + panel(state, layout)
+    return actions + welcome(state, layout) + notices(state, layout) + prompts(state, layout)
 
 
 def _picture(layout: Layout, texture: int) -> None:

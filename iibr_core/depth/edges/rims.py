@@ -1,7 +1,7 @@
 """Rims: in the few pixels beside a depth edge maps err, and the photo's colours tell which side a pixel belongs to.
 
 What is left of the front on the back's disparity stays behind as a ghost when the view moves, and disparities between
-both fly about as crumbs. Where colours do not tell the sides apart nothing changes.
+both fly about alone. Where colours do not tell the sides apart nothing changes.
 """
 
 from __future__ import annotations
@@ -9,8 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.edges.crumbs import fill_crumbs
-from iibr_core.depth.edges.rim_noise import steady_rims
 from iibr_core.depth.edges.rim_sides import RIM_PX, choose_sides, step_distance
 from iibr_core.depth.edges.soft_outlines import widen_fronts
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
@@ -29,15 +27,13 @@ MIXED_EDGES = 5.0
 LEAST_MEASURED = 0.025
 """A map of whose rims a smaller share is clearly between two surfaces, or unknown, is exact: nothing is changed."""
 LEAST_LEFT = 0.022
-"""A sharpened map of whose rims a smaller share is still between two surfaces, lost its blur: only crumbs are left."""
+"""A sharpened map of whose rims a smaller share is still between two surfaces, lost its blur: nothing is changed."""
 MOST_CLEAR_FELLOWS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_FELLOWS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
 OUTLINE_EDGES = 3.0
 """Times the least edge: fronts that stand out by more have soft outlines."""
-NOISE_EDGES = 2.0
-"""Times the least edge: what stands off by less is a surface's noise."""
 CROWD_PX = 5
 CROWDED = 0.3
 """Where steps are at so large a share of the pixels within CROWD_PX, as in meshes, a lone value may be a wire's."""
@@ -55,32 +51,27 @@ def settle_rims(
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
     soft: (H, W), where the map was soft before it was sharpened; None: nowhere.
-    Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for
-    unknown, and all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then
-    pixels of rims change sides where the colours say so, fronts grow over outlines that are soft in the photo, rims
-    that waver are smoothed along themselves, and crumbs that are left are filled. An exact map, which has neither such
-    disparities nor unknown ones in its rims, comes back as it is; of one that was soft in places, those lose their
-    crumbs, and all else is done there only if sharpening has left disparities between surfaces. Raises Cancelled once
-    should_stop is true.
+    Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
+    all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then pixels of
+    rims change sides where the colours say so, and fronts grow over outlines that are soft in the photo. An exact map,
+    which has neither such disparities nor unknown ones in its rims, comes back as it is; so does one that was soft in
+    places, unless sharpening has left disparities between surfaces there. Raises Cancelled once should_stop is true.
     """
     colors = np.ascontiguousarray(photo, np.float32)
     rim = step_distance(values, least_edge) < RIM_PX
     between, clear = _find_between(values, least_edge, should_stop)
     least = LEAST_MEASURED * np.count_nonzero(rim)
     is_exact = clear <= least and np.count_nonzero(unknown & rim) <= least
-    if is_exact and soft is None:
-        return values
     is_left = soft is not None and np.count_nonzero(between & soft) > LEAST_LEFT * np.count_nonzero(rim & soft)
+    if is_exact and not is_left:
+        return values
     settled = values
     if clear > least or is_left:
         between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
         known = np.where(between | unknown, np.float32(np.nan), values)
         settled = fill_disparity_by_color(colors, known, should_stop)
-    if not is_exact or is_left:
-        settled = choose_sides(colors, settled, between | unknown, least_edge, should_stop)
-        settled = widen_fronts(colors, settled, OUTLINE_EDGES * least_edge, should_stop)
-        settled = steady_rims(colors, settled, NOISE_EDGES * least_edge, should_stop)
-    settled = fill_crumbs(colors, settled, NOISE_EDGES * least_edge, should_stop)
+    settled = choose_sides(colors, settled, between | unknown, least_edge, should_stop)
+    settled = widen_fronts(colors, settled, OUTLINE_EDGES * least_edge, should_stop)
     # Where the map was not soft, it is exact.
     return settled if soft is None or not is_exact else np.where(soft, settled, values)
 

@@ -4,8 +4,7 @@ whole.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,8 +43,10 @@ RARE = 0.002
 MARGIN_STEPS = 4
 """Steps of the small sweep that are added to the range at both ends."""
 MOST_STEPS = 512
-AFTER_STEPS = 12
-"""What follows a sweep takes as long as so many of its steps."""
+CHOOSING_WORK = 0.35
+"""Of choosing between the disparities of a sweep, for each of them, against its step of the sweep."""
+REFINING_WORK = 14.0
+"""What follows then takes as long as so many steps of a sweep, of whatever length."""
 LEAST_SIDE_PX = 8
 FEW_VIEWS = 4
 """So few match by chance in many places: their maps are checked against each other."""
@@ -88,8 +89,9 @@ def estimate_coarse(
     margin = MARGIN_STEPS * step
     whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
     range_px = float(low - margin) * shrink, float(high + margin) * shrink
-    steps = sweep_steps(range_px, small.reach) + AFTER_STEPS
-    return CoarseDisparity(whole, range_px, steps * views[reference].size / 3 / (small.luma.size * len(disparities)))
+    took = (map_work(len(disparities), len(small.textures)) - REFINING_WORK) * small.luma.size
+    takes = map_work(sweep_steps(range_px, small.reach) + 1, len(small.textures)) * views[reference].size / 3
+    return CoarseDisparity(whole, range_px, takes / took)
 
 
 def estimate_disparity(
@@ -106,17 +108,22 @@ def estimate_disparity(
     """
     matched = _matching_views(views, offsets, reference, 1, should_stop)
     disparities = np.linspace(*range_px, sweep_steps(range_px, matched.reach) + 1, dtype=np.float32)
-    swept = itertools.count(1)
+    done, total = 0.0, map_work(len(disparities), len(matched.textures))
 
-    def report_step() -> None:
-        report_progress(next(swept), len(disparities) + AFTER_STEPS, FINDING)
+    def advance(work: float = 1.0) -> None:
+        nonlocal done
+        done += work
+        report_progress(done, total, FINDING)
 
     values, _ = choose_disparity(
-        sweep(matched, disparities, should_stop, report_step), matched.luma, disparities, should_stop
+        sweep(matched, disparities, should_stop, advance), matched.luma, disparities, should_stop
     )
+    advance(CHOOSING_WORK * len(disparities))
     values = _median(values, should_stop)
     if len(matched.textures) <= FEW_VIEWS:
-        values = _fill_unseen(views[reference], values, _agrees(matched, values, disparities, should_stop), should_stop)
+        is_seen = _agrees(matched, values, disparities, should_stop, advance)
+        values = _fill_unseen(views[reference], values, is_seen, should_stop)
+        advance(CHOOSING_WORK * len(disparities))
     return _refine(matched, values, range_px, should_stop)
 
 
@@ -130,6 +137,11 @@ def refine_disparity(
 ) -> FloatImage:
     """The same from disparity (H, W) that is off by less than a pixel already: nothing is swept."""
     return _refine(_matching_views(views, offsets, reference, 1, should_stop), values, range_px, should_stop)
+
+
+def map_work(steps: int, views: int) -> float:
+    """What `estimate_disparity` takes with so many disparities and views, in steps of its sweep."""
+    return (1 + (views <= FEW_VIEWS)) * steps * (1 + CHOOSING_WORK) + REFINING_WORK
 
 
 def sweep_steps(range_px: tuple[float, float], reach: float) -> int:
@@ -166,13 +178,19 @@ def _refine(
 
 
 def _agrees(
-    views: MatchingViews, values: FloatImage, disparities: NDArray[np.float32], should_stop: ShouldStop
+    views: MatchingViews,
+    values: FloatImage,
+    disparities: NDArray[np.float32],
+    should_stop: ShouldStop,
+    report_step: Callable[[], None] = lambda: None,
 ) -> NDArray[np.bool_]:
     """Where the farthest view, matched in its turn, gives a place the same disparity (H, W): what both of them see."""
     other = len(views.textures) - 1
     order = [other, *(index for index in range(other))]
     turned = MatchingViews(views.textures[order], views.offsets[order] - views.offsets[other], views.textures[other])
-    seen, _ = choose_disparity(sweep(turned, disparities, should_stop), turned.luma, disparities, should_stop)
+    seen, _ = choose_disparity(
+        sweep(turned, disparities, should_stop, report_step), turned.luma, disparities, should_stop
+    )
     seen = _median(seen, should_stop)
     offsets = [ViewOffset(float(t), float(s)) for t, s in views.offsets[[0, other]]]
     return find_confirmed([values, seen], offsets, 0, should_stop)

@@ -14,7 +14,7 @@ import numpy as np
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.agreement import reconcile
-from iibr_core.depth.multi_view.estimate import AFTER_STEPS, FINDING, estimate_disparity, refine_disparity, sweep_steps
+from iibr_core.depth.multi_view.estimate import FINDING, estimate_disparity, map_work, refine_disparity, sweep_steps
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -64,7 +64,7 @@ def estimate_all(
 def _matching_work(offsets: Sequence[ViewOffset], index: int, range_px: tuple[float, float]) -> float:
     """What matching a view takes."""
     reach = max(max(abs(at.t - offsets[index].t), abs(at.s - offsets[index].s)) for at in offsets)
-    return STEP_WORK * (sweep_steps(range_px, reach) + AFTER_STEPS)
+    return STEP_WORK * map_work(sweep_steps(range_px, reach) + 1, len(offsets))
 
 
 def matched_views(offsets: Sequence[ViewOffset]) -> list[int]:

@@ -70,6 +70,6 @@ def _storable(picture: NDArray[Any], part: ExrPart) -> NDArray[np.float32]:
 def _is_whole(path: Path, parts: int) -> bool:
     """Whether the last part has its last row: of a disk that fills up nothing is told."""
     source = oiio.ImageInput.open(oiio_name(path))
-    last = source and source.seek_subimage(parts - 1, 0) and source.read_scanline(source.spec().height - 1, 0)
+    last = source and source.seek_subimage(parts - 1, 0) and source.read_scanline(source.spec().height - 1)
     complaint_of(source or oiio)
     return last is not None and last is not False

@@ -75,6 +75,6 @@ def _is_whole(path: Path, height: int) -> bool:
     if path.suffix.lower() == ".png":
         return True
     source = oiio.ImageInput.open(oiio_name(path))
-    last_row = source and source.read_scanline(height - 1, 0)
+    last_row = source and source.read_scanline(height - 1)
     complaint_of(source or oiio)  # or it is told on stderr
     return last_row is not None

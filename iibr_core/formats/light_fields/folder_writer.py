@@ -16,7 +16,8 @@ import numpy as np
 
 from iibr_core.formats.files import entries_of, is_folder
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.formats.outputs import UnfinishedFolder, remove_leftovers, require_folder_place
+from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place
+from iibr_core.formats.unfinished import remove_leftovers
 from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
 
 WRITING_THREADS = 2

@@ -137,7 +137,7 @@ def _focal_px(folder: Path, name: re.Match[str], view: KnownView) -> float:
 def _range_px(folder: Path, focal_px: float, step_m: float) -> tuple[float, float] | None:
     """Disparities of the distances that the folder's config lets people focus on, None where it tells none."""
     path = folder / CONFIG
-    if not is_file(path) or path.stat().st_size == 0 or step_m == 0:
+    if not is_file(path) or step_m == 0:
         return None
     with open_binary(path) as file:
         lines = file.read(MOST_CONFIG_BYTES).decode("utf-8-sig", "replace").splitlines()

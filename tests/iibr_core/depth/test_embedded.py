@@ -332,6 +332,7 @@ def test_damaged_xml(packet: bytes) -> None:
 def test_too_many_elements() -> None:
     with pytest.raises(InputError, match="elements"):
         parse_packet(b"<a>" + b"<b/>" * MAX_ELEMENTS + b"</a>")
+    parse_packet(b"<a>" + b"<b/>" * (MAX_ELEMENTS - 1) + b"</a>")
 
 
 def test_photos_without_depth(tmp_path: Path) -> None:

@@ -19,16 +19,18 @@ from onnx import TensorProto, helper, numpy_helper
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models import estimate_cache, onnx_models
-from iibr_core.depth.models.catalog import USUAL_MODEL, LocalModel, known_model, model_to_use
-from iibr_core.depth.models.download import VERIFIED
-from iibr_core.depth.models.estimate import estimate_with
-from iibr_core.depth.models.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
-from iibr_core.depth.models.preparation import network_input
+from iibr_core.depth.estimators import estimate_cache, onnx_models
+from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model, model_to_use
+from iibr_core.depth.estimators.download import VERIFIED
+from iibr_core.depth.estimators.estimate import estimate_with
+from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
+from iibr_core.depth.estimators.preparation import network_input
+from iibr_core.depth.estimators.protocol import LocalModel
 from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ignore_progress
 from tests.iibr_core.depth.onnx_graphs import published, weighing
+from tests.iibr_core.depth.random_networks import export_depth_anything
 from tests.iibr_core.depth.test_transformers_models import depth_anything as depth_anything_folder
 
 BUDGET = 2**30
@@ -193,33 +195,8 @@ def depth_anything(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, torc
     folder = tmp_path_factory.mktemp("model")
     saved = depth_anything_folder(folder / "saved").folder
     network, file = transformers.DepthAnythingForDepthEstimation.from_pretrained(saved).eval(), folder / "model.onnx"
-    torch.onnx.export(
-        WithSymbolicSize(network).eval(),
-        (torch.zeros(1, 3, 56, 84),),
-        file,
-        dynamo=False,
-        input_names=["pixel_values"],
-        output_names=["predicted_depth"],
-        dynamic_axes={"pixel_values": {2: "rows", 3: "columns"}},
-    )
+    export_depth_anything(network, file)
     return file, network
-
-
-class WithSymbolicSize(torch.nn.Module):
-    """The network, its head's last steps repeated without `int()`, which would fix the exported size."""
-
-    def __init__(self, network: torch.nn.Module) -> None:
-        super().__init__()
-        self.network = network
-
-    def forward(self, pixel_values: torch.Tensor) -> torch.Tensor:
-        network, (rows, columns) = self.network, (side // 14 for side in pixel_values.shape[2:])
-        features = network.backbone.forward_with_filtered_kwargs(pixel_values).feature_maps
-        head, hidden = network.head, network.neck(features, rows, columns)[network.head.head_in_index]
-        hidden = torch.nn.functional.interpolate(
-            head.conv1(hidden), (rows * 14, columns * 14), mode="bilinear", align_corners=True
-        )
-        return head.activation2(head.conv3(head.activation1(head.conv2(hidden)))).squeeze(1) * head.max_depth
 
 
 @pytest.mark.parametrize(("height", "width"), [(56, 84), (84, 56), (140, 98)])
@@ -247,7 +224,11 @@ def test_the_usual_model_is_used_once_it_is_verified(monkeypatch: pytest.MonkeyP
     for choice in (DepthChoice(), DepthChoice(model=usual.name)):
         found = model_to_use(choice)
         assert found is not None
-        assert (found.title, found.folder, found.file) == (usual.title, snapshot, snapshot / "onnx" / "model.onnx")
+        assert (found.title, found.folder, found.weights) == (
+            usual.title,
+            snapshot,
+            (snapshot / "onnx" / "model.onnx",),
+        )
 
 
 def test_a_folder_with_several_files_asks_which(tmp_path: Path) -> None:
@@ -256,7 +237,18 @@ def test_a_folder_with_several_files_asks_which(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="which ONNX file is meant"):
         model_of(tmp_path)
     weighing(tmp_path / "model.onnx", (1, 0, 0))
-    assert model_of(tmp_path).file == tmp_path / "model.onnx"
+    assert model_of(tmp_path).weights == (tmp_path / "model.onnx",)
+
+
+@pytest.mark.parametrize(("kind", "package"), [("depth_anything", "onnxruntime"), ("zoedepth", "transformers")])
+def test_a_folder_with_both_weights_runs_as_onnx_where_its_output_is_known(
+    tmp_path: Path, kind: str, package: str
+) -> None:
+    """ZoeDepth gives metres, which its ONNX files do not say: taken for inverse depth, near would be far."""
+    weighing(tmp_path / "model.onnx", (1, 0, 0))
+    (tmp_path / "model.safetensors").touch()
+    (tmp_path / "config.json").write_text(json.dumps({"model_type": kind}))
+    assert model_of(tmp_path).family.packages[0] == package
 
 
 def test_an_estimate_is_cached_by_the_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -264,13 +256,13 @@ def test_an_estimate_is_cached_by_the_file(monkeypatch: pytest.MonkeyPatch, tmp_
     file = weighing(tmp_path / "model.onnx", (1, 0, 0))
     photo = photo_of(smooth_photo(ImageSize(60, 60)))
     first = estimate_with(model_of(file), photo)
-    assert len(list((tmp_path / "cache").iterdir())) == 1
+    assert len(list((tmp_path / "cache").glob("*.npz"))) == 1
     weighing(file, (0, 1, 0))
     second = estimate_with(model_of(file), photo)
     assert isinstance(first, RelativeInverseDepth)
     assert isinstance(second, RelativeInverseDepth)
     assert np.abs(first.values - second.values).max() > 0.1
-    assert len(list((tmp_path / "cache").iterdir())) == 2
+    assert len(list((tmp_path / "cache").glob("*.npz"))) == 2
 
 
 def test_neither_torch_nor_transformers_is_imported(tmp_path: Path) -> None:

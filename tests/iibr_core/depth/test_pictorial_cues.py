@@ -91,3 +91,12 @@ def test_thin_photos(size: tuple[int, int]) -> None:
     values = estimate_from_cues(photo_of(np.random.default_rng(0).random((*size, 3)))).values
     assert values.shape == size
     assert np.isfinite(values).all()
+
+
+def test_many_strong_edges_below_do_not_flatten_what_stands_above_them() -> None:
+    pixels = np.full((240, 120, 3), 0.5, np.float32)
+    pixels[30:80, 45:75] = 0.6
+    for row in range(100, 240, 40):
+        pixels[row : row + 20], pixels[row + 20 : row + 40] = 0.0, 1.0
+    values = estimate_from_cues(photo_of(pixels)).values
+    assert values[55, 60] - values[55, 15] > 0.03 * np.ptp(values)

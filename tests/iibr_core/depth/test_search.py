@@ -9,9 +9,9 @@ import pytest
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models import estimate_cache
-from iibr_core.depth.models.catalog import USUAL_MODEL, known_model
-from iibr_core.depth.models.download import VERIFIED
+from iibr_core.depth.estimators import estimate_cache
+from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model
+from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resize_estimate, sketch_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.tiling import Cancelled
@@ -69,6 +69,7 @@ def test_the_order_file_embedded_rough(tmp_path: Path) -> None:
     assert is_nearer_inside(found)
     found = open_with_depth(path, start_from("rough"))
     assert (found.origin.kind, found.origin.failures) == ("rough", ())
+    assert found.disparity.viewing_share < 1
     assert "--disparity" in found.origin.advice
     assert "--depth-model" in found.origin.advice
     assert any("rough" in note for note in found.disparity.notes)

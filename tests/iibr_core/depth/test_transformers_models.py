@@ -17,16 +17,20 @@ import transformers
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.models import estimate_cache
-from iibr_core.depth.models.catalog import KNOWN_MODELS, LocalModel, cached_folder, fetch, known_model, model_to_use
-from iibr_core.depth.models.config import read_preparation
-from iibr_core.depth.models.download import VERIFIED
-from iibr_core.depth.models.estimate import estimate_with
-from iibr_core.depth.models.preparation import Preparation, input_size
+from iibr_core.depth.estimators import estimate_cache
+from iibr_core.depth.estimators.catalog import fetch, known_model, model_here, model_to_use
+from iibr_core.depth.estimators.config import read_preparation
+from iibr_core.depth.estimators.download import VERIFIED
+from iibr_core.depth.estimators.estimate import estimate_with
+from iibr_core.depth.estimators.preparation import Preparation, input_size
+from iibr_core.depth.estimators.protocol import LocalModel
+from iibr_core.depth.estimators.registry import FAMILIES
+from iibr_core.depth.estimators.transformers_models import FAMILY, KINDS
 from iibr_core.depth.search import estimator_of, open_with_depth
 from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError, Photo
+from tests.iibr_core.depth.random_networks import depth_anything_network, with_random_weights
 
 RNG = np.random.default_rng(3)
 PHOTO = Photo(RNG.random((40, 60, 3)).astype(np.float32), 50.0, "photo")
@@ -50,20 +54,27 @@ def own_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def saved(network: Any, folder: Path, **preparation: object) -> LocalModel:
-    """Weights are made large enough that something of the photo reaches the output: they are meant to be trained."""
-    with torch.no_grad():
-        for weights in network.parameters():
-            if weights.ndim > 1:
-                weights.normal_(0, weights[0].numel() ** -0.5)
-    network.eval().save_pretrained(folder)
+    """With random weights, and how photos are prepared for it."""
+    with_random_weights(network).save_pretrained(folder)
     (folder / "preprocessor_config.json").write_text(json.dumps(preparation))
-    return LocalModel("Tiny", folder)
+    return in_folder(folder)
+
+
+def in_folder(folder: Path) -> LocalModel:
+    return LocalModel("Tiny", folder, FAMILY, FAMILY.weights_in(folder))
+
+
+def opened(folder: Path) -> LocalModel:
+    """As users name it."""
+    model = model_to_use(DepthChoice(model=str(folder)))
+    assert model is not None
+    return model
 
 
 def depth_anything(folder: Path, kind: str = "relative", seed: int = 0) -> LocalModel:
     torch.manual_seed(seed)
-    config = transformers.DepthAnythingConfig(
-        backbone_config={**BACKBONE, **FEATURES},
+    network = depth_anything_network(
+        {**BACKBONE, **FEATURES},
         reassemble_hidden_size=32,
         neck_hidden_sizes=[8, 8, 8, 8],
         fusion_hidden_size=8,
@@ -71,9 +82,6 @@ def depth_anything(folder: Path, kind: str = "relative", seed: int = 0) -> Local
         depth_estimation_type=kind,
         max_depth=20,
     )
-    network = transformers.DepthAnythingForDepthEstimation(config)
-    with torch.no_grad():  # random weights rarely reach beyond the last rectifier
-        network.head.conv3.bias += 1
     return saved(network, folder, size={"height": 56, "width": 56}, keep_aspect_ratio=True, ensure_multiple_of=14)
 
 
@@ -274,7 +282,7 @@ def test_pickled_weights_are_refused(tmp_path: Path) -> None:
     (model.folder / "model.safetensors").unlink()
     (model.folder / "pytorch_model.bin").write_bytes(b"pickle")
     with pytest.raises(InputError, match="pickled"):
-        estimate_with(model, PHOTO)
+        opened(model.folder)
 
 
 def cut(path: Path) -> None:
@@ -305,7 +313,7 @@ def test_damaged_folders_are_one_line(name: str, damage: Callable[[Path], object
     model = depth_anything(tmp_path / "model")
     damage(model.folder / name)
     with pytest.raises(InputError, match=named) as caught:
-        estimate_with(model, PHOTO)
+        estimate_with(opened(model.folder), PHOTO)
     assert "\n" not in str(caught.value)
 
 
@@ -361,9 +369,7 @@ def test_a_kept_estimate_needs_no_network(tmp_path: Path, own_cache: Path) -> No
     assert not np.array_equal(values_of(estimate_with(depth_anything(tmp_path / "b", seed=1), PHOTO)), values_of(first))
     # The same contents elsewhere are the same.
     model.folder.rename(tmp_path / "moved")
-    np.testing.assert_array_equal(
-        values_of(estimate_with(LocalModel("T", tmp_path / "moved"), PHOTO)), values_of(first)
-    )
+    np.testing.assert_array_equal(values_of(estimate_with(in_folder(tmp_path / "moved"), PHOTO)), values_of(first))
     assert len(list(own_cache.glob("*.npz"))) == 3
 
 
@@ -414,21 +420,22 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, own_cach
 def test_models_are_found_by_folder_and_by_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
     folder = depth_anything(tmp_path / "model").folder
-    assert model_to_use(DepthChoice(model=str(folder))) == LocalModel("the model in model", folder)
+    found = LocalModel("the model in model", folder, FAMILY, (folder / "model.safetensors",))
+    assert model_to_use(DepthChoice(model=str(folder))) == found
     assert model_to_use(DepthChoice(model=None)) is None
     with pytest.raises(InputError, match="iibr models get depth-pro"):
         model_to_use(DepthChoice(model="depth-pro"))
-    published = known_model("depth-anything-v2-base")
+    published = known_model("depth-anything-v2-metric-indoor")
     snapshot = tmp_path / "hub" / f"models--{published.repository.replace('/', '--')}" / "snapshots" / published.commit
     snapshot.parent.mkdir(parents=True)
     folder.rename(snapshot)
-    assert cached_folder(published) is None  # nobody verified it
+    assert model_here(published) is None  # nobody verified it
     (snapshot / VERIFIED).write_text("{}")
-    found = model_to_use(DepthChoice(model=published.name))
-    assert found is not None
-    assert (found.title, found.folder) == (published.title, snapshot)
+    named = model_to_use(DepthChoice(model=published.name))
+    assert named is not None
+    assert (named.title, named.folder) == (published.title, snapshot)
     (snapshot / "model.safetensors").unlink()
-    assert cached_folder(published) is None
+    assert model_here(published) is None
 
 
 @pytest.mark.parametrize("wanted", ["", "nonsense", "/no/such/folder", "./neither"])
@@ -462,7 +469,7 @@ def test_a_file_is_no_model(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("package", ["depth_anything_3"])
 def test_models_of_packages_that_are_not_installed(package: str) -> None:
-    model = next(model for model in KNOWN_MODELS if model.package == package)
+    model = next(family for family in FAMILIES if family.packages[0] == package).models[0]
     with pytest.raises(InputError, match=f"package {package}.*not installed"):
         model_to_use(DepthChoice(model=model.name))
 
@@ -506,7 +513,8 @@ def test_no_network_is_one_line(tmp_path: Path) -> None:
     import subprocess
 
     code = (
-        "from iibr_core.depth.models.catalog import fetch, known_model; fetch(known_model('depth-anything-v2-small'))"
+        "from iibr_core.depth.estimators.catalog import fetch, known_model; "
+        "fetch(known_model('depth-anything-v2-small'))"
     )
     environment = {**os.environ, "HF_ENDPOINT": "http://127.0.0.1:9", "HF_HOME": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
@@ -520,7 +528,7 @@ def test_no_network_is_one_line(tmp_path: Path) -> None:
 
 def test_preparations_are_read_as_written(tmp_path: Path) -> None:
     (tmp_path / "preprocessor_config.json").write_text('{"size": 384, "image_mean": 0.5}')
-    assert read_preparation(tmp_path, "dpt") == Preparation((384, 384), False, 1, False, (0.5,) * 3, (0.5,) * 3)
+    assert read_preparation(tmp_path, KINDS["dpt"]) == Preparation((384, 384), False, 1, False, (0.5,) * 3, (0.5,) * 3)
     (tmp_path / "preprocessor_config.json").write_text("{}")
-    assert read_preparation(tmp_path, "depth_anything").size == (518, 518)
-    assert read_preparation(tmp_path, "zoedepth").pads
+    assert read_preparation(tmp_path, KINDS["depth_anything"]).size == (518, 518)
+    assert read_preparation(tmp_path, KINDS["zoedepth"]).pads

@@ -6,12 +6,15 @@ import struct
 from io import BytesIO
 
 import numpy as np
+import OpenImageIO as oiio
 import pillow_heif
 import pytest
 from PIL import Image, ImageCms
 
 from iibr_core.color import convert, linear_from_srgb, photo_in_srgb, srgb_from_linear
 from iibr_core.formats.images.color_profile import ColorProfile, UnusableProfileError, color_profile, color_space_of
+from iibr_core.formats.images.downsampling import linear_light
+from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import DISPLAY_P3, SRGB
 
@@ -101,8 +104,6 @@ def test_photos_may_keep_their_own_primaries(tmp_path):
 
 
 def test_of_an_exr_they_are_its_chromaticities(tmp_path):
-    import OpenImageIO as oiio
-
     p3_xy = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)
     for value, expected in ((p3_xy, DISPLAY_P3), ((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329), SRGB)):
         spec = oiio.ImageSpec(1, 1, 3, "float")
@@ -213,3 +214,12 @@ def test_flipped_bytes_give_colours_or_a_refusal(seed):
     linear = profile.linear(COLORS)
     assert np.isfinite(linear).all()
     assert 0 <= linear.min() <= linear.max() <= 1
+
+
+def test_linear_light_is_by_the_profile_that_comes_with_the_pixels():
+    gamma = profile_bytes(curve=("curv", 1, (round(256 * 1.8),)))
+    spec, data = oiio.ImageSpec(60, 40, 3, "uint8"), np.frombuffer(gamma, np.uint8)
+    spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(data)}]"), data)
+    linear = color_profile(gamma).linear(COLORS)
+    assert np.array_equal(linear_light(Raster(COLORS, None, spec)), linear)
+    assert np.abs(linear - linear_from_srgb(COLORS / np.float32(255))).max() > 0.01

@@ -20,11 +20,12 @@ from iibr_core.formats.outputs import (
     UnfinishedFolder,
     atomic_write,
     make_folder,
-    remove_leftovers,
+    release_place,
     require_file_place,
     require_files_in,
     require_folder_place,
 )
+from iibr_core.formats.unfinished import remove_leftovers
 from iibr_core.types import InputError
 
 NOBODY = 65534
@@ -244,7 +245,7 @@ def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from iibr_core.formats import outputs
+from iibr_core.formats import outputs, unfinished
 folder = Path(sys.argv[1])
 def end():
     os.kill(os.getpid(), signal.SIGKILL)
@@ -270,7 +271,7 @@ def before_the_old_one_is_gone():
     unfinished.put_in_place()
     end()
 def remove_leftovers():
-    outputs.remove_leftovers(folder)
+    unfinished.remove_leftovers(folder)
 globals()[sys.argv[2]]()
 """
 
@@ -355,7 +356,7 @@ def test_half_a_file_leaves_what_was_there(tmp_path: Path) -> None:
 AS_NOBODY = """
 import os, sys
 from pathlib import Path
-from iibr_core.formats import files, outputs
+from iibr_core.formats import files, outputs, unfinished
 from iibr_core.types import InputError
 if os.getuid() == 0:
     os.setgroups([]); os.setgid(int(sys.argv[2])); os.setuid(int(sys.argv[2]))
@@ -379,7 +380,7 @@ for look in (
         print("nothing was refused")
     except InputError as error:
         print(error)
-outputs.remove_leftovers(closed)
+unfinished.remove_leftovers(closed)
 """
 
 
@@ -450,3 +451,68 @@ def test_a_new_file_needs_no_hard_links(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "b.txt").write_text("theirs")
     with pytest.raises(AlreadyThereError, match="another program"):
         write(tmp_path / "b.txt", "mine")
+
+
+CLAIMING = """
+import sys
+from pathlib import Path
+from functools import partial
+from iibr_core.formats import outputs
+from iibr_core.types import InputError
+place = Path(sys.argv[1])
+require = outputs.require_file_place if place.suffix else partial(outputs.require_folder_place, is_whole=True)
+try:
+    require(place, may_replace=sys.argv[2] == "replaces")
+    print("claimed", flush=True)
+except InputError as error:
+    print(error, flush=True)
+sys.stdin.read()
+"""
+
+
+def claim_in_process(place: Path, *, may_replace: bool = False) -> subprocess.Popen[str]:
+    """It has asked, and waits for the end of its input."""
+    command = [sys.executable, "-c", CLAIMING, str(place), "replaces" if may_replace else ""]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def said_by(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+@pytest.mark.parametrize("name", ["a.png", "field", "new/deep/field"])
+def test_the_second_process_at_a_new_place_is_told_at_once(tmp_path: Path, name: str) -> None:
+    place = tmp_path / name
+    with claim_in_process(place) as first:
+        assert said_by(first) == "claimed"
+        for may_replace in (False, True):
+            with claim_in_process(place, may_replace=may_replace) as second:
+                said = "claimed" if may_replace else f"{place}: another program is writing it"
+                assert said_by(second).startswith(said)
+        with claim_in_process(tmp_path / "other.png") as beside:
+            assert said_by(beside) == "claimed"
+    assert names(tmp_path) == [], "who ends without writing leaves nothing"
+
+
+def test_the_claim_of_a_killed_process_holds_nobody_back(tmp_path: Path) -> None:
+    with claim_in_process(tmp_path / "new" / "field") as first:
+        assert said_by(first) == "claimed"
+        first.kill()
+    (left,) = names(tmp_path)
+    assert left.endswith(".claim")
+    require_folder_place(tmp_path / "new" / "field", is_whole=True)
+    assert names(tmp_path) == [left]
+    write_folder(tmp_path / "new" / "field", "mine")
+    assert names(tmp_path) == ["new"]
+
+
+def test_a_place_that_is_given_up_is_free(tmp_path: Path) -> None:
+    for _ in range(2):
+        require_file_place(tmp_path / "a.png")
+    release_place(tmp_path / "a.png")
+    assert names(tmp_path) == []
+    with claim_in_process(tmp_path / "a.png") as other:
+        assert said_by(other) == "claimed"
+        with pytest.raises(InputError, match="another program is writing it"):
+            require_file_place(tmp_path / "a.png")

@@ -22,6 +22,7 @@ from iibr_core.formats.images.photo import (
     upright,
     write_image,
 )
+from iibr_core.formats.images.pillow_reader import raster_of
 from iibr_core.types import ImageSize, InputError
 
 RNG = np.random.default_rng(7)
@@ -382,3 +383,11 @@ def test_nothing_is_left_where_writing_fails(tmp_path):
         with pytest.raises(InputError, match=path.name):
             write_image(path, RGB)
     assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]
+
+
+@pytest.mark.parametrize(("told", "taken"), [(None, 1), (0, 1), (1, 1), (2, 2), (8, 8), (9, 1)])
+def test_an_orientation_that_there_is_none_of_counts_as_upright(told, taken):
+    image = Image.new("RGB", (3, 2))
+    if told is not None:
+        image.getexif()[0x0112] = told
+    assert raster_of(image).spec.get_int_attribute("Orientation") == taken

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.formats.images.header import HEIC_BYTES, read_photo_header
+from iibr_core.formats.images.header import HEIC_BYTES, _samples_a_pixel, read_photo_header
 from iibr_core.types import InputError
 
 PIXELS = np.random.default_rng(1).integers(0, 255, (60, 80, 3), np.uint8)
@@ -57,3 +57,9 @@ def test_cut_off_headers_are_refused_or_read(tmp_path, cut):
     except InputError as error:
         size = (60, 80) if str(path) in str(error) else str(error)
     assert size == (60, 80)
+
+
+@pytest.mark.parametrize("frame", [b"", b"\x08\0\x10\0\x10\x01\x01\x11", b"\x08\0\x10\0\x10\x01\x01\x10\0"])
+def test_a_frame_that_says_nothing_of_use_is_taken_for_four_full_components(frame):
+    """Cut off, or sampled not at all."""
+    assert _samples_a_pixel(frame) == 4

@@ -14,6 +14,7 @@ import pytest
 from PIL import Image, ImageCms, PngImagePlugin
 
 from iibr_core.color import convert, linear_from_srgb
+from iibr_core.formats.images import exr_parts, oiio_writer
 from iibr_core.formats.images.color_profile import color_profile
 from iibr_core.formats.images.icc_profile import icc_profile
 from iibr_core.formats.images.metadata import (
@@ -310,3 +311,21 @@ def test_facts_of_damaged_exif_are_few_words(seed):
     for what, value in camera_facts(PictureMetadata(bytes(exif))):
         assert "\n" not in what + value
         assert len(value) < 130
+
+
+def test_the_stars_a_photo_has_are_kept_and_what_is_of_its_file_is_not(tmp_path):
+    """Windows writes them in two tags; 0x0111 says where the file's strips lie."""
+    exif = Image.Exif()
+    exif[0x4746], exif[0x4749], exif[0x0111] = 4, 75, 8
+    Image.fromarray(patches()).save(tmp_path / "a.jpg", exif=exif)
+    write_picture(tmp_path / "b.jpg", patches(), metadata=read_metadata(tmp_path / "a.jpg"))
+    with Image.open(tmp_path / "b.jpg") as image:
+        kept = image.getexif()
+    assert (kept.get(0x4746), kept.get(0x4749), kept.get(0x0111)) == (4, 75, None)
+
+
+@pytest.mark.parametrize("whole", [exr_parts._is_whole, oiio_writer._is_whole])
+def test_what_does_not_even_open_is_not_whole_and_nothing_is_told(tmp_path, capfd, whole):
+    (tmp_path / "a.exr").write_bytes(b"cut off")
+    assert not whole(tmp_path / "a.exr", 1)
+    assert capfd.readouterr().err == ""

@@ -16,8 +16,9 @@ from PIL import Image
 from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.formats.images.lif import open_lif
+from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, read_source, source_size
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, part_of, read_source, source_size
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields import views as views_module
 from iibr_core.formats.light_fields.registry import find_light_field, is_light_field, open_light_field, writer_for
@@ -297,3 +298,15 @@ def test_a_leia_image_brings_its_own_inverse_depth(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.estimate.values, grey / 255, atol=0.02)
     path.write_bytes(leia_image(smooth(), smooth(shift=4)))
     assert read_embedded(path) is None
+
+
+@pytest.mark.parametrize(("orientation", "turned"), [(None, np.s_[:, :]), (1, np.s_[:, :]), (2, np.s_[:, ::-1])])
+def test_what_is_taken_of_a_picture_is_upright_and_says_so(
+    tmp_path: Path, orientation: int | None, turned: tuple[slice, slice]
+) -> None:
+    pixels, spec = np.arange(24, dtype=np.uint8).reshape(2, 4, 3), oiio.ImageSpec(4, 2, 3, "uint8")
+    if orientation is not None:
+        spec.attribute("Orientation", orientation)
+    part = part_of(Raster(pixels, None, spec), PictureSource(tmp_path / "a.png", shown_size=ImageSize(2, 4)))
+    assert np.array_equal(part.pixels, pixels[turned])
+    assert part.spec.get_int_attribute("Orientation", 0) == 1

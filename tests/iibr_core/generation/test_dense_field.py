@@ -202,3 +202,12 @@ def test_grids_that_fit_say_how_many_steps(sparse, dense, steps):
 def test_grids_that_do_not_fit_are_refused_with_those_that_do(sparse, dense, advice):
     with pytest.raises(InputError, match=advice):
         require_steps(GridShape(*sparse), GridShape(*dense))
+
+
+@pytest.mark.parametrize("sparse", [GridShape(2, 2), GridShape(3, 3), GridShape(1, 3)])
+def test_shares_grow_to_all_of_the_work(sparse):
+    given = [flat_view(*at, 100) for at in np.ndindex(*sparse)]
+    dense = GridShape(*(4 * (views - 1) + 1 for views in sparse))
+    shares = [view.share for view in densify(given, sparse, dense)]
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)

@@ -51,7 +51,7 @@ def same(one, other):
     )
 
 
-@pytest.mark.parametrize("quality", ["fast", "balanced", "exact"])
+@pytest.mark.parametrize("quality", ["fast", "balanced"])
 @pytest.mark.parametrize("scene", SCENES)
 def test_in_the_end_the_pixels_are_those_of_making_views_at_once(monkeypatch, scene, quality):
     photo, disparity = SCENES[scene]()
@@ -66,16 +66,15 @@ def test_in_the_end_the_pixels_are_those_of_making_views_at_once(monkeypatch, sc
     assert all(same(view, at_once[index]) for index, view in in_bands.items())
 
 
-@pytest.mark.parametrize("quality", ["balanced", "exact"])
 @pytest.mark.parametrize("scene", SCENES)
-def test_in_the_end_every_view_is_what_the_final_ray_set_shows(scene, quality):
+def test_in_the_end_every_view_is_what_the_final_ray_set_shows(scene):
     """The slow twin: each view rendered whole, once the ray set is complete."""
     photo, disparity = SCENES[scene]()
     plan = literal_plan(photo, disparity, 5)
-    final = by_index(made(photo, disparity, quality=quality, draft_bytes=PLENTY))
+    final = by_index(made(photo, disparity, quality="balanced", draft_bytes=PLENTY))
     rays, outer = ray_set(photo, disparity, plan)
     assert {tuple(offset) for offset, _ in outer} == {tuple(plan.grid.offset(*index)) for index in OUTER}
-    with ViewSynthesis(transformer=transformer_for(quality), every=quality == "exact") as synthesis:
+    with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
         views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr, tiling.never)
         for index in set(final) - {plan.grid.centre}:
             assert same(final[index], views.make(plan.grid.offset(*index)))
@@ -180,10 +179,8 @@ def test_where_little_may_be_kept_few_views_come_twice(monkeypatch):
     ("quality", "draft_bytes", "twice"),
     [
         ("fast", PLENTY, set()),
-        ("exact", PLENTY, OUTER),
         ("balanced", 0, OUTER),
         ("balanced", None, set()),
-        ("exact", None, set()),
     ],
 )
 def test_who_comes_twice(quality, draft_bytes, twice):
@@ -193,7 +190,7 @@ def test_who_comes_twice(quality, draft_bytes, twice):
     assert max(order.values()) <= 2
 
 
-@pytest.mark.parametrize("quality", ["fast", "balanced", "exact"])
+@pytest.mark.parametrize("quality", ["fast", "balanced"])
 def test_what_leaves_nothing_to_decide_comes_once(quality):
     photo = photo_of(smooth_texture(20, 24))
     for values, grid in ((np.zeros((20, 24)), 3), (np.where(np.arange(24) < 12, 0.0, 2.0) * np.ones((20, 1)), 1)):

@@ -10,6 +10,7 @@ from iibr_core.generation.memory_model import (
     HEADROOM,
     LEAST_PIXELS,
     MIB,
+    PHOTO_BYTES,
     RAY_BYTES,
     STATISTICS_BYTES,
     VIEWER_BYTES,
@@ -171,3 +172,11 @@ def test_a_picture_at_the_photos_own_size_counts_what_it_shows_of_what_is_hidden
     assert VIEWER_BYTES + 28 * 12_000_000 < in_the_middle < aside < 2 * in_the_middle
     assert own_size_bytes(large, view, 10**8, tile, False) == in_the_middle + HEADROOM * 10**8
     assert own_size_bytes(large, view, 0, ImageSize(1300, 1300), True) > aside
+
+
+def test_views_that_are_shown_count_beside_the_viewer_and_the_photo():
+    size, grid = ImageSize(1000, 1000), GridShape(3, 3)
+    needed = VIEWER_BYTES + 10**6 * PHOTO_BYTES + round(HEADROOM * 9 * view_bytes(10**6, is_hdr=False))
+    require_views(Budget(needed, "--memory is"), "a.jpg", size, grid)
+    with pytest.raises(InputError, match="3 x 3 views"):
+        require_views(Budget(needed - 1, "--memory is"), "a.jpg", size, grid)

@@ -5,7 +5,6 @@ import pytest
 
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
 from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.inpainting.background import SURFACE_PX
 from iibr_core.inpainting.beyond_frame import (
     LINES_PX,
     PLACES,
@@ -15,7 +14,6 @@ from iibr_core.inpainting.beyond_frame import (
     _level,
     extend_beyond_frame,
 )
-from iibr_core.inpainting.leaving_surfaces import follow_surfaces
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
@@ -35,7 +33,7 @@ def mean_at(means, level, place):
     return means[k][place] * (k + 1 - level) + means[k + 1][place] * (level - k)
 
 
-def extend_slowly(colors, disparity, margins, farthest):
+def extend_slowly(colors, disparity, margins):
     """The same, pixel by pixel, from the definitions."""
     height, width = disparity.shape
     places = [(0, x) for x in range(width)] + [(y, width - 1) for y in range(1, height)]
@@ -50,17 +48,15 @@ def extend_slowly(colors, disparity, margins, farthest):
     around = np.pad(colors, ((2, 2), (2, 2), (0, 0)), "edge").astype(np.float64)
     grown = np.empty((*margins.around(SIZE), 3))
     surfaces = np.empty(margins.around(SIZE))
-    continued = follow_surfaces(disparity, margins, SURFACE_PX / farthest)
     for row, column in np.ndindex(surfaces.shape):
         y, x = np.clip(row - margins.top, 0, height - 1), np.clip(column - margins.left, 0, width - 1)
         away = np.hypot(row - margins.top - y, column - margins.left - x)
         if not away:
             surfaces[row, column], grown[row, column] = disparity[y, x], colors[y, x]
             continue
-        nearest, place = places.index((y, x)), continued[row, column]
-        y, x = places[place]
+        nearest = places.index((y, x))
         surfaces[row, column] = disparity[y, x]
-        mean = mean_at(means, _level(away), place)
+        mean = mean_at(means, _level(away), nearest)
         v, u = 2 * y - row + margins.top, 2 * x - column + margins.left
         detail = colors[v, u] - np.einsum("ij,ijc->c", kernel, around[v : v + 5, u : u + 5])
         colour = np.maximum(mean + TEXTURE_SHARE * away / (away + TEXTURE_PX) * detail, 0)
@@ -78,23 +74,23 @@ def extend_slowly(colors, disparity, margins, farthest):
 def test_against_the_definitions():
     colors, disparity = noise(*SIZE), noise(*SIZE)[..., 0]
     for found, expected in zip(
-        extend_beyond_frame(colors, disparity, MARGINS, 1.0), extend_slowly(colors, disparity, MARGINS, 1.0)
+        extend_beyond_frame(colors, disparity, MARGINS), extend_slowly(colors, disparity, MARGINS)
     ):
         np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
 def test_the_photo_stands_in_the_middle_to_the_bit_and_no_margins_leave_it_alone():
     colors, disparity = noise(*SIZE), noise(*SIZE)[..., 0]
-    grown, surfaces = extend_beyond_frame(colors, disparity, MARGINS, 1.0)
+    grown, surfaces = extend_beyond_frame(colors, disparity, MARGINS)
     np.testing.assert_array_equal(grown[2:-5, 3:-4], colors)
     np.testing.assert_array_equal(surfaces[2:-5, 3:-4], disparity)
-    assert extend_beyond_frame(colors, disparity, Margins(), 1.0)[0] is colors
+    assert extend_beyond_frame(colors, disparity, Margins())[0] is colors
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 2)], ids=str)
 def test_tiny_photos_of_one_colour_go_on_in_it(size):
     colors = np.full((*size, 3), 0.25, np.float32)
-    grown, _ = extend_beyond_frame(colors, np.zeros(size, np.float32), Margins(7, 1, 2, 3), 1.0)
+    grown, _ = extend_beyond_frame(colors, np.zeros(size, np.float32), Margins(7, 1, 2, 3))
     np.testing.assert_allclose(grown, 0.25, atol=1e-6)
 
 
@@ -102,7 +98,7 @@ def test_a_line_that_leaves_the_frame_goes_on_straight():
     y, x = np.indices((60, 80))
     bar = lambda y, x: np.exp(-(((x - y / 2 - 25) / 3) ** 2))  # noqa: E731
     colors = bar(y, x)[..., None].repeat(3, axis=2).astype(np.float32)
-    grown, _ = extend_beyond_frame(colors, np.zeros((60, 80), np.float32), Margins(12, 12, 12, 12), 1.0)
+    grown, _ = extend_beyond_frame(colors, np.zeros((60, 80), np.float32), Margins(12, 12, 12, 12))
     for row in (4, 80):
         expected = bar(row - 12, np.arange(104) - 12)
         assert abs(int(grown[row, :, 0].argmax()) - int(expected.argmax())) <= 1
@@ -116,7 +112,7 @@ def test_means_widen_with_the_distance():
 
 def test_a_stop_is_heard():
     with pytest.raises(Cancelled):
-        extend_beyond_frame(noise(*SIZE), noise(*SIZE)[..., 0], MARGINS, 1.0, lambda: True)
+        extend_beyond_frame(noise(*SIZE), noise(*SIZE)[..., 0], MARGINS, lambda: True)
 
 
 def test_margins_are_what_the_outer_views_see_on_each_side():

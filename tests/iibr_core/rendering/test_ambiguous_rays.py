@@ -14,6 +14,7 @@ from iibr_core.rendering.ambiguous_rays import (
     INPAINTED,
     LEAST_WEIGHT,
     PLAIN,
+    PROFILE_PX,
     SHARE,
     SOFTNESS,
     UNCOVERED,
@@ -301,3 +302,7 @@ def test_one_hypothesis_leaves_no_room_for_the_plain_one_and_is_refused():
         pytest.raises(ValueError, match="1 hypotheses a ray"),
     ):
         synthesis.render(rays, OFFSET)
+
+
+def test_profiles_are_taken_where_the_shipped_weights_were_trained_with_them():
+    assert PROFILE_PX == (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)

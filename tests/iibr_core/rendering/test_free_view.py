@@ -254,3 +254,13 @@ def test_it_can_be_cancelled():
     views = FreeViews(pixels, inverse_depth, here, [here], lambda: next(answers, True))
     with pytest.raises(Cancelled):
         [views.view(here) for _ in range(60)]
+
+
+@pytest.mark.parametrize(("shown", "is_hidden"), [(1, False), (2, True), (0, True)])
+def test_what_is_made_up_must_lie_clearly_before_what_the_photo_shows(shown, is_hidden):
+    """Images 0 of the photo and 1 of what is made up have the sources 1 and 2; 0 is none."""
+    corners = np.array([[[-1.0, -1.0, 1.2], [2.0, -1.0, 1.2], [2.0, 2.0, 1.2], [-1.0, 2.0, 1.2]]])
+    nearest, source = np.full((SAMPLES, SAMPLES), 1.0, np.float32), np.full((SAMPLES, SAMPLES), shown, np.uint8)
+    for ahead in (0.5, 0.1):
+        free_view._draw_squares(corners, np.ones(1, np.bool_), np.ones(1), 2, 1, ahead, 0, nearest, source)
+        assert (source == (3 if is_hidden or ahead < 0.2 else shown)).all()

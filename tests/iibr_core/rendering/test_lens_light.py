@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from iibr_core.generation.light_field import ray_set
 from iibr_core.rendering import large_views
-from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile, whole
+from iibr_core.rendering.large_views import AROUND_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.rendering.lens_light import LargeLens, LensSample, bring_to, draw_large, mean_of_areas
 from iibr_core.rendering.specks import without_specks
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
@@ -128,3 +128,12 @@ def test_the_mean_of_a_part_counts_the_shares_of_its_border() -> None:
     part = mean_of_areas(light, ImageSize(3, 4), area=(0.5, 1.25, 3.0, 4.0))
     expected = fine[2:14, 5:21].reshape(3, 4, 4, 4, 3).mean((1, 3))
     np.testing.assert_allclose(part, expected, rtol=1e-5)
+
+
+def test_progress_counts_the_pixels_that_are_read_for_a_tile() -> None:
+    told: list[tuple[float, float]] = []
+    with ViewSynthesis() as synthesis:
+        photo = large(20, 1100, front=3.0)
+        draw_large(photo, LargeLens(), whole(photo.size), synthesis, report_progress=lambda *now: told.append(now[:2]))
+    first, second = 20 * (1024 + AROUND_PX + 3), 20 * (1100 - 1024 + AROUND_PX + 3)
+    assert told == [(first, first + second), (first + second, first + second)]

@@ -308,23 +308,3 @@ def test_no_dialog_means_a_prompt(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.prompt == PathPrompt("map"))
     viewer.app.do(ShowPrompt(None), SetFontScale(1.0), ToggleSection("depth"))
     viewer.until_idle()
-
-
-def test_holes_are_filled_another_way_and_depth_edits_stay(viewer: Driver) -> None:
-    viewer.app.do(SetTone(DepthEdits(gamma=1.5), is_finished=True), EndGesture())
-    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
-    preferences = replace(viewer.app.state.preferences, open_sections=("scene",))
-    viewer.app.state = replace(viewer.app.state, preferences=preferences)
-    viewer.until_idle()
-    edited, corner = disparity_of(viewer.app).copy(), viewer.app.scene_view.views_present
-    viewer.press("##holes")
-    viewer.press("patch", "##Combo_00")
-    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
-    viewer.until_idle()
-    scene = viewer.app.state.scene
-    assert scene is not None
-    assert scene.plan is not None
-    assert scene.source.inpaint == "patch"
-    assert any("inpainted by patch" in reason for reason in scene.plan.reasons)
-    assert viewer.app.scene_view.views_present == corner == 9
-    np.testing.assert_array_equal(disparity_of(viewer.app), edited)

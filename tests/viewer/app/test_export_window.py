@@ -112,7 +112,7 @@ def ten_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
         (Paint((0.5, 0.5)), Paint((0.7, 0.5)), EndGesture()),
         (SetTone(DepthEdits(gamma=1.7), is_finished=True),),
         (OpenPath(replace(source, grid=GridShape(5, 5))),),
-        (OpenPath(replace(source, quality="exact")),),
+        (OpenPath(replace(source, quality="fast")),),
         (other_photo(folder),),
     ]
 

@@ -18,7 +18,7 @@ from viewer.model.actions import DoTask
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.state.optics import SetAperture, SetFocus
 from viewer.model.state.tasks import SaveTask
-from viewer.ui.overlays.free_camera import CHIP
+from viewer.ui.overlays.chips import CHIP
 
 
 def seen(viewer: Driver) -> np.ndarray:

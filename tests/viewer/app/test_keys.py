@@ -49,7 +49,7 @@ def test_what_is_typed_too_early_is_no_command() -> None:
     """The palette comes up, and has the keyboard a frame later."""
     keys = Keys(arrows=ViewOffset(1, 0), commands=("Keep this state to compare", "Save the picture…"))
     assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [AskToSave()]
-    assert len(actions_from_keys(keys, replace(STATE, prompt="welcome"))) == 3
+    assert len(actions_from_keys(keys, replace(STATE, prompt="help"))) == 3
 
 
 def test_a_held_key_goes_on_to_the_next_photo_once_the_one_before_is_shown() -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from iibr_core.types import InputError
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, load_preferences, store_preferences
+from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, last_opened, load_preferences, store_preferences
 from viewer.model.actions import PlaceWindow, SetFontScale, SetTheme, ToggleSection
 from viewer.model.lens.limits import FONT_SCALE_LIMITS
 from viewer.model.reducers.lens import APERTURE_OPENED
@@ -39,6 +40,18 @@ def test_what_was_told_once_is_not_told_by_the_next_process(tmp_path: Path) -> N
     again = reduce(load_preferences(state_with(scene_of()), tmp_path), FocusOn((0.0, 0.0), -1.0))
     assert again.optics.aperture_diameter > 0
     assert not again.notices
+
+
+def test_what_was_open_last_is_known_as_long_as_it_is_there(tmp_path: Path) -> None:
+    photo = tmp_path / "photo.png"
+    photo.touch()
+    assert last_opened(tmp_path) is None, "nothing is kept"
+    store_preferences(replace(AppState(), recent=(str(photo), str(tmp_path))), tmp_path)
+    assert last_opened(tmp_path) == str(photo)
+    photo.unlink()
+    assert last_opened(tmp_path) is None, "another one is not what was open last"
+    (tmp_path / RECENT_FILE).write_text('["a\\u0000b"]')
+    assert last_opened(tmp_path) is None
 
 
 def test_nothing_kept_is_no_news(tmp_path: Path) -> None:

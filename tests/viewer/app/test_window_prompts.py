@@ -12,8 +12,17 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.app.window_slot import STEP
-from viewer.model.actions import AskToSave, HidePanel, Notify, OpenPath, SetFontScale, ShowPrompt, StopWork
-from viewer.model.commands import COMMANDS
+from viewer.model.actions import (
+    AskToSave,
+    HidePanel,
+    Notify,
+    OpenPath,
+    SetFontScale,
+    ShowPrompt,
+    StopWork,
+    ToggleSection,
+)
+from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
@@ -205,14 +214,16 @@ def test_notices_go_by_themselves_the_newest_first(viewer: Driver, monkeypatch: 
     viewer.until(lambda app: not app.state.notices)
 
 
-def test_a_photo_without_depth_has_a_button_that_opens_a_map(open_window: Opener, tmp_path: Path) -> None:
+def test_a_map_or_a_model_of_ones_own_is_opened(open_window: Opener, tmp_path: Path) -> None:
     write_image(tmp_path / "alone.png", np.full((64, 96, 3), 100, np.uint8))
     driver = open_window(tmp_path / "alone.png", grid=GridShape(3, 3))
+    driver.app.do(ToggleSection("depth"))
     driver.until_idle()
-    assert not driver.app.state.notices, "the panel says it, and nothing lies over the picture"
-    driver.press("Open a map…##better")
+    driver.press("Open map…")
     driver.until(lambda app: app.state.prompt == PathPrompt("map"))
     driver.send("key", "Escape")
     driver.until(lambda app: app.state.prompt is None)
-    driver.press("Get a model…##better")
+    driver.app.do(BY_NAME["Depth models…"].action(driver.app.state))
     driver.until(lambda app: isinstance(app.state.prompt, ModelsPrompt))
+    driver.press("Choose a file…", "prompt ModelsPrompt")
+    driver.until(lambda app: app.state.prompt == PathPrompt("model"))

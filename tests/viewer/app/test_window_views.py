@@ -9,10 +9,11 @@ import numpy as np
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.display.inspection_view import ROUNDING
-from viewer.model.actions import DismissNotices, ShowPrompt
+from viewer.model.actions import DismissNotices
 from viewer.model.inspection_request import DIFFERENCE_GAIN
 from viewer.model.state.inspection import Compare, KeepState
 from viewer.model.state.optics import MoveEye, SetAperture, SetExposure
+from viewer.ui.overlays.reticle import pointer_text
 
 
 def test_f11_fills_the_screen_and_escape_comes_back_to_where_it_was(viewer: Driver) -> None:
@@ -84,12 +85,30 @@ def shown(viewer: Driver, name: str) -> np.ndarray:
     return np.frombuffer(texture.read(alignment=1), np.uint8).reshape(height, width, -1)[..., :3]
 
 
-def test_help_is_shown_on_the_first_start_and_not_again(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
-    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=GridShape(1, 1))
+def test_the_hint_at_the_pointer_goes_with_the_first_drag_for_ever(
+    open_window: Opener, photo_path: Path, tmp_path: Path
+) -> None:
+    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=GridShape(3, 3))
     first.until_idle()
-    assert first.app.state.prompt == "welcome"
-    first.app.do(ShowPrompt(None))
+    first.send("mousemove", *first.position(0.5, 0.5))
+    first.until(lambda app: app.state.hover is not None)
+    assert words_at_pointer(first) == "Drag to look"
+    assert first.app.state.prompt is None
+    first.send("mousedown", 1, "mousemove", *first.position(0.7, 0.5))
+    first.until(lambda app: app.state.optics.eye.s != 0)
+    first.send("mouseup", 1)
+    first.until(lambda app: app.state.hover is not None)
+    assert "Drag" not in words_at_pointer(first)
     first.close()
-    second = open_window(photo_path, kept_in=tmp_path / "kept", grid=GridShape(1, 1))
+    second = open_window(photo_path, kept_in=tmp_path / "kept", grid=GridShape(3, 3))
     second.until_idle()
-    assert second.app.state.prompt is None
+    second.send("mousemove", *second.position(0.5, 0.5))
+    second.until(lambda app: app.state.hover is not None)
+    assert "Drag" not in words_at_pointer(second)
+
+
+def words_at_pointer(driver: Driver) -> str:
+    state = driver.app.state
+    assert state.scene is not None
+    assert state.hover is not None
+    return pointer_text(state, state.scene, state.hover)

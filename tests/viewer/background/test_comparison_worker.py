@@ -91,7 +91,7 @@ def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: Comp
     assert not middle.entropy.any(), "every ray of the middle view is the photo's own"
 
 
-def test_fast_and_exact_are_the_views_generate_makes(inputs: ComparisonInputs) -> None:
+def test_fast_and_balanced_are_the_views_generate_makes(inputs: ComparisonInputs) -> None:
     loaded, plan = inputs.loaded, inputs.plan
     assert loaded is not None
     assert plan is not None
@@ -99,7 +99,7 @@ def test_fast_and_exact_are_the_views_generate_makes(inputs: ComparisonInputs) -
     pair, scored = ComparisonJob().results_of(InspectionRequest(1, "quality", view, is_scored=True), inputs, never)
     assert isinstance(pair, PairReady)
     disparity = plan.field_disparity(loaded.disparity)
-    for image, quality in ((pair.left, "fast"), (pair.right, "exact")):
+    for image, quality in ((pair.left, "fast"), (pair.right, "balanced")):
         views = generate(loaded.photo, disparity, plan, quality=quality)  # type: ignore[arg-type]
         expected = next(update.colors for update in views if (update.row, update.column) == view)
         np.testing.assert_array_equal(image, expected)

@@ -65,7 +65,7 @@ def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
         write_image_file(folder / "views" / f"v{row}_u{column}.png", np.zeros((6, 40, 3), np.uint8), "uint8")
     last, views = list(showings(results_of(SceneRequest(1, Source(str(folder))), lambda: False, lambda: CENTRE)))[-1]
     assert not last.scene.has_view_disparity
-    assert any("too small" in note for note in last.scene.notes)
+    assert any("too small" in note for note in last.scene.problems)
     assert len(views) == 6
 
 

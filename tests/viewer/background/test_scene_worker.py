@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
+from iibr_core.runtime import compiling
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanford, write_stereo_pair
@@ -27,6 +28,7 @@ from viewer.background.scene_worker import (
     SceneWork,
     SceneWorker,
     ViewReady,
+    _telling_compiling,
     results_of,
     sketch_of,
 )
@@ -461,3 +463,18 @@ def test_a_photo_that_is_left_keeps_its_map_and_nothing_of_its_strokes(photo_pat
     assert left.canvas is not loaded.canvas
     np.testing.assert_array_equal(left.disparity.values, loaded.disparity.values)
     np.testing.assert_array_equal(left.canvas.apply(edits), painted)
+
+
+def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the views go on being counted, and can be stopped."""
+    monkeypatch.setattr(compiling, "_first_run", compiling._FirstRun())
+    told: list[Progress] = []
+
+    def results() -> Iterator[ViewReady]:
+        compiling.note_kernel(came_along=False)
+        yield ViewReady(0, VIEW, Progress(3, 9))
+        compiling.note_kernel(came_along=False)
+
+    assert len(list(_telling_compiling(results(), told.append))) == 1
+    assert [(progress.done, progress.total) for progress in told] == [(0, 0), (3, 9)]
+    assert all(progress.doing.startswith(compiling.COMPILING) for progress in told)

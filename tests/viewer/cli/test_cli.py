@@ -64,13 +64,40 @@ def test_help_keeps_the_brackets_of_tables(
     assert "[surface] and [light]" in " ".join(capsys.readouterr().out.replace("│", " ").split())
 
 
-@pytest.mark.parametrize("words", [[], ["-h"], ["plan", "-h"]])
-def test_help_comes_without_asking_and_by_its_short_name(
+@pytest.mark.parametrize("words", [["-h"], ["plan", "-h"]])
+def test_help_comes_by_its_short_name(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]
 ) -> None:
     assert run(monkeypatch, *words) == 0
     shown = capsys.readouterr()
     assert ("Usage: " in shown.out, shown.err) == (True, "")
+
+
+def test_without_a_display_help_comes_without_asking_and_one_line_says_why() -> None:
+    done = run_apart("viewer")
+    assert ("Usage: " in done.stdout, done.returncode) == (True, 0)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("note: no window can be opened")
+
+
+def test_help_lists_commands_in_the_order_in_which_people_use_them() -> None:
+    words = [line.split()[1] for line in run_apart("viewer", "-h").stdout.splitlines() if re.match(r"│ [a-z]+ ", line)]
+    assert (words[:3], words[-2:]) == (["view", "export", "screenshot"], ["evaluate", "train"])
+    assert {"generate", "depth", "batch", "plan", "demo", "models"} == set(words[3:-2])
+
+
+@pytest.mark.parametrize("name", ["scene.png", "missing.png", "missing/photo", "."])
+def test_a_path_in_place_of_a_command_is_viewed(photo_path: Path, name: str) -> None:
+    """Here as far as the window that cannot be opened, or the file that is not there."""
+    alone, viewed = (run_apart("viewer", *words, name, cwd=photo_path.parent) for words in ((), ("view",)))
+    assert (alone.returncode, alone.stderr) == (viewed.returncode, viewed.stderr)
+    assert "no such file" in alone.stderr if "missing" in name else "no window can be opened" in alone.stderr
+
+
+def test_a_command_goes_before_a_file_of_its_name_and_a_typo_is_no_path(photo_path: Path) -> None:
+    (photo_path.parent / "plan").write_text("a file")
+    assert "argument 'photo'" in run_apart("viewer", "plan", cwd=photo_path.parent).stderr
+    assert "Did you mean 'view'" in run_apart("viewer", "veiw", cwd=photo_path.parent).stderr
 
 
 def test_a_shell_completes_commands() -> None:
@@ -146,14 +173,11 @@ def trained(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 def test_quality_says_where_the_transformer_runs(
     monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, trained: Path
 ) -> None:
-    """Made with generate and seen in a screenshot alike: the more rays it weighs, the more pixels it changes."""
+    """Made with generate and seen in a screenshot alike: it changes pixels, of contested rays only."""
     from iibr_core.formats.images.photo import read_photo
 
-    disparity = photo_path.with_name("scene_disparity.npy")
-    slope = 0.5 * np.abs(np.arange(WIDTH) % 24 - 12)
-    np.save(disparity, np.load(disparity) + slope)  # enough for hypotheses to differ, too little to be ambiguous
     made, shown = {}, {}
-    for quality in ("fast", "balanced", "exact"):
+    for quality in ("fast", "balanced"):
         out, image = tmp_path / quality, tmp_path / f"{quality}.png"
         assert run(monkeypatch, "generate", photo_path, "--grid", 3, "--out", out, "--quality", quality) == 0
         made[quality] = read_photo(out / "input_Cam000.png").pixels
@@ -161,8 +185,8 @@ def test_quality_says_where_the_transformer_runs(
         assert run(monkeypatch, "screenshot", photo_path, *words) == 0
         shown[quality] = read_photo(image).pixels
     for pictures in (made, shown):
-        balanced, exact = ((pictures[name] != pictures["fast"]).any(axis=2).mean() for name in ("balanced", "exact"))
-        assert 0 < balanced < exact
+        changed = (pictures["balanced"] != pictures["fast"]).any(axis=2)
+        assert 0 < changed.mean() < 0.5
 
 
 def test_inpaint_says_what_fills_the_holes(monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def test_viewing_needs_no_extra(tmp_path: Path, words: tuple[object, ...]) -> No
             ("batch", "{dir}", "--to", "depth", "-o", "{dir}/out", "--scheduler", "tcp://127.0.0.1:1"),
             "pip install 'iibr[batch]'",
         ),
-        (("plan", "{photo}", "--depth-model", "depth-anything-v2-base"), "pip install 'iibr[depth]'"),
+        (("plan", "{photo}", "--depth-model", "depth-pro"), "pip install 'iibr[depth]'"),
     ],
     ids=["train", "evaluate", "batch", "depth model"],
 )

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 import typer
 
-from iibr_core.depth.models.catalog import KNOWN_MODELS, known_model
-from iibr_core.depth.models.download import VERIFIED, require_unchanged
+from iibr_core.depth.estimators.catalog import KNOWN_MODELS, known_model
+from iibr_core.depth.estimators.download import VERIFIED, require_unchanged
 from iibr_core.types import GridShape, InputError
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import write_scene
@@ -30,7 +30,7 @@ def run_models(
     home: Path, *words: str, typed: str = "", endpoint: str = "http://127.0.0.1:9"
 ) -> subprocess.CompletedProcess[str]:
     """In a process of its own: the hub library reads its address once. Nobody listens at the usual one."""
-    environment = {**os.environ, "HF_ENDPOINT": endpoint, "HF_HOME": str(home)}
+    environment = {**os.environ, "HF_ENDPOINT": endpoint, "HF_HOME": str(home), "XDG_CACHE_HOME": str(home)}
     return subprocess.run(
         [sys.executable, "-P", "-m", "viewer", "models", *words],
         env=environment,
@@ -44,13 +44,18 @@ def run_models(
 def test_the_list_names_every_model_with_size_and_licence(tmp_path: Path) -> None:
     done = run_models(tmp_path)
     assert done.returncode == 0
-    lines = done.stdout.splitlines()
-    for model, line in zip(KNOWN_MODELS, lines):
+    *lines, last = done.stdout.splitlines()
+    for model, line in zip(KNOWN_MODELS, (line for line in lines if not line.startswith(" ")), strict=True):
         assert line.startswith(model.name + " ")
         assert f"{model.megabytes:,} MB" in line
         assert model.licence in line
         assert "not here" in line
-    assert "iibr models get" in lines[-1]
+        assert "s a photo" not in line
+        below = lines[lines.index(line) + 1].strip()
+        assert below.startswith(f"Good for {model.good_for}.")
+        assert ("Recommended." in below) == model.is_recommended
+    assert "Needs the package depth_anything_3 first: pip install depth-anything-3." in done.stdout
+    assert "iibr models get" in last
 
 
 def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:

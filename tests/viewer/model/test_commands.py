@@ -7,16 +7,14 @@ from dataclasses import replace
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.types import ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.cli.demo import demo_photo
 from viewer.model.actions import AskToSave
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
+from viewer.model.demo import demo_photo
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import AskToExport, ExportPrompt
-from viewer.model.state.optics import MoveEye
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
 from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ChooseTask
@@ -56,9 +54,8 @@ def test_what_the_commands_bring_up() -> None:
     helped = reduce(state, BY_NAME["Mouse and keys"].action(state))
     assert helped.prompt == "help"
     assert reduce(helped, BY_NAME["Mouse and keys"].action(helped)).prompt is None
-    welcomed = replace(state, prompt="welcome")
-    assert reduce(welcomed, MoveEye(ViewOffset(0, 1))).prompt is None
-    assert reduce(welcomed, BY_NAME["Mouse and keys"].action(welcomed)).prompt == "help"
+    shown = reduce(AppState(), BY_NAME["See the demo"].action(AppState()))
+    assert (shown.source, shown.awaits_touch) == (Source(str(demo_photo())), True)
     listed = reduce(state, BY_NAME["All commands"].action(state))
     assert listed.prompt == PalettePrompt()
     assert reduce(AppState(), BY_NAME["Save the picture…"].action(AppState())).prompt is None

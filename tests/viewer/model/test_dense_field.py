@@ -6,16 +6,19 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.generation.dense_field import require_steps
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.actions import OpenPath
+from viewer.model.actions import DoTask, OpenPath
 from viewer.model.commands import COMMANDS
 from viewer.model.dense_field import MOST_ACROSS, chosen_grid, denser_grids, next_denser, with_views_between
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.filling import FilledField, FillTask, ViewsFilled
+from viewer.model.state.jobs import STOPPING, JobProgress
 from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Progress, Scene, Source, source_beside
+from viewer.model.state.scene import Scene, Source, source_beside
 
 GIVEN, DENSE = GridShape(3, 3), GridShape(5, 5)
 FIELD = Scene(Source("field"), "field", 60, 40, GIVEN, (-2.0, 3.0), "light field", given_grid=GIVEN)
@@ -29,21 +32,55 @@ def test_all_grids_that_are_offered_have_places_for_the_given_views(given: GridS
         assert max(grid) <= MOST_ACROSS
 
 
+def filling(source: Source, doing: str = "") -> JobProgress:
+    return JobProgress(1, "fill", "field", doing, fills=source)
+
+
 def test_the_grid_that_was_chosen_is_shown_before_its_views_are_there() -> None:
-    assert chosen_grid(FIELD, with_views_between(FIELD, DENSE)) == DENSE
-    filled = replace(FIELD, grid=DENSE, source=replace(FIELD.source, filled_grid=DENSE))
-    assert chosen_grid(filled, with_views_between(filled, GIVEN)) == GIVEN
+    filled = replace(FIELD, grid=DENSE, source=with_views_between(FIELD, DENSE))
+    denser = with_views_between(FIELD, GridShape(9, 9))
+    assert chosen_grid(FIELD, FIELD.source, [filling(filled.source), filling(denser)]) == (9, 9)
+    assert chosen_grid(FIELD, FIELD.source, [filling(denser, STOPPING)]) == GIVEN
+    assert chosen_grid(FIELD, FIELD.source, [filling(replace(denser, path="other"))]) == GIVEN
+    assert chosen_grid(filled, with_views_between(filled, GIVEN), []) == GIVEN
     for asked in (None, Source("other.png")):
-        assert chosen_grid(filled, asked) == DENSE
+        assert chosen_grid(filled, asked, []) == DENSE
 
 
-@pytest.mark.parametrize(("done", "is_told"), [(3, True), (25, False)])
-def test_leaving_a_field_before_its_views_are_filled_in_is_told(done: int, is_told: bool) -> None:
-    filled = with_views_between(FIELD, DENSE)
-    state = AppState(source=filled, scene=replace(FIELD, source=filled), progress=Progress(done, 25))
-    opened = reduce(state, OpenPath(Source("other.png")))
-    assert [notice.stays for notice in opened.notices] == [True] * is_told
-    assert not reduce(state, OpenPath(with_views_between(FIELD, GIVEN))).notices, "it is still open"
+def filled_field() -> FilledField:
+    return FilledField(replace(FIELD, grid=DENSE, source=with_views_between(FIELD, DENSE)), ())
+
+
+def test_views_between_are_shown_where_their_field_is_open() -> None:
+    state = reduce(AppState(source=FIELD.source, scene=FIELD, generation=3), ViewsFilled(filled_field()))
+    assert (state.source, state.generation, state.notices) == (Source("field", filled_grid=DENSE), 4, ())
+
+
+@pytest.mark.parametrize(
+    "open_now", [None, Source("other.png"), replace(FIELD.source, depth=DepthChoice(file="a.pfm"))]
+)
+def test_views_between_are_told_elsewhere_and_found_by_who_goes_back(open_now: Source | None) -> None:
+    state = reduce(AppState(source=open_now), ViewsFilled(filled_field()))
+    assert (state.source, state.generation) == (open_now, 0)
+    assert [notice.stays for notice in state.notices] == [True]
+    state = reduce(reduce(state, OpenPath(Source("other.png"))), OpenPath(FIELD.source))
+    assert state.source == Source("field", filled_grid=DENSE)
+    assert state.filled is not None
+    assert state.filled.is_of(state.source)
+    assert reduce(state, OpenPath(FIELD.source)).source == FIELD.source, "who is there already asks for those on disk"
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Source("field2", filled_grid=DENSE),
+        Source("field"),
+        Source("field", filled_grid=DENSE, inpaint="diffusion:folder"),
+        Source("field", filled_grid=DENSE, depth=DepthChoice(file="a.pfm")),
+    ],
+)
+def test_views_between_are_of_one_field_and_one_way_to_make_them(other: Source) -> None:
+    assert not filled_field().is_of(other)
 
 
 def test_nothing_lies_between_one_view_or_very_many() -> None:
@@ -66,7 +103,7 @@ def test_the_command_tells_where_nothing_lies_between() -> None:
         told = command.action(AppState(scene=scene))
         assert "no more views" in told.notice.text  # type: ignore[union-attr]
     opened = command.action(AppState(scene=FIELD))
-    assert opened.source == next_denser(FIELD)  # type: ignore[union-attr]
+    assert opened == DoTask(FillTask(Source("field", filled_grid=DENSE)))
 
 
 def test_the_picture_stays_when_views_between_are_there() -> None:

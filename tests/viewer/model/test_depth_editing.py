@@ -49,6 +49,7 @@ from viewer.model.state.depth_editing import (
     SetRefine,
     SetTone,
 )
+from viewer.model.state.model_download import UseModel
 from viewer.model.state.optics import MoveEye, SetFocus
 from viewer.model.state.prompts import PathPrompt, SavePrompt
 from viewer.model.state.scene import Source
@@ -228,9 +229,7 @@ def test_a_map_is_for_the_photo_that_is_open() -> None:
     wanted = replace(DECIDED, depth=depth, focus_disparity=None)
     assert action_for_path("map", "b.pfm", opened(DECIDED)) == OpenPath(wanted)
     assert actions_from_drop(["b.pfm"], opened(DECIDED)) == [OpenPath(wanted)]
-    model = action_for_path("model", "/m", opened(DECIDED))
-    assert isinstance(model, OpenPath)
-    assert model.source.depth == DepthChoice("model", model="/m", refine=0.25)
+    assert action_for_path("model", "/m", opened(DECIDED)) == UseModel("/m")
 
 
 def pointer_at(share_x: float, share_y: float, **more: object) -> tuple[Pointer, object]:

@@ -167,7 +167,7 @@ def test_the_place_pointed_at_last_stays_and_what_was_found_there_goes() -> None
 
 
 def test_every_kind_has_a_command_that_also_takes_it_away() -> None:
-    for name in (*(f"Overlay: {kind}" for kind in OVERLAYS), "Compare photo and picture", "Compare fast and exact"):
+    for name in (*(f"Overlay: {kind}" for kind in OVERLAYS), "Compare photo and picture", "Compare fast and balanced"):
         state = after(OPEN, BY_NAME[name].action(OPEN))
         assert state.inspection != OPEN.inspection
         assert after(state, BY_NAME[name].action(state)).inspection == OPEN.inspection

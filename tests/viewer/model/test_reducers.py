@@ -25,7 +25,6 @@ from viewer.model.actions import (
     SessionsKept,
     SetDepthStrength,
     SetHover,
-    SetInpainter,
     SetTheme,
     StopWork,
     TakeSettings,
@@ -266,10 +265,8 @@ def test_undone_edits_are_lost_as_little_as_others() -> None:
     assert reduce(reduce(half, SessionsKept(True)), Quit()).should_quit, "it opens as it is left"
 
 
-def test_the_first_help_stays_while_a_folder_opens_its_first_photo() -> None:
-    welcomed = replace(AppState(), prompt="welcome")
-    assert reduce(welcomed, OpenPath(Source("photo.png"))).prompt == "welcome"
-    assert reduce(replace(welcomed, prompt="help"), OpenPath(Source("photo.png"))).prompt is None
+def test_what_is_opened_closes_the_help() -> None:
+    assert reduce(replace(AppState(), prompt="help"), OpenPath(Source("photo.png"))).prompt is None
 
 
 def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> None:
@@ -332,8 +329,10 @@ def test_a_sketch_opens_the_photo_and_the_whole_photo_goes_on_with_it() -> None:
     state = reduce(state_with(None), SceneOpened(1, sketch))
     assert state.progress.doing.startswith("reading")
     state = reduce(replace(state, source=SOURCE), FocusOn((0.0, 0.0), 1.0))
-    whole = reduce(state, SceneOpened(1, scene_of(source=SOURCE, notes=("Made smaller.",))))
-    assert whole.notices == (*state.notices, Notice("Made smaller."))
+    whole = reduce(
+        state, SceneOpened(1, scene_of(source=SOURCE, notes=("A map is damaged.",), problems=("A map is damaged.",)))
+    )
+    assert whole.notices == (*state.notices, Notice("A map is damaged."))
     assert whole.history.past == state.history.past != ()
     assert whole.has_chosen_focus
     stopped = reduce(state, StopWork())
@@ -403,7 +402,6 @@ def test_reset_brings_the_first_optics_back() -> None:
         (MoveEye(ViewOffset(math.nan, 0.0)), False, False),
         (SetDepthStrength(2.0, is_finished=False), False, False),
         (SetDepthStrength(2.0, is_finished=True), False, True),
-        (SetInpainter("patch"), False, False),
         (OpenPath(Source("other.png")), False, True),
         (ProgressMade(1, Progress(3, 81, 0.1)), False, False),
         (Notify(Notice("hello")), False, False),
@@ -426,11 +424,14 @@ def test_opening_shows_what_is_read_and_keeps_the_old_scene_until_then() -> None
     assert "other.png" in after.progress.doing
 
 
-def test_a_new_scene_starts_with_fresh_optics_and_its_notes() -> None:
+def test_a_new_scene_starts_with_fresh_optics_and_tells_only_what_failed_and_what_a_button_helps_with() -> None:
     state = reduce(reduce(state_with(scene_of()), SetAperture(2)), OpenPath(Source("other.png")))
-    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source, notes=("Made smaller.",))))
+    notes = ("Made smaller.", "A map is damaged.", "No depth. Give a map with --disparity FILE, or put one beside.")
+    scene = scene_of(source=state.source, notes=notes, problems=notes[1:2])
+    state = reduce(state, SceneOpened(state.generation, scene))
     assert state.optics == Optics()
-    assert state.notices == (Notice("Made smaller."),)
+    assert [notice.text[:8] for notice in state.notices] == ["A map is", "No depth"]
+    assert scene.further_notes == notes, "the rest stands in its section"
 
 
 def test_the_same_file_opened_again_is_a_new_scene() -> None:
@@ -502,17 +503,3 @@ def test_notices_are_kept_once_bounded_and_dismissable() -> None:
     assert [notice.text for notice in state.notices] == [str(i) for i in range(3, NOTICES_KEPT + 3)]
     state = reduce(state, DismissNotice(Notice("5")))
     assert [notice.text for notice in state.notices] == ["3", "4", "6", "7"]
-
-
-def test_another_inpainter_makes_the_open_photos_views_anew() -> None:
-    photo = state_with(scene_of(plan=plan_of(GridShape(9, 9))))
-    asked = reduce(photo, SetInpainter("patch"))
-    assert asked.generation == photo.generation + 1
-    assert asked.source is not None
-    assert asked.scene is not None
-    assert asked.source.inpaint == "patch"
-    assert asked.scene.source is asked.source, "it is the same photo, with its depth as it was edited"
-    assert reduce(asked, SetInpainter("patch")) is asked
-    opening = replace(photo, source=Source("other.png"))
-    for unchanged in (state_with(None), state_with(scene_of()), opening):
-        assert reduce(unchanged, SetInpainter("patch")) == unchanged

@@ -59,7 +59,7 @@ sources = st.builds(
     st.builds(DepthChoice, file_scale=numbers, refine=st.floats(0, 1)),
     st.none() | st.builds(GridShape, st.integers(1, 99), st.integers(1, 99)),
     st.none() | numbers,
-    quality=st.sampled_from(("fast", "balanced", "exact")),
+    quality=st.sampled_from(("fast", "balanced")),
 )
 settings = st.builds(SavedSettings, optics, numbers, sources, st.tuples(st.integers(1, 9999), st.integers(1, 9999)))
 ONE = SavedSettings(Optics(eye=ViewOffset(1, 2)), 1.5, Source("", grid=GridShape(3, 5)), (60, 40))
@@ -95,6 +95,10 @@ def changed(**changes: Any) -> str:
             target = target[key]
         target[last] = value
     return json.dumps(whole)
+
+
+def test_the_quality_that_was_dropped_is_read_as_balanced() -> None:
+    assert settings_from_text(changed(source__quality="exact"), "a.png").source.quality == "balanced"
 
 
 SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 1.0}

@@ -12,15 +12,16 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.inpainting.registry import INPAINTERS
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.background.model_download import list_models
 from viewer.model.actions import SetFontScale, SetUnits, ShowPrompt
 from viewer.model.layout import PANEL_WIDTH, ScreenSize
+from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.exporting import ANIMATIONS, ExportPrompt
 from viewer.model.state.jobs import JobProgress
+from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.optics import (
     APERTURE_KINDS,
     ApertureShape,
@@ -33,7 +34,6 @@ from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS
 from viewer.ui.sections.depth import START_TIPS, START_WORDS
-from viewer.ui.sections.scene import INPAINTER_TIPS
 from viewer.ui.style import Color, Look, apply_style, palette_of
 from viewer.ui.widgets import GRIP_HEIGHT
 
@@ -138,19 +138,20 @@ def test_the_grip_of_a_slider_lies_below_its_value(viewer: HeadlessViewer, items
 
 PROMPTS: dict[str, Prompt] = {
     "help": "help",
-    "welcome": "welcome",
     "quit": "quit",
     "quit while busy": "quit",
     "palette": PalettePrompt(),
     "save": SavePrompt("a.jpg", ScreenSize(48, 32), problem="There is no such folder: choose another one, or make it."),
     "path": PathPrompt("photo"),
     "export": ExportPrompt("mp4", "a.mp4"),
-    "models": list_models(),
+    "models": ModelsPrompt(),
 }
+WELCOME = "welcome"
+"""No prompt, but alike: what an empty window says."""
 
 
 @pytest.mark.parametrize("scale", [0.6, 1.0, 2.0])
-@pytest.mark.parametrize("name", PROMPTS)
+@pytest.mark.parametrize("name", [*PROMPTS, WELCOME])
 def test_prompts_fit_the_window_and_their_words_fit_them(
     viewer: HeadlessViewer, items: list[Item], monkeypatch: pytest.MonkeyPatch, name: str, scale: float
 ) -> None:
@@ -159,7 +160,7 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
 
     def note_and_end() -> None:
         corner, size = imgui.get_window_pos(), imgui.get_window_size()
-        if imgui.internal.get_current_window_read().name.startswith("prompt"):
+        if imgui.internal.get_current_window_read().name.startswith(("prompt", WELCOME)):
             ended.append((corner.x, corner.y, corner.x + size.x, corner.y + size.y, imgui.get_scroll_max_x()))
         end()
 
@@ -168,7 +169,9 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
         jobs = JobProgress(1, "export", "a.mp4", "drawing frames", 0.5), JobProgress(2, "picture", "b.png")
         edited = DepthSettings(edits=DepthEdits(gamma=1.5))
         viewer.state = replace(viewer.state, jobs=jobs, depth=edited)
-    viewer.do(SetFontScale(scale), ShowPrompt(PROMPTS[name]))
+    if name == WELCOME:
+        viewer.state = AppState()
+    viewer.do(SetFontScale(scale), list_models(), ShowPrompt(PROMPTS.get(name)))
     viewer.screen(WINDOW)
     left, top, right, bottom, hidden = ended[-1]
     assert (left >= 0, top >= 0, right <= WINDOW.width, bottom <= WINDOW.height) == (True,) * 4, ended[-1]
@@ -230,5 +233,4 @@ def test_an_entry_under_the_pointer_stands_out_from_its_list(theme: Theme) -> No
 
 def test_every_entry_of_a_list_says_what_it_means() -> None:
     assert set(START_TIPS) == set(START_WORDS)
-    assert set(INPAINTER_TIPS) == set(INPAINTERS)
     assert set(MOTION_TIPS) == set(ANIMATIONS)

@@ -51,8 +51,7 @@ def test_a_picture_is_final_only_with_all_views_as_they_stay() -> None:
     [
         ("fast", True, "60 × 40 px, 3 × 9 views, fast"),
         ("balanced", True, "60 × 40 px, 3 × 9 views"),
-        ("exact", True, "60 × 40 px, 3 × 9 views, exact"),
-        ("exact", False, "60 × 40 px, 3 × 9 views"),
+        ("fast", False, "60 × 40 px, 3 × 9 views"),
     ],
 )
 def test_quality_is_told_where_views_are_made_and_not_plain(quality: Quality, is_made: bool, words: str) -> None:

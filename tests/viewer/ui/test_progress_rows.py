@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.types import GridShape
-from viewer.model.actions import DoTask, StopWork
+from viewer.model.actions import DoTask
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WRITING, CancelJobTask, JobProgress
-from viewer.model.state.model_download import CancelGetTask, Downloading
-from viewer.model.state.scene import Progress, Source
+from viewer.model.state.model_download import CancelGetTask, DepthModels, Downloading
+from viewer.model.state.scene import Source
 from viewer.ui.overlays.progress_rows import progress_rows
-
-FILLING = AppState(source=Source("field", filled_grid=GridShape(9, 9)), progress=Progress(20, 81, 4.0), generation=1)
 
 
 def test_each_job_has_a_row_and_a_cancel_of_its_own() -> None:
@@ -25,19 +23,14 @@ def test_each_job_has_a_row_and_a_cancel_of_its_own() -> None:
         assert row.cancel is None
 
 
-def test_views_between_those_on_disk_are_seen_while_they_are_made() -> None:
-    (row,) = progress_rows(FILLING)
-    assert row.cancel == StopWork()
-    assert row.done == FILLING.progress.share
-    for over in (
-        replace(FILLING, progress=Progress(81, 81, 9.0)),
-        replace(FILLING, stopped=1),
-        replace(FILLING, source=Source("photo.png")),
-    ):
-        assert not progress_rows(over)
+def test_filling_between_views_has_such_a_row_too() -> None:
+    filling = JobProgress(3, "fill", "field", "making views", 0.25, 8.0, Source("field", filled_grid=GridShape(9, 9)))
+    (row,) = progress_rows(AppState(jobs=(filling,)))
+    assert (row.name, row.words) == ("Filling between the views of field", "making views, 25 %, about 8 s left")
+    assert row.cancel == DoTask(CancelJobTask(3))
 
 
 def test_a_download_has_the_same_row() -> None:
-    (row,) = progress_rows(AppState(downloading=Downloading("A model", 25, 100)))
+    (row,) = progress_rows(AppState(models=DepthModels(downloading=Downloading("A model", 25, 100))))
     assert (row.name, row.words, row.done) == ("Downloading A model", "25 of 100 MB", 0.25)
     assert row.cancel == DoTask(CancelGetTask())

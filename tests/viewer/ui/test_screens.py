@@ -84,7 +84,6 @@ def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section
 @pytest.mark.parametrize(
     "action",
     [
-        ShowPrompt("welcome"),
         ShowPrompt(PalettePrompt("mo")),
         AskToSave(),
         AskForPath("photo"),
@@ -175,6 +174,17 @@ def test_what_is_under_way_in_words() -> None:
     assert job_text(replace(drawing, left_s=8.0)) == "drawing, 23 %, about 8 s left"
     assert job_text(replace(drawing, doing=WRITING, done=1.0)) == "writing the file"
     assert job_text(JobProgress(2, "export", "a.mp4")) == "waiting for its turn"
+
+
+def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: HeadlessViewer) -> None:
+    preferences = replace(viewer.state.preferences, open_sections=("scene",))
+    viewer.state = replace(viewer.state, preferences=preferences)
+    before = viewer.screen(SIZE).astype(int)
+    assert viewer.state.scene is not None
+    viewer.state = replace(viewer.state, scene=replace(viewer.state.scene, notes=("7.3 % of the map is unknown.",)))
+    changed = np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24
+    assert in_panel(changed).sum() > ENOUGH_PIXELS
+    assert not changed[:, : -int(PANEL_WIDTH)].any()
 
 
 def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(

@@ -9,7 +9,7 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from iibr_core.formats.outputs import remove_leftovers
+from iibr_core.formats.unfinished import remove_leftovers
 from iibr_core.runtime.machine import (
     LEAST_USUAL_BYTES,
     MOST_USUAL_SHARE,

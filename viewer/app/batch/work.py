@@ -42,7 +42,7 @@ def export_photo(task: PhotoTask) -> Outcome:
 
 def _export(task: PhotoTask) -> Path:
     """Raises InputError."""
-    from iibr_core.formats.outputs import AlreadyThereError, make_folder, require_no_link
+    from iibr_core.formats.outputs import AlreadyThereError, make_folder, release_place, require_no_link
     from viewer.app.exports.registry import export_path, require_export_place, writer_of
     from viewer.app.save_places import inputs_of
 
@@ -63,6 +63,8 @@ def _export(task: PhotoTask) -> Path:
     except AlreadyThereError:  # somebody put it there meanwhile
         place.claim.unlink(missing_ok=True)
         raise
+    finally:
+        release_place(target)
     if not place.claim.exists():  # whoever waited for this photo has gone
         _claim(task, target)
     return target
@@ -110,7 +112,8 @@ def _settle_on_disk(output: Path) -> None:
 
 def _sync(path: Path) -> None:
     with suppress(OSError):  # a system that syncs no folders
-        descriptor = os.open(path, os.O_RDONLY)
+        # Windows syncs only what may be written; elsewhere no folder may be.
+        descriptor = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
         try:
             os.fsync(descriptor)
         finally:

@@ -40,7 +40,7 @@ QUALITY_LEVELS = (
     QualityLevel(3, 1, 0.5),
     QualityLevel(4, 1, 0.35),
 )
-"""From the best picture to the quickest. Fewer pixels show less than fewer samples: see docs/optics.md."""
+"""From the best picture to the quickest. Fewer pixels show less than fewer samples: see docs/speed.md, Drawing."""
 
 PICTURE_FETCHES, LAYERS_FETCHES = 4.0, 8.0
 PINHOLE_FETCHES, SOURCE_FETCHES = 4.0, 5.0

@@ -17,6 +17,11 @@ PORTRAIT_RANGE = 0.06
 """Of all the disparity there is: a face is sharp from nose to ear."""
 
 
+def first_aperture(scene: Scene) -> float:
+    """In view steps: what focusing opens a pinhole to; 0 where there is one view."""
+    return FIRST_APERTURE * aperture_limit(scene.grid)
+
+
 def preset_optics(name: PresetName, optics: Optics, scene: Scene, has_chosen_focus: bool) -> Optics:
     """The optics for this purpose; viewpoint, dolly, exposure and highlights stay as they are.
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from math import hypot
 
 from iibr_core.rendering.gloss.settings import MOST_POINTS, Gloss, GlossStroke
 from iibr_core.types import ViewOffset
+from viewer.model.actions import SamePlaces
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
 from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, has_sound_gloss, is_finite
-from viewer.model.lens.presets import FIRST_APERTURE, preset_optics
+from viewer.model.lens.presets import first_aperture, preset_optics
 from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState, TiltHandles
 from viewer.model.state.notices import Notice
@@ -37,6 +39,8 @@ from viewer.model.state.scene import Scene, Source
 
 POINT_SPACING = 1 / 6
 """Of the radius: a stroke of the gloss brush is remembered by places this far apart."""
+SHARP_SHARE = 0.05
+"""Of the range of disparity: a place as near to the focus was made sharp by the click on it."""
 APERTURE_OPENED = "Focusing opened the aperture a little: what is nearer or farther blurs. Its slider sets how much."
 
 
@@ -55,25 +59,31 @@ def reduce_lens(state: AppState, action: LensAction) -> AppState:
 
 
 def _note_choice(state: AppState, action: LensAction) -> AppState:
-    """Remember what the user has decided about focus and aperture. Where the tilt goes, its handles do too."""
+    """Remember what the user has decided about focus and aperture, and that the viewpoint can be moved. Where the tilt
+    goes, its handles do too.
+    """
     match action:
-        case FocusOn() | SetFocus():
-            return replace(state, has_chosen_focus=True)
+        case FocusOn(place):
+            return replace(state, has_chosen_focus=True, focused_at=place)
+        case SetFocus():
+            return replace(state, has_chosen_focus=True, focused_at=None)
         case SetAperture():
             return replace(state, has_chosen_aperture=True)
         case ApplyPreset():
             return replace(state, has_chosen_aperture=True, has_chosen_focus=False, tilt_handles=None)
         case ResetOptics():
             return replace(state, has_chosen_aperture=False, has_chosen_focus=False, tilt_handles=None)
+        case MoveEye() if not state.preferences.told_drag:
+            return replace(state, preferences=replace(state.preferences, told_drag=True))
     return state
 
 
 def _open_for_focus(state: AppState, scene: Scene) -> AppState:
     """A pinhole shows everything sharp: the first focusing opens it a little, unless the user chose it."""
-    widest = aperture_limit(scene.grid)
-    if state.has_chosen_aperture or state.optics.aperture_diameter > 0 or widest == 0:
+    diameter = first_aperture(scene)
+    if state.has_chosen_aperture or state.optics.aperture_diameter > 0 or diameter == 0:
         return state
-    opened = replace(state, optics=replace(state.optics, aperture_diameter=FIRST_APERTURE * widest))
+    opened = replace(state, optics=replace(state.optics, aperture_diameter=diameter))
     if state.preferences.told_aperture:
         return opened
     return add_notice(_tell_aperture(opened, True), Notice(APERTURE_OPENED))
@@ -174,6 +184,39 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
         focus_tilt=(optics.focus_tilt[0] * ratio, optics.focus_tilt[1] * ratio),
         aperture_diameter=aperture,
     )
+
+
+def carry_to_depth(
+    optics: Optics, old: Scene, new: Scene, same: SamePlaces, focused_at: tuple[float, float] | None
+) -> Optics:
+    """The optics that show a photo whose depth was found anew as it was seen before: what was sharp stays sharp."""
+    carried = carry_optics(optics, old, new)
+    (first, first_now), (last, last_now) = same.pairs[0], same.pairs[-1]
+    ratio = abs(last_now - first_now) / (last - first) if last > first else 1.0
+    tilt = (optics.focus_tilt[0] * ratio, optics.focus_tilt[1] * ratio)
+    # nobody chose a focus of 0: it is the plan's own, and stays that
+    focus = _disparity_now(optics.focus_disparity, same.pairs) if optics.focus_disparity else 0.0
+    carried = replace(carried, focus_disparity=focus, focus_range=optics.focus_range * ratio, focus_tilt=tilt)
+    if same.in_focus is None or focused_at is None:
+        return carried
+    before, now = same.in_focus
+    is_sharp_there = abs(sharp_disparity(optics, focused_at) - before) <= SHARP_SHARE * (last - first)
+    return focus_on(carried, focused_at, now) if is_sharp_there else carried
+
+
+def with_focus_of(optics: Optics, other: Optics) -> Optics:
+    """The optics with the plane of focus of others."""
+    disparity, range_, tilt = other.focus_disparity, other.focus_range, other.focus_tilt
+    return replace(optics, focus_disparity=disparity, focus_range=range_, focus_tilt=tilt)
+
+
+def _disparity_now(disparity: float, pairs: tuple[tuple[float, float], ...]) -> float:
+    """What places of this disparity have now, between those that are known."""
+    for (low, low_now), (high, high_now) in pairwise(pairs):
+        if disparity <= high:
+            share = clamp((disparity - low) / (high - low), 0.0, 1.0) if high > low else 0.0
+            return low_now + share * (high_now - low_now)
+    return pairs[-1][1]
 
 
 def is_same_scene(old: Source, new: Source, is_light_field: bool) -> bool:

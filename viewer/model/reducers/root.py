@@ -34,7 +34,6 @@ from viewer.model.actions import (
     SetFontScale,
     SetFullscreen,
     SetHover,
-    SetInpainter,
     SetLoop,
     SetSpeed,
     SetTheme,
@@ -43,11 +42,13 @@ from viewer.model.actions import (
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
+    Sway,
     TakeSettings,
     TaskTaken,
     TellSessions,
     Tick,
     ToggleSection,
+    Touch,
     Undo,
     WorkerEvent,
     WorkerLost,
@@ -61,26 +62,37 @@ from viewer.model.lens.limits import (
     clamp_optics,
     is_finite,
 )
-from viewer.model.reducers.camera_motion import advance_motion, glide_home, start_motion
+from viewer.model.reducers.camera_motion import advance_motion, start_motion
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
+from viewer.model.reducers.depth_models import reduce_models
 from viewer.model.reducers.exporting import ask_to_export
 from viewer.model.reducers.folder import list_folder, photo_after, scroll_filmstrip
 from viewer.model.reducers.free_camera import reduce_free_camera
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
-from viewer.model.reducers.lens import reduce_lens, take_back_opening
+from viewer.model.reducers.lens import reduce_lens, take_back_opening, with_focus_of
 from viewer.model.reducers.notices import add_notice
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction, DepthSettings
 from viewer.model.state.exporting import AskToExport
+from viewer.model.state.filling import ViewsFilled, is_same_field
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.jobs import JobsChanged, QuitWhenDone
-from viewer.model.state.model_download import DownloadingChanged
+from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetDolly, SetGlossBrush
+from viewer.model.state.optics import (
+    FocusOn,
+    GlossBrush,
+    LensAction,
+    MoveEye,
+    Optics,
+    ResetOptics,
+    SetDolly,
+    SetGlossBrush,
+)
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import SECTIONS, Preferences
 from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
@@ -90,16 +102,16 @@ from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
 EDITS_KEPT = "Depth edits are kept: the photo opens as you leave it. Save the depth map for other programs."
-UNFINISHED_FILL = "the views between those on disk were not finished. Open it and fill between its views again."
+FILLED = "the views between those on disk are there. Open it again to see them."
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
 
 
 def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
     if isinstance(action, LensAction):
+        state = _touch(state) if state.awaits_touch else state
         state = replace(state, shows_before=False) if state.shows_before else state
         state = replace(state, free_camera=None) if isinstance(action, ResetOptics) else state
-        state = replace(state, prompt=None) if state.prompt == "welcome" else state  # who moves has understood
         moves = isinstance(action, MoveEye | SetDolly | ResetOptics)
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
         edited = reduce_lens(still, action)
@@ -116,13 +128,13 @@ def reduce(state: AppState, action: Action) -> AppState:
         return reduce_inspection(state, action)
     if isinstance(action, DepthAction):
         return reduce_depth(state, action)
+    if isinstance(action, ModelAction):
+        return reduce_models(state, action)
     if isinstance(action, PreferencesAction):
         return replace(state, preferences=_reduce_preferences(state.preferences, action))
     match action:
         case SetDepthStrength():
             return record_edit(state, _set_depth_strength(state, action), "SetDepthStrength")
-        case SetInpainter(name):
-            return _set_inpainter(state, name)
         case TakeSettings(settings):
             return record_edit(state, _take_settings(state, settings), "TakeSettings")
         case RestoreSession(settings):
@@ -164,12 +176,15 @@ def _reduce_files(state: AppState, action: Action) -> AppState:
         case SetFolderOrder(order):
             state = replace(state, preferences=replace(state.preferences, folder_order=order))
             return list_folder(state, state.folder.path, state.folder.photos) if state.folder is not None else state
-        case OpenPath(source):
+        case OpenPath(source, is_demo):
+            source = _with_filled_views(state, source)
             progress = Progress(doing=f"reading {PurePath(source.path).name}")
             generation, left = state.next_generation, _leave_field(state)
-            prompt = state.prompt if state.prompt == "welcome" else None  # a folder opens a photo of it by itself
-            state = replace(_tell_unfinished_fill(state, source), free_camera=None, poses=None, prompt=prompt)
+            models = replace(state.models, asked=None, left_focus=None)
+            state = replace(state, free_camera=None, poses=None, prompt=None, awaits_touch=is_demo, models=models)
             return replace(state, source=source, progress=progress, generation=generation, left_field=left)
+        case ViewsFilled(field):
+            return _take_filled(replace(state, filled=field), field.scene.source)
         case StopWork():
             return stop_work(state)
         case ResumeWork() if state.scene is not None:
@@ -204,8 +219,6 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
         case JobsChanged(jobs):
             state = replace(state, jobs=jobs)
             return _quit(state, is_sure=False) if state.quits_when_done and not jobs else state
-        case DownloadingChanged(downloading):
-            return replace(state, downloading=downloading)
         case SetHover(hover):
             return move_pointer(state, hover)
         case Notify(notice):
@@ -254,14 +267,19 @@ def _checked_zoom(zoom: Zoom | None) -> Zoom | None:
     return Zoom(max(zoom.scale, LEAST_ZOOM), (x, y))
 
 
-def _tell_unfinished_fill(state: AppState, opened: Source) -> AppState:
-    """With a notice where the views between those of a light field are left before they are all there."""
-    left = state.source
-    if left is None or left.filled_grid is None or left.path == opened.path:
-        return state
-    if state.progress.is_complete or state.stopped == state.generation:
-        return state
-    return add_notice(state, Notice(f"{PurePath(left.path).name}: {UNFINISHED_FILL}", stays=True))
+def _take_filled(state: AppState, filled: Source) -> AppState:
+    """Show the views between where their light field is open still; else say that they are there."""
+    if state.source is not None and is_same_field(state.source, filled):
+        return _reduce_files(state, OpenPath(filled))
+    return add_notice(state, Notice(f"{PurePath(filled.path).name}: {FILLED}", stays=True))
+
+
+def _with_filled_views(state: AppState, source: Source) -> Source:
+    """Who goes back to a light field finds the views between that were made of it."""
+    filled, is_back = state.filled, state.source is None or state.source.path != source.path
+    if filled is None or not is_back or not is_same_field(filled.scene.source, source):
+        return source
+    return replace(source, filled_grid=filled.scene.source.filled_grid)
 
 
 def _step_photo(state: AppState, steps: int) -> AppState:
@@ -283,12 +301,14 @@ def _leave_field(state: AppState) -> FinishedField | None:
 
 def _reduce_motion(state: AppState, action: MotionAction) -> AppState:
     motion, scene = state.motion, state.scene
+    if isinstance(action, Touch):
+        return _touch(state)
     if scene is None:
         return state
     match action:
         case ReturnHome(takes_back_click):
             state = replace(_without_click(state) if takes_back_click else state, free_camera=None)
-            gliding = replace(state, motion=glide_home(motion, state.optics))
+            gliding = replace(state, motion=start_motion(motion, "home", state.optics))
             return record_edit(state, gliding, "ReturnHome", always=True)
         case SetLoop(kind):
             return record_edit(
@@ -298,10 +318,18 @@ def _reduce_motion(state: AppState, action: MotionAction) -> AppState:
             return replace(state, motion=replace(motion, speed=clamp(speed, *SPEED_LIMITS)))
         case PauseMotion(is_paused):
             return replace(state, motion=replace(motion, is_paused=is_paused, ticked_s=None))
+        case Sway() if state.awaits_touch and motion.kind is None:
+            return replace(state, motion=start_motion(motion, "sway", state.optics))
         case Tick(now_s):
             motion, optics = advance_motion(motion, state.optics, scene.grid, now_s)
             return replace(state, motion=motion, optics=clamp_optics(optics, scene))
     return state
+
+
+def _touch(state: AppState) -> AppState:
+    """The demo holds still where it is, and stays so."""
+    motion = Motion(speed=state.motion.speed) if state.motion.kind == "sway" else state.motion
+    return replace(state, awaits_touch=False, motion=motion)
 
 
 def _without_click(state: AppState) -> AppState:
@@ -322,26 +350,13 @@ def _set_depth_strength(state: AppState, action: SetDepthStrength) -> AppState:
     return replace(state, depth_strength=strength, generation=generation)
 
 
-def _set_inpainter(state: AppState, name: str) -> AppState:
-    """Of the scene that is open; while another is being read, nothing changes."""
-    source, scene = state.source, state.scene
-    if source is None or scene is None or scene.source is not source or scene.plan is None:
-        return state
-    if name == source.inpaint:
-        return state
-    source = replace(source, inpaint=name)
-    return replace(
-        state, source=source, scene=replace(scene, source=source), generation=state.next_generation, stopped=None
-    )
-
-
 def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
     """The optics, made to fit. What needs a new field, depth strength and all that is decided at opening, stays."""
     if state.scene is None or not is_finite(settings.optics):
         return state
     optics = clamp_optics(settings.optics, state.scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
-    return replace(state, optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
+    return replace(_touch(state), optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
 
 
 def _restore(state: AppState, settings: SavedSettings) -> AppState:
@@ -351,6 +366,9 @@ def _restore(state: AppState, settings: SavedSettings) -> AppState:
         return state
     has_aperture = settings.optics.aperture_diameter > 0
     restored = replace(restored, has_chosen_focus=True, has_chosen_aperture=has_aperture)
+    if settings.has_model_depth and state.scene.is_guessed:  # the focus is of another depth than this
+        models, optics = replace(state.models, left_focus=settings.optics), with_focus_of(restored.optics, Optics())
+        restored = replace(restored, optics=optics, has_chosen_focus=False, models=models)
     if state.scene.plan is None:
         return restored
     depth = DepthSettings(settings.source.depth.refine, settings.depth_edits)

@@ -7,21 +7,25 @@ from pathlib import PurePath
 
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.types import InputError
-from viewer.model.actions import OpenFailed, ProgressMade, SceneOpened, WorkerEvent
-from viewer.model.lens.limits import focus_limits
+from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
+from viewer.model.lens.limits import clamp_optics, focus_limits
+from viewer.model.lens.presets import first_aperture
 from viewer.model.reducers.folder import is_stepped_to
 from viewer.model.reducers.history import map_optics
-from viewer.model.reducers.lens import carry_optics
+from viewer.model.reducers.lens import carry_optics, carry_to_depth, with_focus_of
 from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History
 from viewer.model.state.inspection import of_next_scene
+from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
+from viewer.model.state.optics import Optics
 from viewer.model.state.photo_facts import ReadFactsTask
 from viewer.model.state.scene import Progress, Scene
+from viewer.model.state.tasks import MaySwayTask
 from viewer.model.window_words import notice_in_window
 
 RECENT_KEPT = 8
@@ -32,12 +36,14 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
     if news.generation != state.generation:
         return state
     match news:
-        case SceneOpened(_, scene):
-            return _open_scene(state, scene)
+        case SceneOpened(_, scene, same_places):
+            return _open_scene(state, scene, same_places)
         case ProgressMade(_, progress, view):
             there = state.views_there if view is None else state.views_there | {view}
             shown = state.progress if state.stopped == state.generation else progress
-            return replace(state, progress=shown, views_there=there)
+            begins = state.awaits_touch and shown.is_complete and not state.progress.is_complete
+            tasks = (*state.tasks, MaySwayTask()) if begins else state.tasks
+            return replace(state, progress=shown, views_there=there, tasks=tasks)
         case OpenFailed(_, message):
             return _fail_to_open(add_notice(state, notice_in_window(message, is_error=True)))
 
@@ -62,10 +68,16 @@ def stop_work(state: AppState) -> AppState:
     return replace(state, stopped=state.generation, progress=Progress(doing=doing))
 
 
-def _open_scene(state: AppState, scene: Scene) -> AppState:
+def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -> AppState:
     old = state.scene
     if old is not None and old.source is scene.source and scene.plan is None:
         scene = _with_steady_focus(state, old, scene)
+
+    def carried(optics: Optics) -> Optics:
+        if same_places is None or old is None:
+            return carry_optics(optics, old, scene)
+        return carry_to_depth(optics, old, scene, same_places, state.focused_at)
+
     opened = replace(
         state,
         scene=scene,
@@ -73,15 +85,14 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         views_there=frozenset({scene.grid.centre}),
         left_field=None,
         shown_generation=state.generation,
-        optics=carry_optics(state.optics, old, scene),
-        history=map_optics(state.history, lambda optics: carry_optics(optics, old, scene)),
+        optics=carried(state.optics),
+        history=map_optics(state.history, carried),
         inspection=replace(state.inspection, pair=None, probe=None),
     )
-    said_in_panel = scene.depth_origin.advising_line if scene.depth_origin is not None else ""
-    notes = (notice_in_window(note) for note in scene.notes if note != said_in_panel)
-    notices = (*notes, *_offers(scene))[-NOTICES_KEPT:]
+    notices = (*_told(scene), *_offers(scene))[-NOTICES_KEPT:]
     if old is not None and old.source is scene.source:
         is_whole_now = old.is_sketch and not scene.is_sketch
+        opened = _with_left_focus(opened) if same_places is not None else opened
         return replace(opened, notices=(*state.notices, *notices)[-NOTICES_KEPT:]) if is_whole_now else opened
     # the same file, opened again, is new
     motion = Motion(speed=state.motion.speed)
@@ -92,8 +103,11 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection, zoom=None)
     depth = DepthSettings(scene.source.depth.refine)
+    if state.awaits_touch:
+        opened = replace(opened, optics=replace(opened.optics, aperture_diameter=first_aperture(scene)))
     if scene.plan is not None:  # a photo: it may have neighbours
-        beside = ListFolderTask(str(PurePath(scene.source.path).parent)), ReadFactsTask(scene.source.path)
+        folder = str(PurePath(scene.source.path).parent)
+        beside = ListFolderTask(folder), ReadFactsTask(scene.source.path), ListModelsTask()
         opened = replace(opened, tasks=(*opened.tasks, *beside))
     return replace(
         opened,
@@ -107,6 +121,7 @@ def _open_scene(state: AppState, scene: Scene) -> AppState:
         saved_edits=UNEDITED,
         has_chosen_focus=False,
         has_chosen_aperture=False,
+        focused_at=None,
     )
 
 
@@ -123,6 +138,15 @@ def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:
     return replace(scene, disparity_range_px=(min(low, focus), max(high, focus)))
 
 
+def _with_left_focus(state: AppState) -> AppState:
+    """With the depth that the photo was left with, and the focus, unless the user chose another meanwhile."""
+    left = state.models.left_focus
+    if left is None or state.has_chosen_focus or state.scene is None:
+        return state
+    optics = clamp_optics(with_focus_of(state.optics, left), state.scene)
+    return replace(state, optics=optics, has_chosen_focus=True, models=replace(state.models, left_focus=None))
+
+
 def _progress_of(state: AppState, scene: Scene) -> Progress:
     """What is shown until more is heard: of a light field, which is shown more than once, how far its job was."""
     if scene.plan is None and state.progress.share > 0 and not state.progress.is_complete:
@@ -133,6 +157,12 @@ def _progress_of(state: AppState, scene: Scene) -> Progress:
 def remember_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
     """The recent paths with this one first."""
     return (path, *(other for other in recent if other != path))[:RECENT_KEPT]
+
+
+def _told(scene: Scene) -> tuple[Notice, ...]:
+    """What failed, and what a button helps with; the other notes stand in the panel's section for the scene."""
+    notices = ((note, notice_in_window(note)) for note in scene.further_notes)
+    return tuple(notice for note, notice in notices if note in scene.problems or notice.commands)
 
 
 def _offers(scene: Scene) -> tuple[Notice, ...]:

@@ -5,17 +5,18 @@ Comparing two records decides what an edit costs: a new `generation` restarts th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.layout import WHOLE, Rect, ScreenSize
 from viewer.model.state.depth_editing import AS_FOUND, Brush, DepthSettings
+from viewer.model.state.filling import FilledField
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.jobs import JobProgress
-from viewer.model.state.model_download import Downloading
+from viewer.model.state.model_download import DepthModels
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import GlossBrush, Optics
@@ -80,7 +81,8 @@ class AppState:
     zoom: None where the whole picture is seen. free_camera: None on the plane of the views; poses: of a file, for it;
     free_progress: how much is done of what its views are made of, None when that is there.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
-    file has them. jobs: saves, copies and exports under way; quits_when_done: the window closes once there are none.
+    file has them. jobs: saves, copies, exports and fills under way; quits_when_done: the window closes once there are
+    none.
     has_chosen_focus, has_chosen_aperture: whether the user said in this scene what is sharp, and how wide the aperture
     is. has_dialogs: whether the system has file dialogs. left_field: None
     where the open scene was left unfinished, or not at all.
@@ -88,7 +90,10 @@ class AppState:
     number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
     of it, perhaps of the one before. is_fullscreen,
     hides_panel: of the window; shows_before: the photo as it was taken stands in place of the picture.
-    downloading: None without. keeps_sessions: whether the photo opens as it is left.
+    models: of depth. keeps_sessions: whether the photo opens as it is left. awaits_touch: the demo is open and nobody
+    has touched it yet: once all its views are there it sways. filled: the light field whose views between were made
+    last, None before. focused_at: the place (see focal_plane) that was clicked last to be sharp, None where the focus
+    was set otherwise.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -122,9 +127,10 @@ class AppState:
     saved_edits: DepthEdits = UNEDITED
     jobs: tuple[JobProgress, ...] = ()
     quits_when_done: bool = False
-    downloading: Downloading | None = None
+    models: DepthModels = field(default_factory=DepthModels)
     has_chosen_focus: bool = False
     has_chosen_aperture: bool = False
+    focused_at: tuple[float, float] | None = None
     has_dialogs: bool = False
     left_field: FinishedField | None = None
     shown_generation: int = 0
@@ -135,6 +141,16 @@ class AppState:
     hides_panel: bool = False
     shows_before: bool = False
     keeps_sessions: bool = False
+    awaits_touch: bool = False
+    filled: FilledField | None = None
+
+    @property
+    def at_rest(self) -> AppState:
+        """The state that a viewpoint which moves by itself has left: what the user decided."""
+        motion = self.motion
+        if motion.kind is None or motion.kind == "home" or motion.is_paused:
+            return self
+        return replace(self, optics=replace(self.optics, eye=motion.start), motion=Motion(speed=motion.speed))
 
     @property
     def shown_optics(self) -> Optics:

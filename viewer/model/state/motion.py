@@ -10,6 +10,8 @@ from viewer.model.state.optics import CENTRE
 
 LoopKind = Literal["circle", "eight", "swing"]
 LOOPS: tuple[LoopKind, ...] = ("circle", "eight", "swing")
+MotionKind = LoopKind | Literal["home", "sway"]
+"""home: a glide to the middle. sway: slow and small, for a while, as long as nobody touches anything."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Motion:
     the last step, None before the first. speed, in turns per second, and is_paused outlast a change of kind.
     """
 
-    kind: LoopKind | Literal["home"] | None = None
+    kind: MotionKind | None = None
     turns: float = 0.0
     ticked_s: float | None = None
     start: ViewOffset = CENTRE

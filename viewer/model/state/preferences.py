@@ -19,7 +19,8 @@ SECTIONS: tuple[Section, ...] = ("view", "focus", "aperture", "light", "gloss", 
 class Preferences:
     """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
     whether it filled the screen then. told_sessions: that depth edits are kept; told_aperture: that
-    focusing opens the aperture. Each is told once.
+    focusing opens the aperture. Each is told once. told_drag: that one drags to look; it is told until one does.
+    estimates_depth: photos without depth get it from the recommended model, without a question, once it is here.
     """
 
     theme: Theme = "dark"
@@ -32,3 +33,5 @@ class Preferences:
     units: Units = "photographic"
     told_sessions: bool = False
     told_aperture: bool = False
+    told_drag: bool = False
+    estimates_depth: bool = False

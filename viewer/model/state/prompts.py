@@ -11,9 +11,9 @@ from viewer.model.layout import ScreenSize
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 
-ChoiceOf = Literal["photo", "folder", "mask", "surroundings", "truth", "map", "model"]
-"""surroundings: what a glossy surface reflects; map: a disparity map for the photo that is open; model: the folder of a
-depth model."""
+ChoiceOf = Literal["photo", "folder", "mask", "surroundings", "truth", "map", "model", "model folder"]
+"""surroundings: what a glossy surface reflects; map: a disparity map for the photo that is open; model: an ONNX file
+of depth."""
 
 
 @dataclass(frozen=True)
@@ -50,5 +50,5 @@ class PalettePrompt:
     selected: int = 0
 
 
-Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "welcome", "quit"]
+Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "quit"]
 """quit: whether to close although jobs are under way, or depth edits are saved nowhere."""

@@ -29,7 +29,8 @@ class SavedSettings:
     """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
 
     depth_edits: of the photo's disparity. unknown_fields: names of what was saved too, but is not known here.
-    refused_file: a file that they named and that is not opened, "" without.
+    refused_file: a file that they named and that is not opened, "" without. has_model_depth: whether a model estimated
+    the depth that the focus is of.
     """
 
     optics: Optics
@@ -39,6 +40,7 @@ class SavedSettings:
     depth_edits: DepthEdits = UNEDITED
     unknown_fields: tuple[str, ...] = ()
     refused_file: str = ""
+    has_model_depth: bool = False
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ class Source:
     """What to open and what the user decided about it; None leaves the choice to the program.
 
     path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
-    transformer runs. inpaint: what fills the places that the photo never saw, a name among `INPAINTERS`. is_literal:
+    transformer runs. inpaint: what fills the places that the photo never saw, see `load_inpainter`. is_literal:
     disparity counts as it is given, in px per step of the grid, instead of the plan's parallax. grid: of a photo's
     views. filled_grid: of a light field with views made between those on disk.
     """
@@ -63,15 +63,17 @@ class Scene:
     """What is open: a photo with its plan, or a light field from disk (plan None).
 
     depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
-    has_view_disparity: whether every view comes with its own disparity. focal_px: in pixels of the picture, None where
+    has_view_disparity: whether every view comes with its own disparity. notes: what was done to what the files hold, a
+    sentence each; problems: those of them that a notice tells. focal_px: in pixels of the picture, None where
     not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
     file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
-    view step as given. depth_models: names of those on this machine. inverse_metres: (slope, offset) of 1 / distance
-    over the disparity as given, None where distances are not known in metres. color_space: of its views. own_size: of
-    the photo in its file, which a view may be smaller than; None for light fields. given_grid: of the views that are in
-    a light field's files; None for photos. infinity_px: a photo's field disparity of what is infinitely far, as far as
-    it is known. is_sketch: it is shown in small while it is read. found_span_px: from the farthest to the nearest field
-    disparity before any of it was edited, None where it cannot be edited.
+    view step as given. depth_model: name or path of the one that gave its depth, None where none did. inverse_metres:
+    (slope, offset) of 1 / distance over the disparity as given, None where distances are not known in metres.
+    color_space: of its views. own_size: of the photo in its file, which a view may be smaller than; None for light
+    fields. given_grid: of the views that are in a light field's files; None for photos. infinity_px: a photo's field
+    disparity of what is infinitely far, as far as it is known. is_sketch: it is shown in small while it is read.
+    found_span_px: from the farthest to the nearest field disparity before any of it was edited, None where it cannot be
+    edited.
     """
 
     source: Source
@@ -85,12 +87,13 @@ class Scene:
     has_view_disparity: bool = True
     plan: ScenePlan | None = None
     notes: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
     focal_px: float | None = None
     subject_disparity_px: float = 0.0
     settings: str = ""
     depth_origin: DepthOrigin | None = None
     levels: Levels | None = None
-    depth_models: tuple[str, ...] = ()
+    depth_model: str | None = None
     inverse_metres: tuple[float, float] | None = None
     color_space: ColorSpace = SRGB
     own_size: ScreenSize | None = None
@@ -100,9 +103,25 @@ class Scene:
     found_span_px: float | None = None
 
     @property
+    def is_guessed(self) -> bool:
+        """Whether its depth is a guess, and stays one."""
+        return self.depth_model is None and self.depth_origin is not None and self.depth_origin.kind == "rough"
+
+    @property
+    def has_model_depth(self) -> bool:
+        """Whether a model estimated the depth that is shown."""
+        return self.depth_origin is not None and self.depth_origin.kind == "model"
+
+    @property
     def size(self) -> ScreenSize:
         """Of a view, as it is drawn."""
         return ScreenSize(self.width, self.height)
+
+    @property
+    def further_notes(self) -> tuple[str, ...]:
+        """The notes without what the panel's line about depth says."""
+        said = self.depth_origin.advising_line if self.depth_origin is not None else ""
+        return tuple(note for note in self.notes if note != said)
 
 
 @dataclass(frozen=True)

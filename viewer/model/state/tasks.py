@@ -8,6 +8,7 @@ from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from viewer.model.layout import ScreenSize
 from viewer.model.state.exporting import ExportTask
+from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.model_download import CancelGetTask, GetModelTask, ListModelsTask
@@ -49,6 +50,11 @@ class ReadMaskTask:
 
 
 @dataclass(frozen=True)
+class MaySwayTask:
+    """Find out whether the demo may move by itself here, and let it."""
+
+
+@dataclass(frozen=True)
 class ReadTruthTask:
     """Look what light field this folder holds, to compare with; once a scene is open."""
 
@@ -63,8 +69,10 @@ Task = (
     | PasteTask
     | WriteSidecarTask
     | ExportTask
+    | FillTask
     | CancelJobTask
     | ReadMaskTask
+    | MaySwayTask
     | ReadTruthTask
     | ListFolderTask
     | ReadFactsTask

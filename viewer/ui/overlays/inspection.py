@@ -25,7 +25,7 @@ from viewer.ui.style import DARK, Color, pack_color, palette_of
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
 SIDES: dict[Comparison, tuple[str, str]] = {
     "photo": ("photo", "result"),
-    "quality": ("fast", "exact"),
+    "quality": ("fast", "balanced"),
     "truth": ("result", "truth"),
     "kept": ("kept", "now"),
 }

@@ -1,5 +1,5 @@
 """The newest notice, over the lower left of the picture, with buttons that take it away or do what it advises; the one
-before comes up after it. Above it the long work that is under way.
+before comes up after it. Above it the long work that is under way, below it what gives a guess true depth.
 """
 
 from __future__ import annotations
@@ -9,29 +9,23 @@ from imgui_bundle import imgui
 from viewer.model.actions import Action, DismissNotice, DismissNotices, TakeSettings
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
+from viewer.model.reducers.depth_models import offered_model
 from viewer.model.state.app_state import AppState
+from viewer.model.state.model_download import GetDepth, ModelOffer, ShowOffer
 from viewer.model.state.notices import Notice
 from viewer.ui.overlays.progress_rows import build_rows, progress_rows
-from viewer.ui.overlays.prompt_rows import button_rows
+from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows
 from viewer.ui.style import palette_of
+from viewer.ui.widgets import quiet
 
 NOTICE_WIDTH = 420.0
-LEAST_HEIGHT = 40.0
-_FLAGS = (
-    imgui.WindowFlags_.no_title_bar
-    | imgui.WindowFlags_.no_resize
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.always_auto_resize
-    | imgui.WindowFlags_.no_focus_on_appearing
-)
+LEAST_WIDTH, LEAST_HEIGHT = 160.0, 40.0
 
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
     """Build the newest notice; what was pressed comes back as actions."""
-    rows = progress_rows(state)
-    if not (state.notices or rows):
+    rows, offer = progress_rows(state), offered_model(state)
+    if not (state.notices or rows or offer):
         return []
     margin = MARGIN * layout.ui_scale
     right, bottom = layout.panel.x - margin, layout.window.height - margin
@@ -41,17 +35,41 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
         bottom = layout.status.y
     elif layout.filmstrip is not None:
         bottom = layout.filmstrip.y - margin / 2
+    if right - margin < LEAST_WIDTH * layout.ui_scale:  # the panel gives way: it must be possible to read them
+        right = layout.window.width - margin
     width = min(NOTICE_WIDTH * layout.ui_scale, right - margin)
     if width <= 0:
         return []
     imgui.set_next_window_pos(imgui.ImVec2(margin, bottom), 0, imgui.ImVec2(0, 1))
     most = max(bottom - margin / 2, LEAST_HEIGHT * layout.ui_scale)
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
-    imgui.begin("notices", None, _FLAGS)
+    imgui.begin("notices", None, CARD_FLAGS)
     actions = build_rows(rows, layout)
     if state.notices:
         actions += _notice(state.notices[-1], state)
+    if offer is not None:
+        actions += _offer(offer)
     imgui.end()
+    return actions
+
+
+def _offer(model: ModelOffer) -> list[Action]:
+    """How to get true depth in place of a guess; nothing more is asked."""
+    words, button = f"{model.title} is on this machine.", "Estimate depth"
+    if model.lacks:
+        words = f"{model.title} {model.lacks}"
+    elif not model.is_here:
+        words = f"{model.title}, {model.megabytes:,} MB, {model.licence}, from {model.host}."
+        button = "Get true depth"
+    actions: list[Action] = [ShowOffer(False)] if imgui.button("×##offer") else []
+    imgui.same_line()
+    imgui.begin_group()
+    imgui.align_text_to_frame_padding()
+    imgui.text_wrapped("Depth is guessed.")
+    quiet(words)
+    if not model.lacks:
+        actions += button_rows([(button, GetDepth())])
+    imgui.end_group()
     return actions
 
 

@@ -10,19 +10,24 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
-from viewer.model.actions import Action, DoTask, StopWork
+from viewer.model.actions import Action, DoTask
 from viewer.model.free_camera import LeaveCamera
 from viewer.model.layout import Layout
+from viewer.model.reducers.depth_models import wanted_model
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING, CancelJobTask, JobKind, JobProgress
-from viewer.model.state.model_download import CancelGetTask
-from viewer.ui.panel import progress_text
-from viewer.ui.widgets import gap, tooltip
+from viewer.model.state.model_download import CancelGetTask, GiveUpEstimate
+from viewer.ui.widgets import gap, last_part, tooltip
 
-VERBS: dict[JobKind, str] = {"picture": "Saving", "map": "Saving", "copy": "Copying", "export": "Exporting"}
+VERBS: dict[JobKind, str] = {
+    "picture": "Saving",
+    "map": "Saving",
+    "copy": "Copying",
+    "export": "Exporting",
+    "fill": "Filling between the views of",
+}
 
 WAITING = "waiting for its turn"
-FILLING = "Making views between those on disk"
 
 
 @dataclass(frozen=True)
@@ -84,10 +89,7 @@ def _job_row(job: JobProgress) -> ProgressRow:
 
 
 def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
-    progress, downloading = state.progress, state.downloading
-    is_working = not progress.is_complete and state.stopped != state.generation and bool(progress_text(progress))
-    if is_working and state.source is not None and state.source.filled_grid is not None:
-        yield ProgressRow("views", FILLING, progress_text(progress), progress.share, StopWork())
+    downloading = state.models.downloading
     if state.free_progress is not None:
         share = min(state.free_progress, 0.99)  # what is whole has no row
         yield ProgressRow("looking", "Drawing what the photo hides", f"{round(100 * share)} %", share, LeaveCamera())
@@ -95,3 +97,8 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
         words = f"{downloading.done:,} of {downloading.total:,} MB"
         share = downloading.done / max(downloading.total, 1)
         yield ProgressRow("download", f"Downloading {downloading.title}", words, share, DoTask(CancelGetTask()))
+    model = wanted_model(state)
+    if model is not None:
+        titles = {offer.name: offer.title for offer in state.models.known}
+        words = f"with {titles.get(model, last_part(model))}"
+        yield ProgressRow("estimate", "Estimating depth", words, 0.0, GiveUpEstimate())

@@ -1,4 +1,4 @@
-"""What the small windows in the middle share: a text to type, one of some, what is wrong, the buttons below."""
+"""What small windows over the picture share: a text to type, one of some, what is wrong, the buttons below."""
 
 from __future__ import annotations
 
@@ -16,6 +16,16 @@ from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, combo, gap, label, tooltip
 
 Choice = TypeVar("Choice", bound=str)
+CARD_FLAGS = (
+    imgui.WindowFlags_.no_title_bar
+    | imgui.WindowFlags_.no_resize
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.always_auto_resize
+    | imgui.WindowFlags_.no_focus_on_appearing
+)
+"""Of a card that stands by itself over the picture."""
 
 
 def prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:

@@ -17,10 +17,11 @@ from viewer.model.layout import PANEL_WIDTH, Layout, ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress, QuitWhenDone
-from viewer.model.state.model_download import GetModelTask, ModelsPrompt
+from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
 from viewer.ui.overlays.export_prompt import export_prompt
+from viewer.ui.overlays.models_prompt import models_prompt
 from viewer.ui.overlays.prompt_rows import (
     button_rows,
     focus_on_appearing,
@@ -34,7 +35,7 @@ from viewer.ui.overlays.prompt_rows import (
 from viewer.ui.widgets import button, gap, label, quiet
 
 Option = TypeVar("Option")
-PROMPT_WIDTH, MODELS_WIDTH = 460.0, 490.0
+PROMPT_WIDTH = 460.0
 KEYS_WIDTH = 112.0
 ROWS_SHOWN = 12
 MOUSE = (
@@ -53,8 +54,6 @@ MOUSE = (
     ("Gamepad", "Viewpoint, focus; triggers: aperture"),
     ("Esc", "Close what is open, put the brush away"),
 )
-FIRST_GESTURES = 5
-"""So many are told at the first start, in a pad that leaves the photo to be seen."""
 PICTURE_ENDINGS = "The name's ending decides: .png, .jpg, .tif, .webp, .avif, or .exr in linear light."
 MAP_ENDINGS = "The name's ending decides: .pfm, .exr, .npy, or .png (16 bits, scaled)."
 PATH_WORDS = {
@@ -64,7 +63,8 @@ PATH_WORDS = {
     "surroundings": "A picture all around (equirectangular), to be reflected",
     "truth": "Ground truth: a folder of views",
     "map": "A disparity map for this photo",
-    "model": "The folder of a depth model",
+    "model": "A depth model: an ONNX file, or a folder",
+    "model folder": "The folder of a depth model",
 }
 _FLAGS = (
     imgui.WindowFlags_.no_title_bar
@@ -92,21 +92,16 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
 
 
 def _place(prompt: Prompt, layout: Layout) -> None:
-    """In the middle of the picture; what is told at the first start in a corner, as in the middle are faces; the help
-    in the panel's place: it is read while the hand tries it on the picture.
-    """
+    """In the middle of the picture; the help in the panel's place: it is read while the hand tries it."""
     scale, window = layout.ui_scale, layout.window
     if prompt == "help":
         imgui.set_next_window_pos(imgui.ImVec2(window.width, 0), 0, imgui.ImVec2(1, 0))
         width = min(PANEL_WIDTH * scale, window.width)
         imgui.set_next_window_size_constraints(imgui.ImVec2(width, window.height), imgui.ImVec2(width, window.height))
         return
-    width = min((MODELS_WIDTH if isinstance(prompt, ModelsPrompt) else PROMPT_WIDTH) * scale, window.width)
-    if prompt == "welcome":
-        imgui.set_next_window_pos(imgui.ImVec2(0, 0))
-    else:
-        middle = imgui.ImVec2(max(layout.panel.x, width) / 2, window.height / 2)
-        imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
+    width = min(PROMPT_WIDTH * scale, window.width)
+    middle = imgui.ImVec2(max(layout.panel.x, width) / 2, window.height / 2)
+    imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
 
 
@@ -119,16 +114,14 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case PathPrompt():
             return _path(prompt, state, layout)
         case ModelsPrompt():
-            return _models(prompt, state, layout)
+            return models_prompt(prompt, state, layout)
         case PalettePrompt():
             return _palette(prompt, state, layout)
         case "quit":
             return _quit(state, layout)
         case "help":
             keys = ((", ".join(chord.words for chord in c.chords), c.name) for c in COMMANDS if c.chords)
-            return _help(layout, [*MOUSE, *keys], imgui.TableFlags_.scroll_y)
-        case "welcome":
-            return _help(layout, [*MOUSE[:FIRST_GESTURES], ("F1", "All of mouse and keys")])
+            return _help(layout, [*MOUSE, *keys])
 
 
 def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
@@ -212,34 +205,6 @@ def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
     return prompt_actions(closed, replace(prompt, path=path), prompt)
 
 
-def _models(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list[Action]:
-    """Depth models to be had, with size and licence: one is chosen, and downloaded unless it is here."""
-    imgui.text("Get a depth model")
-    gap(layout, 2)
-    selected = prompt.selected
-    if imgui.begin_table("models", 3, imgui.TableFlags_.sizing_fixed_fit):
-        for i, model in enumerate(prompt.models):
-            imgui.table_next_column()
-            if imgui.selectable(model.title, i == selected, imgui.SelectableFlags_.span_all_columns)[0]:
-                selected = i
-            imgui.table_next_column()
-            imgui.text_disabled("here" if model.is_here else f"{model.megabytes:,} MB")
-            imgui.table_next_column()
-            imgui.text_disabled(model.licence.partition(" (")[0])
-        imgui.end_table()
-    model = prompt.models[selected]
-    gap(layout, 2)
-    quiet(f"From huggingface.co/{model.repository}, licence {model.licence}. {model.lacks}")
-    word = "Use it" if model.is_here else f"Download {model.megabytes:,} MB"
-    is_enabled = state.downloading is None if not model.is_here else state.source is not None and not model.lacks
-    pressed, closed = prompt_buttons(word, layout, is_enabled)
-    if pressed and model.is_here:
-        return [ShowPrompt(None), action_for_path("model", model.name, state)]
-    if pressed:
-        return [ShowPrompt(None), DoTask(GetModelTask(model.name))]
-    return prompt_actions(closed, replace(prompt, selected=selected), prompt)
-
-
 def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
     """Commands that match what was typed; the arrow keys select one of them, Enter runs it."""
     focus_on_appearing()
@@ -277,7 +242,7 @@ def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -
     return pressed
 
 
-def _help(layout: Layout, rows: list[tuple[str, str]], flags: int = 0) -> list[Action]:
+def _help(layout: Layout, rows: list[tuple[str, str]]) -> list[Action]:
     """What the mouse and the keys do; the button stays in sight where the rows scroll."""
     style = imgui.get_style()
     button_width = imgui.calc_text_size("Close").x + 2 * style.frame_padding.x
@@ -286,7 +251,7 @@ def _help(layout: Layout, rows: list[tuple[str, str]], flags: int = 0) -> list[A
     imgui.same_line(imgui.get_window_width() - style.window_padding.x - button_width)
     is_closed = button("Close", layout)
     gap(layout, 2)
-    if imgui.begin_table("keys", 2, flags):
+    if imgui.begin_table("keys", 2, imgui.TableFlags_.scroll_y):
         imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, KEYS_WIDTH * layout.ui_scale)
         imgui.table_setup_column("meaning", imgui.TableColumnFlags_.width_stretch)
         for what, meaning in rows:
@@ -314,7 +279,7 @@ def _quit(state: AppState, layout: Layout) -> list[Action]:
 
 def jobs_text(jobs: Sequence[JobProgress]) -> str:
     """What is under way, in words: "2 exports are", "1 picture and 1 export are"."""
-    exports = sum(job.kind == "export" for job in jobs)
-    counts = (("picture", len(jobs) - exports), ("export", exports))
+    exports, fills = (sum(job.kind == kind for job in jobs) for kind in ("export", "fill"))
+    counts = (("picture", len(jobs) - exports - fills), ("export", exports), ("light field", fills))
     words = " and ".join(f"{count} {noun}{'s' if count > 1 else ''}" for noun, count in counts if count)
     return f"{words} {'is' if len(jobs) == 1 else 'are'}"

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from iibr_core.depth.editing.edits import DEPTH_TOOLS
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
+from viewer.model.lens.limits import aperture_limit
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.optics import GlossBrush, Optics
@@ -16,6 +17,7 @@ from viewer.model.state.preferences import Units
 from viewer.model.state.scene import Scene
 from viewer.ui.style import DARK, pack_color
 
+HINT = "Drag to look"
 WORD_GAP = "  ·  "
 RETICLE_RADIUS = 11.0
 HANDLE_RADIUS = 8.0
@@ -43,6 +45,13 @@ def overlays(state: AppState, layout: Layout) -> None:
     elif state.hover is not None and state.hover.disparity is not None:
         _draw_reticle(state, scene, state.hover, layout, picture)
     draw.pop_clip_rect()
+
+
+def pointer_text(state: AppState, scene: Scene, hover: Hover) -> str:
+    """What one can do here, until it was done once; then what lies here."""
+    if not state.preferences.told_drag and aperture_limit(scene.grid):
+        return HINT
+    return hover_text(state.optics, scene, hover, state.preferences.units)
 
 
 def hover_text(optics: Optics, scene: Scene, hover: Hover, units: Units = "photographic") -> str:
@@ -87,7 +96,7 @@ def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, p
     y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
     radius, frame = RETICLE_RADIUS * scale, layout.frame or picture
     _ring(draw, x, y, radius, scale, pack_color(DARK.text))
-    words = hover_text(state.optics, scene, hover, state.preferences.units)
+    words = pointer_text(state, scene, hover)
     size, room = imgui.calc_text_size(words), 6 * scale
     left = x + radius + room if x + radius + 3 * room + size.x <= frame.x + frame.width else x - radius - size.x
     left = max(left - (room if left < x else 0), frame.x + room)

@@ -8,13 +8,14 @@ from imgui_bundle import imgui
 
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
-from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthStrength
-from viewer.model.commands import BRUSH_WORDS, BY_NAME
+from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthStrength, ShowPrompt
+from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
 from viewer.model.lens.limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
+from viewer.model.state.model_download import DepthModels, ModelsPrompt, SetEstimatesDepth, UseModel
 from viewer.model.state.scene import Scene, source_with_depth
 from viewer.model.state.tasks import ChooseTask
 from viewer.model.window_words import words_in_window
@@ -53,29 +54,17 @@ STROKE_TIP = "Of one stroke. Level and bucket always give the whole depth."
 SAMPLE_TIP = (
     "Level and bucket give the depth where you press. Ctrl+click in the picture picks another, this forgets it."
 )
-BETTER_DEPTH = (("Open a map…", "Open a depth map…"), ("Get a model…", "Get a depth model…"))
-"""Words on a button, and the command they stand for."""
+OTHER_MODELS = "Depth models…", "What there is, and a file of your own."
+ESTIMATES_TIP = "By the recommended model, behind the guess; of photos that bring no depth along."
 TOOLS_A_ROW = 3
 
 
-def depth_line(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Where depth came from, in one line, and what failed; buttons to get better depth where it is poor."""
+def depth_line(scene: Scene, layout: Layout) -> None:
+    """Where depth came from, in one line, and what failed."""
     origin = scene.depth_origin
     quiet(origin.line if origin is not None else f"Depth: {scene.depth_source}.")
-    if origin is None:
-        return []
-    tooltip("\n".join(map(words_in_window, (*origin.failures, origin.advice))).strip(), layout)
-    if not origin.advice:
-        return []
-    actions: list[Action] = []
-    spacing = 4 * layout.ui_scale
-    width = (imgui.get_content_region_avail().x - spacing) / len(BETTER_DEPTH)
-    for i, (words, name) in enumerate(BETTER_DEPTH):
-        if i:
-            imgui.same_line(0, spacing)
-        if button(f"{words}##better", layout, words_in_window(origin.advice), width=width):
-            actions.append(BY_NAME[name].action(state))
-    return actions
+    if origin is not None:
+        tooltip("\n".join(map(words_in_window, (*origin.failures, origin.advice))).strip(), layout)
 
 
 def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -91,7 +80,7 @@ def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     gap(layout, 2)
     actions += _brush(state, layout)
     gap(layout, 2)
-    return actions + _files(state, layout)
+    return actions + _files(state, layout) + _estimates_new(state, layout)
 
 
 def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -107,15 +96,28 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         return []
     wanted = _choice_text(source.depth.start, source.depth.model, source.depth.file)
     ways: list[tuple[DepthStart, str | None]] = [("auto", None), ("embedded", None)]
-    ways += [("model", name) for name in _models(scene, source.depth.model)] + [("rough", None), ("flat", None)]
+    names = _models(state.models, source.depth.model)
+    ways += [("model", name) for name in names] + [("rough", None), ("flat", None)]
     label("From", layout, FROM_TIP)
-    entries = [(_choice_text(start, model, None), START_TIPS[start]) for start, model in ways]
+    entries = [(_choice_text(start, model, None), START_TIPS[start]) for start, model in ways] + [OTHER_MODELS]
     picked = combo("depth from", wanted, entries, layout, FROM_TIP)
-    return [] if picked is None else [OpenPath(source_with_depth(source, *ways[picked]))]
+    actions: list[Action] = []
+    if picked == len(ways):
+        actions.append(ShowPrompt(ModelsPrompt()))
+    elif picked is not None:
+        start, model = ways[picked]
+        actions.append(UseModel(model) if model is not None else OpenPath(source_with_depth(source, start)))
+    return actions
 
 
-def _models(scene: Scene, chosen: str | None) -> list[str]:
-    return list(dict.fromkeys([*([chosen] if chosen else []), *scene.depth_models]))
+def _estimates_new(state: AppState, layout: Layout) -> list[Action]:
+    estimates = checkbox("Estimate depth of new photos", state.preferences.estimates_depth, layout, ESTIMATES_TIP)
+    return [] if estimates is None else [SetEstimatesDepth(estimates)]
+
+
+def _models(models: DepthModels, chosen: str | None) -> list[str]:
+    here = [model.name for model in models.known if model.is_ready]
+    return list(dict.fromkeys([*([chosen] if chosen else []), *here]))
 
 
 def _choice_text(start: DepthStart, model: str | None, path: str | None) -> str:

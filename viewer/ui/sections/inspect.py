@@ -41,14 +41,14 @@ OPACITY_TIP = "Of what lies over the picture."
 TRUTH_TIP = "A light field on disk to compare with."
 COMPARISON_WORDS: dict[Comparison, str] = {
     "photo": "Photo",
-    "quality": "Exact",
+    "quality": "Balanced",
     "truth": "Truth",
     "kept": "Kept state",
     "difference": "Difference",
 }
 COMPARISON_TIPS: dict[Comparison, str] = {
     "photo": "The photo beside the picture.",
-    "quality": "The view nearest to the viewpoint, made fast and made exactly.",
+    "quality": "The view nearest to the viewpoint, made in fast and in balanced quality.",
     "truth": "The view nearest to the viewpoint beside the same one of a light field on disk. Drop its folder on the "
     "panel, or press again to choose another one.",
     "kept": "The picture as it was when its state was kept (K), beside the present one.",

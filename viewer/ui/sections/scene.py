@@ -1,35 +1,34 @@
-"""The panel's section for the scene: what its file says of it, where its depth is from, what the plan chose and why."""
+"""The panel's section for the scene: what its file says of it, where its depth is from, what the plan chose
+and why, and what reading it changed.
+"""
 
 from __future__ import annotations
 
-from iibr_core.inpainting.registry import INPAINTERS
+from collections.abc import Sequence
+
 from iibr_core.types import GridShape
-from viewer.model.actions import Action, OpenPath, SetInpainter
+from viewer.model.actions import Action, DoTask
 from viewer.model.dense_field import chosen_grid, denser_grids, with_views_between
 from viewer.model.layout import Layout
+from viewer.model.state.filling import FillTask
+from viewer.model.state.jobs import JobProgress
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.scene import Scene, Source
-from viewer.ui.widgets import combo, gap, label, last_part, quiet
+from viewer.model.window_words import words_in_window
+from viewer.ui.widgets import combo, gap, label, quiet
 
-HOLES_TIP = (
-    "What fills the places that the photo never saw: background goes on smoothly from what lies behind, patch gives it"
-    " texture from around. The views are made anew."
-)
-INPAINTER_TIPS = {
-    "background": "Background goes on smoothly from what lies behind: quick, and nearest to true views.",
-    "patch": "Background with texture from around: slower, and less smooth.",
-}
-MODEL_TIP = "A model of yours paints them: in seconds a view on a GPU, in minutes without one."
 BETWEEN_TIP = (
     "Makes views between those on disk, of all that these see. First their disparity is found, where the files have"
     " none: that takes longest. Exports take them along."
 )
 
 
-def scene_section(scene: Scene, asked: Source | None, facts: FactsRead, layout: Layout) -> list[Action]:
-    """Build the section; what can be changed in it: a photo's ways to fill holes, views between a light field's.
+def scene_section(
+    scene: Scene, asked: Source | None, jobs: Sequence[JobProgress], facts: FactsRead, layout: Layout
+) -> list[Action]:
+    """Build the section; what can be changed in it: views between those of a light field.
 
-    asked: what was asked for last.
+    asked: what is to be opened. jobs: those under way.
     """
     gap(layout, 2)
     of_file = facts.facts if facts.path == scene.source.path else ()
@@ -39,30 +38,21 @@ def scene_section(scene: Scene, asked: Source | None, facts: FactsRead, layout: 
     gap(layout, 2)
     for reason in scene.plan.reasons if scene.plan else (_of_light_field(scene),):
         quiet(reason)
+    for note in scene.further_notes:
+        quiet(words_in_window(note))
     if scene.given_grid is not None and denser_grids(scene.given_grid):
-        return _views_between(scene, asked, scene.given_grid, layout)
-    return _holes(scene, layout) if scene.plan is not None and scene.plan.has_disocclusion else []
+        return _views_between(scene, chosen_grid(scene, asked, jobs), scene.given_grid, layout)
+    return []
 
 
-def _holes(scene: Scene, layout: Layout) -> list[Action]:
-    """The ways of inpainting that need no model, and the one that the photo was opened with."""
-    chosen = scene.source.inpaint
-    names = tuple(dict.fromkeys((*INPAINTERS, chosen)))
-    label("Holes", layout, HOLES_TIP)
-    entries = [(last_part(name), INPAINTER_TIPS.get(name, MODEL_TIP)) for name in names]
-    picked = combo("holes", last_part(chosen), entries, layout, HOLES_TIP)
-    return [] if picked is None else [SetInpainter(names[picked])]
-
-
-def _views_between(scene: Scene, asked: Source | None, given: GridShape, layout: Layout) -> list[Action]:
+def _views_between(scene: Scene, chosen: GridShape, given: GridShape, layout: Layout) -> list[Action]:
     """The views on disk alone, or one of the denser grids; what was chosen is shown at once."""
-    chosen = chosen_grid(scene, asked)
     label("Views", layout, BETWEEN_TIP)
     grids = (given, *denser_grids(given))
     entries = [(_grid_words(grid, given), _grid_tip(grid, given)) for grid in grids]
     picked = combo("views", _grid_words(chosen, given), entries, layout, BETWEEN_TIP)
     is_new = picked is not None and grids[picked] != chosen
-    return [OpenPath(with_views_between(scene, grids[picked or 0]))] if is_new else []
+    return [DoTask(FillTask(with_views_between(scene, grids[picked or 0])))] if is_new else []
 
 
 def _grid_tip(grid: GridShape, given: GridShape) -> str:

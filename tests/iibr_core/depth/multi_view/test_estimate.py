@@ -5,7 +5,14 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from iibr_core.color import bytes_from_encoded
-from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.estimate import (
+    REFINING_WORK,
+    estimate_coarse,
+    estimate_disparity,
+    map_work,
+    sweep_bytes,
+    sweep_steps,
+)
 from iibr_core.depth.multi_view.guided_filter import GuidedFilter
 from iibr_core.depth.multi_view.matching import (
     COST_STEPS,
@@ -219,3 +226,17 @@ def test_matching_is_what_its_slow_twin_says(disparity):
         halves = [[cost for t, s, cost in costs if is_there(t, s)] for is_there in sides]
         expected = [np.mean(half) if half and len(costs) >= 0.3 * 8 else everything for half in halves]
         np.testing.assert_allclose(found[:, y, x], [*expected, everything], rtol=1e-4, atol=1e-8)
+
+
+@pytest.mark.parametrize(("offsets", "sweeps"), [(OFFSETS, 1), ([ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)], 2)])
+def test_progress_counts_the_sweep_and_what_follows_it(offsets, sweeps):
+    views, _ = slanted_views(0.01, offsets)
+    range_px, told = (-1.0, 1.0), []
+    reference = len(offsets) // 2 if sweeps == 1 else 0
+    estimate_disparity(views, offsets, reference, range_px, report_progress=lambda *now: told.append(now))
+    steps = sweep_steps(range_px, 2.0 if sweeps == 1 else 1.0) + 1
+    done, totals, _ = zip(*told)
+    assert set(totals) == {map_work(steps, len(offsets))}
+    assert done[:steps] == tuple(range(1, steps + 1))
+    assert done[-1] == pytest.approx(totals[0] - REFINING_WORK)
+    assert len(told) == sweeps * (steps + 1)

@@ -63,3 +63,9 @@ def test_an_even_sky_stays_even_and_wild_pixels_count_as_black(roughness):
 
 def test_a_picture_of_one_pixel_serves():
     assert np.allclose(prefilter_environment(np.full((1, 1, 3), 2.0, np.float32), 0.5), 2.0, atol=1e-5)
+
+
+def test_a_large_picture_that_is_smoothed_is_made_smaller_first():
+    light = np.ones((512, 1024, 3), np.float32)
+    assert prefilter_environment(light, 0.11).shape == (256, 512, 3)
+    assert prefilter_environment(light, 0.05).shape == (512, 1024, 3), "as sharp as it is"

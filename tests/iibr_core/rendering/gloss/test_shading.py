@@ -183,3 +183,15 @@ def test_with_nothing_marked_every_view_is_handed_on_untouched():
 def test_a_gloss_that_is_not_sound_is_refused():
     with pytest.raises(InputError, match="roughness"):
         make_gloss_maps(Gloss(roughness=2.0), GREY, np.zeros(SIZE, np.float32), GEOMETRY)
+
+
+def test_surroundings_grow_brighter_towards_grazing_angles_as_schlick_has_it():
+    """In the middle of the picture, at 75 degrees: R + (1 - R) (1 - cos)^5 of them."""
+    angle = np.radians(75)
+    normal = np.broadcast_to(np.array([0, -np.sin(angle), -np.cos(angle)], np.float32), (*SIZE, 3))
+    gloss = Gloss(roughness=0.0, reflectance=0.04, light=DARK)
+    around = np.full((16, 32, 3), 0.9, np.float32)
+    maps = make_gloss_maps(gloss, GREY, np.full(SIZE, 0.5, np.float32), GEOMETRY, around, normals=normal)
+    matt, share = linear_from_srgb(GREY[0, 0, 0]), 0.04 + 0.96 * (1 - np.cos(angle)) ** 5
+    seen = linear_from_srgb(shaded(maps, (0, 0)))[SIZE[0] // 2 - 1 : SIZE[0] // 2 + 1, SIZE[1] // 2, 0].mean()
+    assert seen == pytest.approx(matt + share * (0.9 - matt), abs=3e-3)

@@ -10,6 +10,7 @@ import pytest
 
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
+from viewer.app.batch import ledger
 from viewer.app.batch.archive import ArchivePhoto
 from viewer.app.batch.ledger import FAILURES, MANIFEST, MOST_LINE_BYTES, Ledger, require_batch_place
 from viewer.app.batch.task import BatchSettings, Outcome, PhotoTask, Place, key_of
@@ -18,11 +19,11 @@ from viewer.model.state.scene import Source
 SETTINGS = BatchSettings("disparity", Source(""))
 
 
-def finish(ledger: Ledger, name: str, key: str) -> None:
-    output = ledger.folder / name
+def finish(opened: Ledger, name: str, key: str) -> None:
+    output = opened.folder / name
     output.touch()
-    task = PhotoTask(f"/photos/{name}", Place(str(ledger.folder), name), key, SETTINGS)
-    ledger.add_finished(task, Outcome(str(output)))
+    task = PhotoTask(f"/photos/{name}", Place(str(opened.folder), name), key, SETTINGS)
+    opened.add_finished(task, Outcome(str(output)))
 
 
 def test_what_is_finished_is_known_afterwards(tmp_path: Path) -> None:
@@ -188,3 +189,11 @@ def test_a_key_of_what_cannot_be_read_says_so(tmp_path: Path) -> None:
     for name in ("empty.png", "missing.png"):
         with pytest.raises(InputError, match=name):
             key_of(SETTINGS, ArchivePhoto(str(tmp_path / name), "a"))
+
+
+def test_where_the_system_has_no_locks_a_ledger_opens_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ledger, "fcntl", None)
+    with Ledger(tmp_path):
+        assert (tmp_path / MANIFEST).is_file()

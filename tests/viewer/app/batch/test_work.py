@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from PIL import Image
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight
 from iibr_core.types import GridShape
 from viewer.app.batch.task import BatchSettings, PhotoTask, Place
-from viewer.app.batch.work import export_photo
+from viewer.app.batch.work import _claim, export_photo
 from viewer.model.state.scene import Source
 
 GLOSS = Gloss(roughness=0.5, reflectance=0.5, light=GlossLight((0.0, 0.0, -1.0)))
@@ -34,3 +35,21 @@ def test_gloss_is_in_what_is_made_of_views_and_in_what_is_drawn(
     plain, shiny = pictures
     assert (shiny - plain).min() >= -2
     assert (shiny - plain).mean() > 5
+
+
+def test_a_claim_is_on_disk_to_stay_before_the_photo_counts_as_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its text, and its name in the folder: a power cut cannot be had here, so what is synchronised is noted."""
+    synchronised: list[str] = []
+
+    def note(descriptor: int) -> None:
+        synchronised.append(os.path.realpath(f"/proc/self/fd/{descriptor}"))
+
+    monkeypatch.setattr(os, "fsync", note)
+    task = PhotoTask("a.png", Place(str(tmp_path), "a"), "key", BatchSettings("depth", Source("")))
+    _claim(task, tmp_path / "a")
+    assert task.place.claim.is_file()
+    text, folder = synchronised
+    assert Path(text).parent == tmp_path
+    assert folder == str(tmp_path)

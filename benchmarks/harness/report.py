@@ -1,0 +1,102 @@
+"""How a benchmark is called, and what it leaves: shared options, tables, reports that say what made them."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from iibr_core.formats.outputs import atomic_write
+from iibr_core.generation.cost_model import CORES
+from iibr_core.types import InputError
+
+WITH_CHANGES = " (with changes)"
+"""After a commit's name: the files were not what that commit has."""
+DOCS = Path(__file__).parents[2] / "docs"
+COMMON: dict[str, dict[str, Any]] = {
+    "data": {"type": Path, "metavar": "DIR", "help": "a scene as `iibr evaluate` takes it, or a folder of them"},
+    "out": {"type": Path, "help": "file for the report, which is printed, too"},
+    "seed": {"type": int, "default": 0},
+    "repeats": {"type": int, "default": 3, "help": "rounds, of which medians are taken"},
+    "only": {"default": "", "help": "those whose name contains one of these words, by commas"},
+}
+"""Options that mean the same wherever they are."""
+
+
+def parser_of(doc: str | None, *common: str, **changes: dict[str, Any]) -> argparse.ArgumentParser:
+    """A program's command line, described by its module's text. common: names of COMMON; changes: to those."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in (*common, *(name for name in changes if name not in common)):
+        parser.add_argument(f"--{name}", **{**COMMON[name], **changes.get(name, {})})
+    return parser
+
+
+def start(module: str, main: Callable[[], None]) -> None:
+    """Run a program; bad input ends it in one line and exit code 2."""
+    try:
+        main()
+    except InputError as error:
+        print(f"{module}: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def is_wanted(name: str, only: str) -> bool:
+    """Whether --only names it."""
+    return any(word in name for word in only.split(","))
+
+
+def emit(lines: Iterable[str], out: Path | None = None) -> None:
+    """Print lines as they come, and write them whole or not at all."""
+    told = []
+    for line in lines:
+        told.append(line)
+        print(line, flush=True)
+    if out is not None:
+        with atomic_write(out) as unfinished:
+            unfinished.write_text("\n".join(told).rstrip("\n") + "\n", "utf-8")
+
+
+def title(words: str, module: str, more: str = "") -> str:
+    """What a report begins with: heading, command, commit, machine."""
+    return f"# {words}\n\n{made_by(module)}, on {CORES} cores.{more and ' ' + more}\n"
+
+
+def made_by(module: str) -> str:
+    """The run in words: `python -m module ...` with its options, and the commit where it is known; no full stop."""
+    command = shlex.join(["python", "-m", module, *sys.argv[1:]])
+    commit = current_commit()
+    return f"Made by `{command}`" + (f" at commit {commit}" if commit else "")
+
+
+def current_commit() -> str:
+    """The commit checked out, short; "" outside a checkout. Changes that are not committed are said."""
+    command = ["git", "describe", "--always", "--exclude=*", f"--dirty={WITH_CHANGES}"]
+    try:
+        run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return run.stdout.strip()
+
+
+def row(*cells: object) -> str:
+    """A line of a table."""
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def head(*names: str) -> str:
+    """What a table begins with: two lines."""
+    return f"{row(*names)}\n{row(*['---'] * len(names))}"
+
+
+def markdown(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A whole table."""
+    return "\n".join([head(*names), *(row(*cells) for cells in rows)])
+
+
+def holds(is_so: bool | None) -> str:
+    """Whether a figure is as good as it is to be; None where this system cannot tell."""
+    return {True: "yes", False: "**no**", None: "not known here"}[is_so]

@@ -1,0 +1,156 @@
+"""Time and memory of work, on machines that do other things too.
+
+Ways are run in turns, one round after the other, and compared within a round: what slows one slows its neighbours.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache, partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from benchmarks.harness.scenes import BenchScene
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_literal
+from iibr_core.types import FloatImage, Quality, ReportProgress, StoredColors, ignore_progress
+from viewer.app.batch.threads import set_environment
+
+COMMAND_LINE = (sys.executable, "-P", "-m", "viewer")
+PEAK_RESET, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """wall_s: what a clock on the wall shows. cpu_s: of all threads together, which other programs disturb less."""
+
+    wall_s: float
+    cpu_s: float
+
+    def __add__(self, other: Cost) -> Cost:
+        return Cost(self.wall_s + other.wall_s, self.cpu_s + other.cpu_s)
+
+    def times(self, factor: float) -> Cost:
+        """That many times as much."""
+        return Cost(factor * self.wall_s, factor * self.cpu_s)
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a process ended: exit code, cost, and the most memory that it filled (this one's counts too, but is less)."""
+
+    code: int
+    cost: Cost
+    peak_mib: float
+
+
+def cost_of(work: Callable[[], object]) -> Cost:
+    """What one run of the work costs."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    work()
+    return Cost(time.perf_counter() - wall, time.process_time() - cpu)
+
+
+def in_turns(
+    ways: Mapping[str, Callable[[], Cost]], repeats: int, report_progress: ReportProgress = ignore_progress
+) -> dict[str, list[Cost]]:
+    """The costs that each way gives, one a round; every round goes through all ways."""
+    found: dict[str, list[Cost]] = {name: [] for name in ways}
+    for round_ in range(repeats):
+        for k, (name, way) in enumerate(ways.items()):
+            report_progress(round_ * len(ways) + k, repeats * len(ways), name)
+            found[name].append(way())
+    return found
+
+
+def median_ratio(costs: list[Cost], reference: list[Cost]) -> float:
+    """Of processor times, each against the reference of its own round."""
+    ratios = [one.cpu_s / other.cpu_s for one, other in zip(costs, reference) if other.cpu_s > 0]
+    return float(np.median(ratios)) if ratios else math.nan
+
+
+def median_cost(costs: list[Cost]) -> Cost:
+    """Medians of both times."""
+    return Cost(float(np.median([c.wall_s for c in costs])), float(np.median([c.cpu_s for c in costs])))
+
+
+def make_field(scene: BenchScene, quality: Quality) -> list[tuple[StoredColors, FloatImage | None]]:
+    """All views of a scene as they are kept: colours and disparity."""
+    photo, disparity = scene.given
+    updates = generate(photo, disparity, plan_literal(photo, disparity, scene.grid), quality=quality)
+    return [(update.colors, update.disparity) for update in updates]
+
+
+def field_costs(
+    scenes: Mapping[str, tuple[BenchScene, Quality]], repeats: int, report_progress: ReportProgress = ignore_progress
+) -> dict[str, Cost]:
+    """Medians of whole fields, made in turns, by name; compiling is not counted."""
+    for scene, quality in scenes.values():
+        make_field(scene, quality)
+    ways = {name: partial(cost_of, partial(make_field, *each)) for name, each in scenes.items()}
+    return {name: median_cost(found) for name, found in in_turns(ways, repeats, report_progress).items()}
+
+
+def peak_bytes(work: Callable[..., object], *args: object) -> float:
+    """The most memory that work(*args) takes beyond what was there before, what it returns held until then; the second
+    of two runs counts, in a process of its own. NaN where the system does not tell (all but Linux).
+
+    work: a function of a module; it and args are pickled.
+    """
+    return _gauge().submit(_peak_of, work, args).result() if PEAK_RESET.exists() else math.nan
+
+
+@cache
+def _gauge() -> ProcessPoolExecutor:
+    """A process that gives freed arrays back to the system at once: kept ones would hide what is taken anew."""
+    with set_environment({"MALLOC_MMAP_THRESHOLD_": str(1 << 17)}):
+        gauge = ProcessPoolExecutor(1, get_context("spawn"))
+        gauge.submit(gc.collect).result()  # it starts with its first work
+    return gauge
+
+
+def _peak_of(work: Callable[..., object], args: tuple[object, ...]) -> float:
+    work(*args)
+    gc.collect()
+    return added_bytes(partial(work, *args))
+
+
+def added_bytes(work: Callable[[], object]) -> float:
+    """The most memory that one run takes in this process beyond what was there before, what it returns held until then.
+    NaN as above.
+    """
+    if not PEAK_RESET.exists():
+        work()
+        return math.nan
+    PEAK_RESET.write_text("5")
+    before = psutil.Process().memory_info().rss
+    held = work()
+    peak = _peak_rss()
+    del held
+    return float(peak - before)
+
+
+def _peak_rss() -> int:
+    line = next(line for line in STATUS.read_text().splitlines() if line.startswith("VmHWM"))
+    return 1024 * int(line.split()[1])
+
+
+def run(command: Sequence[object], environment: Mapping[str, str] | None = None) -> Run:
+    """A process from its start to its end; silent."""
+    silent, start = subprocess.DEVNULL, time.perf_counter()
+    child = subprocess.Popen(list(map(str, command)), stdout=silent, stderr=silent, env=environment)
+    _, status, used = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    cost = Cost(time.perf_counter() - start, used.ru_utime + used.ru_stime)
+    return Run(child.returncode, cost, used.ru_maxrss / 1024)

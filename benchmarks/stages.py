@@ -1,0 +1,288 @@
+"""What each stage between map and view is worth: left out alone, on five kinds of maps of drawn and real scenes.
+
+    python -m benchmarks.stages --data DATA [--out docs/stages.md] [--drawn 10] [--only STAGE,...]
+
+Kinds: exact; measured, by matching views (of DATA: as they come); soft, blurred by 1, 2 or 4 px; resampled, from a half
+or a third of the size or dilated; a phone's, of a third of the size, 8 bits, dilated or not, soft. Gaps are what a
+plain warp of the given map leaves open within the frame, edges what lies within 3 px of them; flying pixels stand out
+from their 5 x 5 median within 12 px of gaps, where the truth's do not, in 10,000; texture is the gradient energy of
+wide gaps against the truth's. A stage earns its place by 0.05 dB on whole views or 0.1 at edges on the mean of a kind.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import multiprocessing
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.harness.report import emit, head, holds, is_wanted, parser_of, row, start, title
+from benchmarks.harness.scenes import FIELD
+from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.edges.refine import refine
+from iibr_core.depth.edges.rims import _find_between
+from iibr_core.depth.multi_view.estimate import estimate_disparity
+from iibr_core.evaluation.datasets import find_scenes, read_view
+from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.trials import trial_input, trials_of
+from iibr_core.generation.view_maker import ViewMaker
+from iibr_core.rendering.ray_set import NO_MARGINS
+from iibr_core.runtime.tiling import never
+from iibr_core.training.degradation import blur, quantise
+from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.types import FloatImage, ImageSize, Quality, ViewOffset
+
+KINDS = ("exact", "measured", "soft", "resampled", "a phone's")
+SIZE, FIRST_SEED, DISPARITIES_PX = ImageSize(240, 320), 41_000, (0.5, 4.0)
+JUDGED = [ViewOffset(t * v, s * u) for v, u in ((4, 4), (3, 1)) for t in (-1, 1) for s in (-1, 1)]
+MOST_PIXELS, MOST_JUDGED = 180_000, 6
+"""Of real scenes."""
+EDGE_PX, AROUND_PX, WIDE_PX = 3, 12, 50
+STANDS_OUT, CALM = 0.12, 0.06
+LEAST_WHOLE_DB, LEAST_EDGE_DB = 0.05, 0.1
+
+Mask = NDArray[np.bool_]
+Views = dict[ViewOffset, FloatImage]
+Left = Mapping[str, object]
+"""What is put in place of names of the core."""
+
+
+def _as_given(_: FloatImage, values: FloatImage, *__: object) -> FloatImage:
+    return values
+
+
+def _unsplit(colors: FloatImage, disparity: FloatImage, *_: object) -> tuple[FloatImage, ...]:
+    return colors, colors, np.full_like(disparity, np.nan), np.zeros_like(disparity)
+
+
+def _none_between(values: FloatImage, least_edge: float, *_: object) -> tuple[Mask, int]:
+    between, clear = _find_between(values, least_edge, never)
+    return np.zeros_like(between), clear
+
+
+def _no_lines(*arguments: Any) -> None:
+    arguments[-1][...] = 0
+
+
+def _unagreed(disparity: FloatImage, _: Mask, pixels: NDArray[np.int64], agreed: FloatImage) -> None:
+    agreed[:, 0] = disparity.ravel()[pixels]
+
+
+STAGES: dict[str, Left] = {
+    "sharpen soft edges": {"depth.edges.refine._sharpen": lambda _, values, *__: (values, None)},
+    "fit to the blur": {"depth.edges.refine.fit_to_blur": lambda _, __, refined, *___: refined},
+    "settle edge bands (next three)": {"depth.edges.refine.settle_rims": _as_given},
+    "refill disparities between surfaces": {"depth.edges.rims._find_between": _none_between},
+    "label edge bands by colour": {"depth.edges.rims.choose_sides": _as_given},
+    "grow over defocused boundaries": {"depth.edges.rims.widen_fronts": _as_given},
+    "split mixed pixels": {"rendering.view_synthesis.split_mixed_pixels": _unsplit},
+    "continue beyond the frame": {"generation.view_maker.margins_beyond_frame": lambda *_: NO_MARGINS},
+    "lines beyond the frame": {"inpainting.beyond_frame.find_lines": _no_lines},
+    "connect slopes": {"rendering.ray_set.join_rays": lambda disparity, *_: np.zeros(disparity.shape, np.uint8)},
+    "leave out what was inpainted in front": {"rendering.ray_set._leave_out_in_front": lambda *_: None},
+    "share what was inpainted": {"generation.view_maker.render_outer_views": lambda *_, **__: iter(())},
+    "reopen holes in the foreground": {
+        "rendering.view_synthesis.ViewSynthesis._reopened": lambda _, __, ___, ____, hole, *_____: np.zeros_like(hole)
+    },
+    "lay partial coverage over": {"rendering.view_synthesis.WHOLE": 0.0},
+    "ray transformer": {},
+    "remove flying pixels": {"rendering.view_synthesis.without_specks": lambda _, __, colors, *___: colors},
+    "lines into gaps": {"inpainting.background.find_lines": _no_lines},
+    "smooth gaps": {"inpainting.background.SMOOTH_STEPS_PX": ()},
+    "median disparity in gaps": {"inpainting.background._agree": _unagreed},
+    "patches in gaps": {"inpainting.background.copy_exemplars": lambda *_, **__: None},
+}
+"""By the stage that is left out. Without the transformer quality is fast."""
+
+
+def main() -> None:
+    parser = parser_of(__doc__, "out", "only", data={"required": True})
+    parser.add_argument("--drawn", type=int, default=10)
+    options = parser.parse_args()
+    emit(report(options.data, options.drawn, [name for name in STAGES if is_wanted(name, options.only)]), options.out)
+
+
+def report(data: Path, drawn_scenes: int, stages: Sequence[str]) -> Iterator[str]:
+    """One row a stage: what changes when it is left out, the mean of each kind."""
+    jobs = [functools.partial(_judge_drawn, seed, stages) for seed in range(FIRST_SEED, FIRST_SEED + drawn_scenes)]
+    jobs += [functools.partial(_judge_real, data, place, stages) for place in range(len(list(find_scenes(data))))]
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        found = [of_map for of_scene in pool.map(_call, jobs) for of_map in of_scene]
+    counts = {kind: sum(one[0] == kind for one in found) for kind in KINDS}
+    maps = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    yield title("What each stage is worth", "benchmarks.stages", f"Maps: {maps}.")
+    yield (__doc__ or "").split("\n\n")[2]
+    yield "Each cell: whole views, edges, gaps (dB); flying pixels; texture; processor time, as a share. Negative"
+    yield "decibels: the stage gains so much. The first row holds the figures themselves, seconds last.\n"
+    yield head("left out", *(kind for kind in KINDS if counts[kind]), "earns its place")
+    for stage in ("nothing", *stages):
+        means = {kind: _mean_change(found, kind, stage) for kind in KINDS if counts[kind]}
+        earns = any(mean[0] <= -LEAST_WHOLE_DB or mean[1] <= -LEAST_EDGE_DB for mean in means.values())
+        yield row(stage, *map(_cell, means.values()), "" if stage == "nothing" else holds(earns))
+
+
+Judged = tuple[str, dict[str, NDArray[np.float64]]]
+"""A kind of map; by what was left out, the figures of a cell."""
+
+
+def _call(job: Callable[[], list[Judged]]) -> list[Judged]:
+    return job()
+
+
+def _mean_change(found: Sequence[Judged], kind: str, stage: str) -> NDArray[np.float64]:
+    rows = [(of_stage[stage], of_stage["nothing"]) for of_kind, of_stage in found if of_kind == kind]
+    if stage == "nothing":
+        return _mean_known([own for own, _ in rows])
+    changes = [np.append(own[:5] - whole[:5], own[5] / whole[5] - 1) for own, whole in rows]
+    return _mean_known(changes)
+
+
+def _mean_known(rows: Sequence[Sequence[float] | NDArray[np.float64]]) -> NDArray[np.float64]:
+    """By column; NaN where a column is."""
+    values = np.array(rows, np.float64)
+    counts = np.isfinite(values).sum(axis=0)
+    return np.where(counts > 0, np.nansum(values, axis=0) / np.maximum(counts, 1), np.nan)
+
+
+def _cell(mean: NDArray[np.float64]) -> str:
+    whole, edges, gaps, flying, texture, seconds = mean
+    return f"{whole:+.2f}, {edges:+.2f}, {gaps:+.2f}; {flying:+.1f}; {texture:+.2f}; {seconds:+.2f}"
+
+
+def _judge_drawn(seed: int, stages: Sequence[str]) -> list[Judged]:
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng, SIZE, float(np.exp(rng.uniform(*np.log(DISPARITIES_PX)))))
+    photo, exact = render(scene, SIZE, ViewOffset(0, 0))
+    truth = {offset: render(scene, SIZE, offset)[0] for offset in JUDGED}
+    offsets = [ViewOffset(0, 0), ViewOffset(0, 1), ViewOffset(0, -1)]
+    views = [stored_from_encoded(render(scene, SIZE, offset)[0], False) for offset in offsets]
+    measured = estimate_disparity(views, offsets, 0, (float(exact.min()) - 0.2, float(exact.max()) + 0.2))
+    maps = {"exact": exact, "measured": measured.astype(np.float32), **_worse(exact, seed)}
+    field = [FIELD.offset(row, column) for row, column in np.ndindex(*FIELD)]
+    return [(kind, _figures(photo, exact, values, None, truth, field, stages)) for kind, values in maps.items()]
+
+
+def _judge_real(data: Path, place: int, stages: Sequence[str]) -> list[Judged]:
+    scene = list(find_scenes(data))[place]
+    trial = trials_of(scene, "auto", MOST_JUDGED)[0]
+    given = trial_input(trial, "auto", DepthChoice(), MOST_PIXELS)
+    truth = {trial.offset(k): read_view(scene.views[k], MOST_PIXELS) for k in trial.judged}
+    own, known = given.maps[0], "exact" if given.maps[0].unknown is None else "measured"
+    maps = {known: (own.values, own.unknown), **{kind: (v, None) for kind, v in _worse(own.values, place).items()}}
+    return [
+        (kind, _figures(given.photo, own.values, values, unknown, truth, list(truth), stages))
+        for kind, (values, unknown) in maps.items()
+    ]
+
+
+def _worse(exact: FloatImage, seed: int) -> dict[str, FloatImage]:
+    """Of the kinds that are made of a better map; each scene has another fault of a kind."""
+    step = float(np.ptp(exact)) / 255
+    dilated = cv2.dilate(exact, np.ones((3, 3)))
+    resampled = (
+        lambda: _through(exact, 2, cv2.INTER_LINEAR),
+        lambda: _through(exact, 2, cv2.INTER_CUBIC),
+        lambda: _through(exact, 3, cv2.INTER_NEAREST),
+        lambda: dilated,
+        lambda: cv2.dilate(exact, np.ones((5, 5))),
+        lambda: _through(exact, 2, cv2.INTER_NEAREST),
+    )
+    phone = blur(quantise(_through(dilated if seed % 2 else exact, 3, cv2.INTER_LINEAR), step), 1.0)
+    made = {"soft": blur(exact, (1.0, 2.0, 4.0)[seed % 3]), "resampled": resampled[seed % 6](), "a phone's": phone}
+    return {kind: np.ascontiguousarray(values, np.float32) for kind, values in made.items()}
+
+
+def _through(values: FloatImage, factor: int, filter_: int) -> FloatImage:
+    """Made smaller and larger again."""
+    height, width = values.shape
+    smaller = cv2.INTER_NEAREST if filter_ == cv2.INTER_NEAREST else cv2.INTER_AREA
+    small = cv2.resize(values, (width // factor, height // factor), interpolation=smaller)
+    return np.asarray(cv2.resize(small, (width, height), interpolation=filter_), np.float32)
+
+
+def _figures(
+    photo: FloatImage,
+    better: FloatImage,
+    given: FloatImage,
+    unknown: Mask | None,
+    truth: Views,
+    field: Sequence[ViewOffset],
+    stages: Sequence[str],
+) -> dict[str, NDArray[np.float64]]:
+    """By what is left out. better: the map that tells where gaps are, whatever was given."""
+    holes = {offset: reference_warp(photo, better, offset).hole for offset in truth}
+    _make(photo, given, unknown, truth, field, "nothing")  # compiles
+    found = {}
+    for stage in ("nothing", *stages):
+        begun = time.process_time()
+        made = _make(photo, given, unknown, truth, field, stage)
+        seconds = time.process_time() - begun
+        found[stage] = np.append(_mean_known([_judge(made[at], truth[at], holes[at]) for at in truth]), seconds)
+    return found
+
+
+def _make(
+    photo: FloatImage,
+    given: FloatImage,
+    unknown: Mask | None,
+    truth: Views,
+    field: Sequence[ViewOffset],
+    left_out: str,
+) -> Views:
+    quality: Quality = "fast" if left_out == "ray transformer" else "balanced"
+    with ExitStack() as until_done:
+        for name, instead in STAGES.get(left_out, {}).items():
+            until_done.enter_context(patch(f"iibr_core.{name}", instead))
+        disparity = refine(photo, given, 1.0, unknown)
+        maker = until_done.enter_context(ViewMaker(photo, disparity, field, (quality,)))
+        colors = {offset: maker.view(quality, offset).colors for offset in truth}
+        return {offset: encoded_from_stored(stored_from_encoded(made, False)) for offset, made in colors.items()}
+
+
+def _judge(made: FloatImage, truth: FloatImage, hole: Mask) -> list[float]:
+    """Whole, edges, gaps, flying pixels, texture; NaN where there is nothing to judge."""
+    labels = cv2.connectedComponents(hole.astype(np.uint8))[1]
+    at_frame = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
+    beyond = np.isin(labels, at_frame[at_frame > 0])
+    gap, edge = hole & ~beyond, _grown(hole, EDGE_PX) & ~hole
+    around = _grown(gap, AROUND_PX) & ~_grown(beyond, 2)
+    wide = cv2.morphologyEx(gap.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3))) > 0
+    flies = around & (_off_median(made) > STANDS_OUT) & (_off_median(truth) < CALM)
+    has_texture = wide.sum() > WIDE_PX
+    return [
+        bounded_psnr(made, truth),
+        bounded_psnr(made, truth, edge),
+        bounded_psnr(made, truth, gap),
+        1e4 * flies.sum() / around.sum() if around.any() else math.nan,
+        _gradient(made)[wide].mean() / max(_gradient(truth)[wide].mean(), 1e-6) if has_texture else math.nan,
+    ]
+
+
+def _grown(mask: Mask, pixels: int) -> Mask:
+    return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((2 * pixels + 1,) * 2, np.uint8)) > 0)
+
+
+def _off_median(picture: FloatImage) -> FloatImage:
+    stored = np.round(255 * np.clip(picture, 0, 1)).astype(np.uint8)
+    return np.abs(stored.astype(np.float32) - cv2.medianBlur(stored, 5)).max(axis=2) / np.float32(255)
+
+
+def _gradient(picture: FloatImage) -> FloatImage:
+    grey = cv2.cvtColor(np.ascontiguousarray(picture, np.float32), cv2.COLOR_RGB2GRAY)
+    return np.hypot(np.diff(grey, axis=1, append=grey[:, -1:]), np.diff(grey, axis=0, append=grey[-1:]))
+
+
+if __name__ == "__main__":
+    start("benchmarks.stages", main)

@@ -1,0 +1,199 @@
+"""Depth models as ONNX files, run by ONNX Runtime: no torch, one file of weights.
+
+Name and size of the input are read from the file. The JSON files beside it say how the photo is prepared, and
+whether the output is depth or inverse depth; without them, both are as Depth Anything V2 has them.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR, read_config, read_preparation
+from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
+from iibr_core.depth.estimators.protocol import Family, KnownModel, LocalModel, Run
+from iibr_core.formats.files import is_file
+from iibr_core.runtime.extras import said_by
+from iibr_core.runtime.machine import core_count
+from iibr_core.runtime.tiling import Cancelled, ShouldStop
+from iibr_core.types import ImageSize, InputError, Photo, ReportProgress
+
+USUAL_PREPARATION = Preparation(ImageSize(518, 518), True, 14, False, (0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
+"""As Depth Anything V2 publishes it: for files without a preprocessor_config.json."""
+KINDS = (None, "depth_anything", "dpt")
+"""By the config's model type: those that give inverse depth, or say that they give metres."""
+ACTIVATION_BYTES = 1500
+"""For each pixel of the input; measured with Depth Anything V2 Small: 1,320 at 686x518, 1,900 at 980x518."""
+USUAL_WEIGHT_BYTES = 99e6
+"""Of that model. Activations grow with a network's width, weights with its square."""
+NUMBER_TYPES = {"tensor(float)": "float32", "tensor(float16)": "float16"}
+LOOK_S = 0.05
+"""How often a running estimate looks whether it is still wanted."""
+
+
+@dataclass(frozen=True)
+class OnnxInput:
+    """How a photo becomes the input of an ONNX model. is_metric: whether the model gives metres."""
+
+    preparation: Preparation
+    size: ImageSize
+    is_metric: bool
+
+
+def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> OnnxInput:
+    """The input for a photo of (height, width). Raises InputError where the memory is too small for any."""
+    folder = model.folder
+    is_told = is_file(folder / PREPROCESSOR)
+    preparation = read_preparation(folder, USUAL_PREPARATION) if is_told else USUAL_PREPARATION
+    is_metric = is_file(folder / CONFIG) and read_config(folder).get("depth_estimation_type") == "metric"
+    least = (2 * preparation.multiple) ** 2
+    per_pixel = ACTIVATION_BYTES * max(1, math.sqrt(model.weight_bytes / USUAL_WEIGHT_BYTES))
+    pixels = affordable_pixels(model.title, model.weight_bytes, per_pixel, least, memory_bytes)
+    return OnnxInput(preparation, input_size(preparation, size, pixels), is_metric)
+
+
+def run_onnx(
+    model: LocalModel, wanted: OnnxInput, photo: Photo, should_stop: ShouldStop, report_progress: ReportProgress
+) -> Estimate:
+    """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
+
+    Raises InputError where the file is no depth model, Cancelled once should_stop is true.
+    """
+    (file,) = model.weights
+    report_progress(0, 0, f"loading {model.title}")
+    session = _open(file)
+    name, size, number_type = _input_of(session, file)
+    values = network_input(photo.pixels, wanted.preparation, size or wanted.size).astype(number_type)
+    report_progress(0, 0, f"estimating depth with {model.title}")
+    output = _run(session, file, {name: values}, should_stop)
+    depth = np.asarray(output, np.float32)
+    depth = depth[:, 0] if depth.ndim == 4 and depth.shape[1] == 1 else depth
+    if depth.ndim != 3 or len(depth) != 1 or not depth.size:
+        raise InputError(f"{file}: gives an array of shape {depth.shape}, not one map of depth; choose a depth model")
+    return MetricDepth(depth[0]) if wanted.is_metric else RelativeInverseDepth(depth[0])
+
+
+def _open(file: Path) -> Any:
+    """A session for the file. Raises InputError where it is no ONNX model, or ONNX Runtime is not installed."""
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise InputError(
+            f"{file}: running it needs ONNX Runtime, which has no package for this Python yet; use Python 3.11 to 3.14"
+        ) from error
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = core_count()
+    # Threads that spin while they wait would take the cores from the window.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # its errors share no class of their own
+        raise InputError(f"{file}: is no ONNX model that can be run ({said_by(error)}); get it again") from error
+
+
+def _input_of(session: Any, file: Path) -> tuple[str, ImageSize | None, str]:
+    """Name, (height, width) where the file fixes it, and number type of the one input."""
+    inputs = session.get_inputs()
+    if len(inputs) != 1 or len(inputs[0].shape) != 4 or inputs[0].type not in NUMBER_TYPES:
+        told = ", ".join(f"{each.name} {each.shape} {each.type}" for each in inputs)[:160]
+        raise InputError(f"{file}: does not take one picture (N, 3, H, W) but {told}; choose a depth model")
+    height, width = inputs[0].shape[2:]
+    is_fixed = isinstance(height, int) and isinstance(width, int)
+    return inputs[0].name, ImageSize(height, width) if is_fixed else None, NUMBER_TYPES[inputs[0].type]
+
+
+def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldStop) -> Any:
+    """The first output. The session runs in a thread of its own, so that it can be stopped."""
+    import onnxruntime
+
+    options = onnxruntime.RunOptions()
+    with ThreadPoolExecutor(1, "iibr-onnx") as thread:
+        running = thread.submit(session.run, None, values, options)
+        while not wait([running], LOOK_S).done:
+            options.terminate = options.terminate or should_stop()
+    if options.terminate:
+        raise Cancelled
+    try:
+        return running.result()[0]
+    except Exception as error:  # as above
+        raise InputError(f"{file}: failed on this photo ({said_by(error)})") from error
+
+
+def _accepts(path: Path) -> bool:
+    """An ONNX file, or a folder with some whose output means what this family takes it for."""
+    if is_file(path):
+        return path.suffix == ".onnx"
+    is_told = is_file(path / CONFIG)
+    return bool(_files_in(path)) and (not is_told or read_config(path).get("model_type") in KINDS)
+
+
+def _files_in(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.onnx")) + sorted(folder.glob("onnx/*.onnx"))
+
+
+def weights_in(path: Path) -> tuple[Path, ...]:
+    """The one ONNX file of a model's folder, `model.onnx` where there are several; a file is its own.
+
+    Raises InputError where that leaves open which is meant.
+    """
+    files = [path] if is_file(path) else _files_in(path)
+    full = [file for file in files if file.name == "model.onnx"]
+    if len(files) != 1 and len(full) != 1:
+        names = ", ".join(file.name for file in files[:3]) or "none"
+        raise InputError(f"{path}: which ONNX file is meant ({names})? Name it with --depth-model {path}/FILE.onnx")
+    return ((full or files)[0],)
+
+
+def _prepare(model: LocalModel, size: ImageSize, memory_bytes: int) -> tuple[object, Run]:
+    wanted = input_for(model, size, memory_bytes)
+    return wanted, partial(run_onnx, model, wanted)
+
+
+MODELS = (
+    KnownModel(
+        "depth-anything-v2-small",
+        "Depth Anything V2 Small",
+        "onnx-community/depth-anything-v2-small",
+        "64fe43eba7f8a384b02fe3fadaa26cbba35548d8",
+        99,
+        "Apache-2.0",
+        "any photo; the fastest",
+        is_recommended=True,
+    ),
+    KnownModel(
+        "depth-anything-v2-base",
+        "Depth Anything V2 Base",
+        "onnx-community/depth-anything-v2-base",
+        "6db5e16b48d85e78c043e57f8411a23550edbbfc",
+        389,
+        "CC-BY-NC-4.0 (not for commercial use)",
+        "any photo; finer shapes than Small, slower",
+    ),
+    KnownModel(
+        "depth-anything-v2-large",
+        "Depth Anything V2 Large",
+        "onnx-community/depth-anything-v2-large",
+        "e5476ff1183c8cfb19fcf293a5904c7403e77695",
+        1340,
+        "CC-BY-NC-4.0 (not for commercial use)",
+        "any photo; the finest shapes of the three, the slowest",
+    ),
+)
+
+FAMILY = Family(
+    packages=("onnxruntime",),
+    install="use Python 3.11 to 3.14, later ones have no package of it yet",
+    fetched=(CONFIG, PREPROCESSOR, "onnx/model.onnx"),
+    accepts=_accepts,
+    weights_in=weights_in,
+    prepare=_prepare,
+    models=MODELS,
+)

@@ -1,0 +1,121 @@
+"""A light field in memory: its views, views between them, pictures through a lens, and writing it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import encoded_from_stored
+from iibr_core.evaluation.refocus import FocalStack, Focus
+from iibr_core.formats.light_fields.registry import WRITERS, writer_for
+from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate
+
+FORMATS = tuple(WRITERS)
+"""That `LightField.save` knows."""
+
+View = ViewUpdate
+"""One view of a light field: row, column, colors (H, W, 3), disparity (H, W) and inpainted (H, W)."""
+
+MakeView = Callable[[ViewOffset], FloatImage]
+
+
+@dataclass(frozen=True, eq=False)
+class LightField:
+    """A light field in memory.
+
+    views: (V, U, H, W, 3), uint8 (255 = white), float16 for HDR photos (1 = white). disparity: (V, U, H, W) float32, px
+    from view to view, None where no view has any. inpainted: (V, U, H, W) bool, True where the photo saw nothing; None
+    where nobody knows. focal_px: focal length in px of a view.
+    """
+
+    views: StoredColors
+    disparity: FloatImage | None
+    inpainted: NDArray[np.bool_] | None
+    focal_px: float
+    name: str = "field"
+    _view_between: MakeView | None = field(default=None, repr=False)
+
+    @property
+    def grid(self) -> GridShape:
+        """Rows and columns of views."""
+        return GridShape(*self.views.shape[:2])
+
+    def view(self, s: float, t: float) -> FloatImage:
+        """The view s steps to the right of the middle one and t steps below it, (H, W, 3) float32, 1 = white.
+
+        Between the views that are stored, a photo's light field makes it. Raises InputError outside the grid, and
+        between the views of a light field that came from disk.
+        """
+        (v, u), (rows, columns) = self.grid.centre, self.grid
+        row, column = v + t, u + s
+        if not (0 <= row <= rows - 1 and 0 <= column <= columns - 1):
+            raise InputError(
+                f"view {s:g},{t:g}: outside the field, where s goes from {-u} to {columns - 1 - u} and t from {-v} to"
+                f" {rows - 1 - v}"
+            )
+        if row == round(row) and column == round(column):
+            return encoded_from_stored(self.views[round(row), round(column)])
+        if self._view_between is None:
+            raise InputError(f"view {s:g},{t:g}: lies between stored views; open the field and ask for a denser grid")
+        return self._view_between(ViewOffset(t, s))
+
+    def refocus(self, disparity: float, aperture: float) -> FloatImage:
+        """A picture through a round lens in the middle of the field, (H, W, 3) float32, 1 = white: the mean, in linear
+        light, of the views inside it, moved so that what has this disparity (px from view to view) is sharp.
+
+        aperture: diameter in view steps; 0 is the middle view. Raises InputError where it is negative or not finite.
+        """
+        if not (math.isfinite(disparity) and math.isfinite(aperture) and aperture >= 0):
+            raise InputError(
+                f"refocus at {disparity:g} with aperture {aperture:g}: give finite numbers, no aperture < 0"
+            )
+        if aperture == 0:
+            return self.view(0, 0)
+        focus = Focus("asked for", disparity, aperture / 2)
+        stack = FocalStack([focus])
+        beside = ((focus.margin_px, focus.margin_px),) * 2 + ((0, 0),)
+        for row, column in np.ndindex(*self.grid):
+            colors = encoded_from_stored(self.views[row, column])
+            stack.add(self.grid.offset(row, column), np.pad(colors, beside, mode="edge"))
+        return stack.pictures()[0]
+
+    def save(self, path: str | Path, format: str = "hci", may_replace: bool = False) -> None:
+        """Write the field: a folder, or one file, as the format says; one of FORMATS.
+
+        Raises InputError where that is not possible, or something is there that may not be replaced.
+        """
+        writer = writer_for(format)
+        writer.require_place(Path(path), (), may_replace)
+        with writer(Path(path), self.grid, self.focal_px, self.name, self.disparity is not None) as opened:
+            for at in np.ndindex(*self.grid):
+                row, column = at
+                opened.add(
+                    ViewUpdate(row, column, self.views[at], None if self.disparity is None else self.disparity[at])
+                )
+
+
+def gather(
+    made: Iterator[View],
+    grid: GridShape,
+    focal_px: float,
+    name: str,
+    view_between: MakeView | None,
+) -> LightField:
+    """All views as arrays; of views that come twice the last counts."""
+    first = next(made)
+    size = first.colors.shape[:2]
+    views = np.empty((*grid, *first.colors.shape), first.colors.dtype)
+    disparity = None if first.disparity is None else np.empty((*grid, *size), np.float32)
+    inpainted = None if first.inpainted is None else np.empty((*grid, *size), np.bool_)
+    for view in (first, *made):
+        views[view.row, view.column] = view.colors
+        if disparity is not None:
+            disparity[view.row, view.column] = view.disparity
+        if inpainted is not None:
+            inpainted[view.row, view.column] = view.inpainted
+    return LightField(views, disparity, inpainted, focal_px, name, view_between)

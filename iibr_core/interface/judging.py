@@ -1,0 +1,54 @@
+"""How far pictures are from true ones, and views from those of data sets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from iibr_core.evaluation import protocol
+from iibr_core.evaluation.datasets import find_scenes
+from iibr_core.evaluation.metrics import flip, psnr, ssim
+from iibr_core.interface.scenes import encoded
+from iibr_core.runtime.extras import require_extra
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import InputError, ReportProgress, ignore_progress
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How far a picture is from the true one: PSNR in dB, infinite for equal ones; SSIM, 1 for equal ones; FLIP, 0."""
+
+    psnr_db: float
+    ssim: float
+    flip: float
+
+
+def compare(picture: NDArray[Any], truth: NDArray[Any]) -> Comparison:
+    """How far a picture (H, W, 3) is from the true one of the same shape; uint8, or float with 1 = white.
+
+    Raises InputError where the shapes differ, or a package is missing: pip install 'iibr[evaluate]'.
+    """
+    if picture.shape != truth.shape or picture.ndim != 3:
+        raise InputError(f"pictures of shapes {picture.shape} and {truth.shape} cannot be compared")
+    require_extra("evaluate", "skimage", "flip_evaluator")
+    one, other = encoded(picture), encoded(truth)
+    return Comparison(psnr(one, other), ssim(one, other), flip(one, other))
+
+
+def evaluate(
+    folder: str | Path,
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+    **options: Any,
+) -> list[protocol.EvaluationResult]:
+    """Judge views against those of a data set: a folder of one scene, or of several, as `iibr evaluate` takes it.
+
+    options: fields of `iibr_core.evaluation.protocol.Options`. Raises InputError, and Cancelled once should_stop is
+    true.
+    """
+    wanted = protocol.Options(**options)
+    scenes = find_scenes(Path(folder))
+    return [one for scene in scenes for one in protocol.evaluate(scene, wanted, report_progress, should_stop)]

@@ -1,0 +1,313 @@
+"""Scenes: a photo with its disparity, or a light field from disk, and the light fields that are made of them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal, TypedDict, Unpack, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import encoded_from_stored, photo_in_srgb
+from iibr_core.depth.choice import DepthChoice, DepthStart
+from iibr_core.depth.search import open_with_depth
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_photo
+from iibr_core.formats.light_fields.registry import is_light_field, open_light_field
+from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.memory_model import budget_of
+from iibr_core.generation.plan import PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
+from iibr_core.generation.view_maker import ViewMaker
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
+from iibr_core.interface.fields import LightField, MakeView, View, gather
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    GridShape,
+    InputError,
+    Photo,
+    Quality,
+    ReportProgress,
+    ViewOffset,
+    ignore_progress,
+)
+
+Parallax = Literal["viewing", "literal"]
+"""How far views move: as the window shows a scene, whatever the units of its disparity, or by the disparity as it was
+given, in px from view to view.
+"""
+Grid = int | tuple[int, int] | None
+"""Views across and down: 9 is 9 x 9, (5, 9) five rows of nine."""
+
+
+class ViewOptions(TypedDict, total=False):
+    """How views are made; what is left out is the usual.
+
+    parallax: see `Parallax`; "viewing" if left out. depth_strength: times the viewing parallax. quality: "fast"
+    or "balanced"; else the plan chooses. inpaint: what fills holes, as `iibr generate --inpaint` takes it.
+    memory_bytes: what the process may take; else a share of what there is.
+    """
+
+    parallax: Parallax
+    depth_strength: float
+    quality: Quality
+    inpaint: str
+    memory_bytes: int
+
+
+class Scene(ABC):
+    """A photo with its depth, or a light field from disk.
+
+    name: of it. photo: it, or the middle view, (H, W, 3) float32, 1 = white. focal_px: focal length in px of a view.
+    depth_source: where its depth came from, in words. notes: what reading it changed, one sentence each.
+    """
+
+    name: str
+    photo: FloatImage
+    focal_px: float
+    depth_source: str
+    notes: tuple[str, ...]
+
+    def light_field(
+        self,
+        grid: Grid = None,
+        should_stop: ShouldStop = never,
+        report_progress: ReportProgress = ignore_progress,
+        **options: Unpack[ViewOptions],
+    ) -> LightField:
+        """All views, in memory.
+
+        grid: None for the plan's; of a light field from disk its own. options: see `ViewOptions`; a light field
+        from disk takes inpaint and memory_bytes, for views between its own. report_progress: told the share that is
+        done. Raises InputError where an option means nothing or memory does not suffice, Cancelled once should_stop is
+        true.
+        """
+        made = self._make(grid, options, should_stop)
+        return gather(_told(made, should_stop, report_progress), made.grid, self.focal_px, self.name, made.view_between)
+
+    def views(
+        self,
+        grid: Grid = None,
+        should_stop: ShouldStop = never,
+        report_progress: ReportProgress = ignore_progress,
+        **options: Unpack[ViewOptions],
+    ) -> Iterator[View]:
+        """Every view once, as it is ready, the middle one first; none is kept. Arguments of `light_field`."""
+        return _told(self._make(grid, options, should_stop), should_stop, report_progress)
+
+    @abstractmethod
+    def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
+        """Begin to make views. Raises InputError."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Making:
+    """The views of a grid, as they come. view_between: makes those between; None: nothing does. doing: in words."""
+
+    grid: GridShape
+    views: Iterator[View]
+    view_between: MakeView | None
+    doing: str
+
+
+def _told(made: _Making, should_stop: ShouldStop, report_progress: ReportProgress) -> Iterator[View]:
+    """The views, telling how far they are. Raises Cancelled once should_stop is true: what makes them ends then."""
+    for view in made.views:
+        raise_if_stopped(should_stop)
+        report_progress(view.share, 1.0, made.doing)
+        yield view
+    raise_if_stopped(should_stop)
+
+
+class PhotoScene(Scene):
+    """A photo and its disparity."""
+
+    def __init__(self, photo: Photo, disparity: Disparity, depth_source: str) -> None:
+        self._photo, self._given = photo_in_srgb(photo), disparity
+        self.name, self.photo, self.focal_px = photo.name, self._photo.pixels, photo.focal_px
+        self.depth_source, self.notes = depth_source, photo.notes + disparity.notes
+
+    @property
+    def disparity(self) -> FloatImage:
+        """As it was given or found, (H, W) float32, larger is closer."""
+        return self._given.values
+
+    def plan(self, grid: Grid = None, **options: Unpack[ViewOptions]) -> ScenePlan:
+        """What will be made, and what that takes. Arguments of `light_field`. Raises InputError."""
+        _require_known(options, ViewOptions.__annotations__)
+        shape, strength = _grid_shape(grid), options.get("depth_strength", 1.0)
+        parallax = options.get("parallax", "viewing")
+        memory, quality, inpaint = options.get("memory_bytes"), options.get("quality"), _inpainting(options)
+        if quality not in (None, *get_args(Quality)):
+            raise InputError(f"quality {quality!r}: give {' or '.join(map(repr, get_args(Quality)))}")
+        if parallax == "viewing":
+            overrides = PlanOverrides(shape, strength, None, memory, quality, inpaint)
+            return plan_for_viewing(self._photo, self._given, overrides)
+        if parallax != "literal":
+            raise InputError(f"parallax {parallax!r}: give 'viewing' or 'literal'")
+        if shape is None or strength != 1:
+            raise InputError("parallax 'literal' takes disparity as it is: give a grid, and no depth_strength")
+        return plan_literal(self._photo, self._given, shape, memory, quality, keeps_views=True, inpaint=inpaint)
+
+    def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
+        plan = self.plan(grid, **options)
+        disparity = plan.field_disparity(self._given)
+        views = generate(self._photo, disparity, plan, should_stop, inpaint=_inpainting(options))
+        return _Making(plan.grid, views, _ViewsBetween(self.photo, disparity.values, plan), "making views")
+
+
+class FieldScene(Scene):
+    """A light field on disk. Views between its own are made from all of them; their disparity is found if need be."""
+
+    def __init__(self, found: MultiView) -> None:
+        self._field, self._grid = found, grid_of(found)
+        self.photo = encoded_from_stored(read_stored_view(found, *self._grid.centre))
+        self.name, self.notes, self.focal_px = found.name, found.notes, found.focal_px or float(self.photo.shape[1])
+        self.depth_source = "the light field" if found.disparity else "none"
+
+    def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
+        _require_known(options, ("inpaint", "memory_bytes"))
+        wanted = _grid_shape(grid) or self._grid
+        if wanted == self._grid:
+            return _Making(wanted, read_views(self._field)[1], None, "reading views")
+        return _Making(wanted, self._denser(wanted, should_stop, options), None, "making views")
+
+    def _denser(self, grid: GridShape, should_stop: ShouldStop, options: ViewOptions) -> Iterator[View]:
+        from iibr_core.generation.dense_field import densify, require_steps
+        from iibr_core.generation.given_views import read_given_views
+
+        require_steps(self._grid, grid, self.name)
+        given = read_given_views(self._field, budget_of(options.get("memory_bytes")), should_stop)
+        return densify(given, self._grid, grid, should_stop, load_inpainter(_inpainting(options)))
+
+
+def open(
+    path: str | Path,
+    depth: DepthStart | str | Path = "auto",
+    refine: float = 1.0,
+    max_pixels: int = DEFAULT_MAX_PIXELS,
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+) -> Scene:
+    """Open a photo, or a light field: a folder of views, a quilt, a lenslet image.
+
+    depth: of a photo, where it comes from: "auto" (a map beside it, the photo's own, a model that is here, a guess),
+    "embedded", "model", "rough", "flat", or the path of a map. refine: how far its edges are drawn to the photo's, 0 to
+    1. Raises InputError for what cannot be read, Cancelled once should_stop is true.
+    """
+    path = Path(path)
+    if is_light_field(path):
+        return FieldScene(open_light_field(path))
+    found = open_with_depth(
+        path, _choice_of(depth, refine), max_pixels, should_stop=should_stop, report_progress=report_progress
+    )
+    return PhotoScene(found.photo, found.disparity, found.origin.words)
+
+
+def from_arrays(
+    photo: NDArray[Any], disparity: NDArray[Any], focal_px: float | None = None, name: str = "photo"
+) -> PhotoScene:
+    """A scene of a photo (H, W, 3), uint8 or float with 1 = white, and its disparity (H, W), larger is closer.
+
+    focal_px: focal length in px, None for that of a usual lens. The disparity counts as it is: nothing is refined, and
+    its unit matters for parallax "literal" alone. Raises InputError for other shapes and values that are not finite.
+    """
+    given, disparity = _photo_of(photo, focal_px, name), np.asarray(disparity)
+    if disparity.shape != given.size:
+        raise InputError(
+            f"a disparity of shape {disparity.shape} for a photo of {tuple(given.size)}: give the same (H, W)"
+        )
+    with np.errstate(over="ignore"):
+        return PhotoScene(given, Disparity(disparity.astype(np.float32), "the given array"), "the given array")
+
+
+def estimate_depth(
+    photo: NDArray[Any] | str | Path,
+    model: str | Path | None = None,
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+) -> FloatImage:
+    """Inverse depth (H, W) float32 of a photo, larger is closer, in no unit: by a model that is on this machine.
+
+    photo: (H, W, 3), or a file. model: a name that `iibr models` lists, an ONNX file, a model's folder, or "guess", for
+    height in the picture and contours alone; None: the recommended one. Raises InputError where it is not here or gives
+    nothing of use, Cancelled once should_stop is true.
+    """
+    given = read_photo(Path(photo)) if isinstance(photo, str | Path) else _photo_of(photo)
+    if model == "guess":
+        from iibr_core.depth.pictorial_cues import estimate_from_cues
+
+        return estimate_from_cues(given, should_stop).values
+    from iibr_core.depth.estimates import MetricDepth, values_of
+    from iibr_core.depth.estimators.catalog import model_to_use
+    from iibr_core.depth.estimators.estimate import estimate_with
+    from iibr_core.depth.search import resize_estimate
+
+    local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
+    assert local is not None, "what was asked for is there, or was refused"
+    estimate = estimate_with(local, given, None, should_stop, report_progress)
+    values = values_of(resize_estimate(estimate, given.size))
+    return np.reciprocal(values) if isinstance(estimate, MetricDepth) else values
+
+
+class _ViewsBetween:
+    """Makes views anywhere between those of a plan, from a ray set that the first of them makes and all share."""
+
+    def __init__(self, photo: FloatImage, disparity: FloatImage, plan: ScenePlan) -> None:
+        self._photo, self._disparity, self._plan = photo, disparity, plan
+
+    def __call__(self, offset: ViewOffset) -> FloatImage:
+        return self._maker.view(self._plan.quality, offset).colors
+
+    @cached_property
+    def _maker(self) -> ViewMaker:
+        grid = self._plan.grid
+        corners = [grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)]
+        return ViewMaker(self._photo, self._disparity, corners, (self._plan.quality,)).__enter__()
+
+
+def _grid_shape(grid: Grid) -> GridShape | None:
+    """Raises InputError for no views."""
+    if grid is None:
+        return None
+    shape = GridShape(grid, grid) if isinstance(grid, int) else GridShape(*grid)
+    if not all(isinstance(side, int | np.integer) and side >= 1 for side in shape):
+        raise InputError(f"grid {grid}: give whole numbers, 1 or more")
+    return shape
+
+
+def _require_known(options: ViewOptions, known: Iterable[str]) -> None:
+    unknown = [name for name in options if name not in known]
+    if unknown:
+        raise InputError(f"{', '.join(unknown)}: means nothing here; give {', '.join(known)}")
+
+
+def _inpainting(options: ViewOptions) -> str:
+    return options.get("inpaint", DEFAULT_INPAINTER)
+
+
+def _choice_of(depth: DepthStart | str | Path, refine: float) -> DepthChoice:
+    match depth:
+        case "auto" | "embedded" | "model" | "rough" | "flat":
+            return DepthChoice(depth, refine=refine)
+    return DepthChoice(file=str(depth), refine=refine)
+
+
+def _photo_of(pixels: NDArray[Any], focal_px: float | None = None, name: str = "photo") -> Photo:
+    pixels = np.asarray(pixels)
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or not pixels.size:
+        raise InputError(f"a photo of shape {pixels.shape}: give (H, W, 3)")
+    given = np.maximum(encoded(pixels), 0)
+    return Photo(given, focal_px or focal_px_from_fov(pixels.shape[1]), name, is_hdr=bool(given.max() > 1))
+
+
+def encoded(pixels: NDArray[Any]) -> FloatImage:
+    """float32, 1 = white."""
+    with np.errstate(over="ignore"):
+        return encoded_from_stored(pixels) if pixels.dtype == np.uint8 else pixels.astype(np.float32)

@@ -1,0 +1,192 @@
+"""The public Python interface: its examples run, and its numbers are those of the parts behind it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import iibr_core as iibr
+from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_literal
+from iibr_core.runtime.resources import resource_folder
+from iibr_core.types import Disparity, GridShape, InputError, Photo
+from tests.iibr_core.scenes import square_before_wall
+
+PAGE = Path(__file__).parents[3] / "docs" / "python.md"
+EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+
+
+@pytest.fixture
+def photo_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    photo, disparity = square_before_wall(60, 80)
+    write_image(tmp_path / "photo.png", np.round(255 * photo.pixels).astype(np.uint8))
+    write_pfm(tmp_path / "photo_disparity.pfm", disparity.values)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def square_scene() -> tuple[np.ndarray, np.ndarray]:
+    photo, disparity = square_before_wall(60, 80)
+    return photo.pixels, disparity.values
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=range(len(EXAMPLES)))
+def test_the_examples_of_the_page_run(example: str, photo_folder: Path) -> None:
+    exec(compile(example, str(PAGE), "exec"), {})
+
+
+def test_every_public_name_is_there_and_said_in_the_page() -> None:
+    said = PAGE.read_text("utf-8")
+    for name in iibr.__all__:
+        assert getattr(iibr, name).__doc__ or name == "FORMATS"
+    assert {name for name in iibr.__all__ if name not in said} <= {
+        "Scene",
+        "LightField",
+        "View",
+        "Comparison",
+        "InputError",
+    }
+    assert set(dir(iibr)) == set(iibr.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        iibr.nothing  # noqa: B018
+
+
+def test_importing_loads_no_library() -> None:
+    code = "import sys, iibr_core; print([m for m in ('numpy', 'numba', 'torch', 'OpenImageIO') if m in sys.modules])"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
+
+
+def test_literal_parallax_is_the_disparity_that_was_given() -> None:
+    pixels, values = square_scene()
+    field = iibr.from_arrays(pixels, values).light_field((1, 3), parallax="literal")
+    photo, disparity = Photo(pixels, 80.0, "a"), Disparity(values, "a")
+    plan = plan_literal(photo, disparity, GridShape(1, 3))
+    for view in generate(photo, disparity, plan):
+        np.testing.assert_array_equal(field.views[view.row, view.column], view.colors)
+    np.testing.assert_array_equal(field.disparity[0, 1], values)
+
+
+def test_viewing_parallax_does_not_depend_on_the_unit() -> None:
+    pixels, values = square_scene()
+    one, other = (iibr.from_arrays(pixels, values * unit).light_field(3) for unit in (1.0, 256.0))
+    np.testing.assert_array_equal(one.views, other.views)
+    assert np.ptp(one.disparity[1, 1]) * 2 == pytest.approx(0.04 * 80, rel=0.01)
+
+
+def test_views_come_by_their_place_to_the_right_and_down() -> None:
+    pixels, values = square_scene()
+    field = iibr.from_arrays(pixels, values).light_field((3, 5))
+    np.testing.assert_array_equal(np.round(255 * field.view(2, -1)), field.views[0, 4])
+    np.testing.assert_array_equal(np.round(255 * field.view(0, 0)), np.round(255 * pixels))
+
+
+def test_a_view_between_is_what_a_denser_field_has_there() -> None:
+    pixels, values = square_scene()
+    scene = iibr.from_arrays(pixels, values)
+    sparse = scene.light_field(3, parallax="literal")
+    dense = iibr.from_arrays(pixels, values / 2).light_field(5, parallax="literal")
+    assert iibr.compare(sparse.view(0.5, 0), dense.view(1, 0)).psnr_db > 40
+
+
+def test_refocusing_keeps_sharp_what_has_that_disparity() -> None:
+    pixels, values = square_scene()
+    field = iibr.from_arrays(pixels, values).light_field(5, parallax="literal")
+    in_front = values > 1
+    inside = (
+        in_front
+        & np.roll(in_front, 8, 0)
+        & np.roll(in_front, -8, 0)
+        & np.roll(in_front, 8, 1)
+        & np.roll(in_front, -8, 1)
+    )
+    error = {
+        name: np.abs(field.refocus(disparity, 4) - pixels)[inside].mean()
+        for name, disparity in (("near", values[in_front].mean()), ("far", values[~in_front].mean()))
+    }
+    assert 5 * error["near"] < error["far"]
+    np.testing.assert_array_equal(field.refocus(0.0, 0.0), field.view(0, 0))
+
+
+@pytest.mark.parametrize("format", iibr.FORMATS)
+def test_saved_fields_open_again(format: str, tmp_path: Path) -> None:
+    pixels, values = square_scene()
+    field = iibr.from_arrays(pixels, values).light_field(3)
+    name = {"eslf": "a_eslf.png", "exr": "a.exr"}.get(format, "a")
+    field.save(tmp_path / name, format)
+    with pytest.raises(InputError, match="there already"):
+        field.save(tmp_path / name, format)
+    if format != "exr":
+        read = iibr.open(tmp_path / name).light_field()
+        np.testing.assert_array_equal(read.views, field.views)
+
+
+def test_the_demo_photo_tells_where_its_depth_came_from() -> None:
+    scene = iibr.open(resource_folder("assets") / "motorcycle" / "motorcycle.png", max_pixels=20_000)
+    assert scene.depth_source == "motorcycle_disparity.pfm"
+    assert scene.photo.shape[:2] == scene.disparity.shape
+
+
+def test_stopping_raises_cancelled() -> None:
+    pixels, values = square_scene()
+    with pytest.raises(iibr.Cancelled):
+        iibr.from_arrays(pixels, values).light_field(3, should_stop=lambda: True)
+
+
+def test_stopping_while_views_between_are_made_raises_cancelled(tmp_path: Path) -> None:
+    pixels, values = square_scene()
+    iibr.from_arrays(pixels, values).light_field(3).save(tmp_path / "field")
+    scene, made = iibr.open(tmp_path / "field"), 0
+
+    def count(*_: object) -> None:
+        nonlocal made
+        made += 1
+
+    with pytest.raises(iibr.Cancelled):
+        scene.light_field(5, should_stop=lambda: made > 3, report_progress=count)
+
+
+BAD = {
+    "a disparity of another size": lambda p, d: iibr.from_arrays(p, d[1:]),
+    "a grey photo": lambda p, d: iibr.from_arrays(p[..., 0], d),
+    "no pixels": lambda p, d: iibr.from_arrays(p[:0], d[:0]),
+    "an unknown disparity": lambda p, d: iibr.from_arrays(p, np.where(d > 1, np.nan, d)),
+    "a colour that is infinite": lambda p, d: iibr.from_arrays(np.where(p > 0.5, np.inf, p), d),
+    "a disparity beyond float32": lambda p, d: iibr.from_arrays(p, np.full(d.shape, 1e300)),
+    "no views": lambda p, d: iibr.from_arrays(p, d).light_field(0),
+    "half a view": lambda p, d: iibr.from_arrays(p, d).light_field((2.5, 1)),
+    "literal without a grid": lambda p, d: iibr.from_arrays(p, d).light_field(parallax="literal"),
+    "literal, but stronger": lambda p, d: iibr.from_arrays(p, d).light_field(3, parallax="literal", depth_strength=2.0),
+    "another parallax": lambda p, d: iibr.from_arrays(p, d).light_field(3, parallax="wide"),
+    "a quality that is none": lambda p, d: iibr.from_arrays(p, d).light_field(3, quality="exact"),
+    "an option that is none": lambda p, d: iibr.from_arrays(p, d).light_field(3, paralax="literal"),
+    "a view outside": lambda p, d: iibr.from_arrays(p, d).light_field(3).view(1.5, 0),
+    "a view nowhere": lambda p, d: iibr.from_arrays(p, d).light_field(3).view(float("nan"), 0),
+    "a negative aperture": lambda p, d: iibr.from_arrays(p, d).light_field(3).refocus(0, -1),
+    "pictures of two sizes": lambda p, d: iibr.compare(p, p[1:]),
+    "a photo that is not there": lambda p, d: iibr.open("nowhere.png"),
+    "a layout that is none": lambda p, d: iibr.from_arrays(p, d).light_field(3).save("a", "zip"),
+    "a model that is none": lambda p, d: iibr.estimate_depth(p, "no-such-model"),
+}
+
+
+@pytest.mark.parametrize("call", BAD.values(), ids=BAD)
+def test_what_means_nothing_is_refused_in_one_line(call, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError) as refusal:
+        call(*square_scene())
+    assert "\n" not in str(refusal.value)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
+def test_the_smallest_photos(size: tuple[int, int]) -> None:
+    field = iibr.from_arrays(np.full((*size, 3), 0.5), np.zeros(size)).light_field(3)
+    assert field.views.shape == (3, 3, *size, 3)
+    assert np.isfinite(field.refocus(3.0, 2.0)).all()

@@ -1,0 +1,71 @@
+"""Depth by a model for the photo that is shown with a guess, in a thread of its own; the newest wish counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from iibr_core.types import FloatImage
+from viewer.background.jobs import Failed, Job, JobThread
+from viewer.background.loaded_photo import LoadedPhoto, deepen
+from viewer.model.actions import SamePlaces
+from viewer.model.state.scene import Source
+
+COMPARED = 200
+"""So many rows and columns of two maps are compared, at most."""
+PAIRS = 33
+
+
+@dataclass(frozen=True, eq=False)
+class EstimateRequest:
+    """A photo as it is open, a model's name or path, and how far edges are refined."""
+
+    source: Source
+    loaded: LoadedPhoto
+    model: str
+    refine: float
+
+    def is_for(self, loaded: LoadedPhoto, model: str) -> bool:
+        """Whether it asks this model about this photo, whatever was edited in it."""
+        return loaded.photo is self.loaded.photo and model == self.model
+
+
+@dataclass(frozen=True, eq=False)
+class Estimated:
+    """What came of a request."""
+
+    request: EstimateRequest
+    loaded: LoadedPhoto
+
+
+EstimateResult = Estimated | Failed[EstimateRequest]
+
+
+class DepthEstimates(JobThread[EstimateRequest, EstimateResult]):
+    """A new request gives up the one before."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when a result was posted."""
+        super().__init__("iibr-depth", wake, _results_of, Failed)
+
+
+def _results_of(job: Job[EstimateRequest, EstimateResult]) -> Iterator[EstimateResult]:
+    asked = job.request
+    source = replace(asked.source, depth=replace(asked.source.depth, file=None, start="model", model=asked.model))
+    yield Estimated(asked, deepen(source, asked.loaded, asked.refine, job.should_stop))
+
+
+def same_places(before: FloatImage, now: FloatImage, focused_at: tuple[float, float] | None) -> SamePlaces:
+    """Two field disparities (H, W) of one photo, compared. focused_at: a place, -1..1 across the picture, y down."""
+    steps = tuple(slice(None, None, -(-length // COMPARED)) for length in before.shape)
+    old, new = before[steps].ravel(), now[steps].ravel()
+    order = np.array_split(np.argsort(old, kind="stable"), min(PAIRS, old.size))
+    pairs = tuple((float(np.median(old[places])), float(np.median(new[places]))) for places in order)
+    if focused_at is None:
+        return SamePlaces(pairs)
+    height, width = before.shape
+    column, row = ((at + 1) / 2 * length - 0.5 for at, length in zip(focused_at, (width, height)))
+    at = min(max(round(row), 0), height - 1), min(max(round(column), 0), width - 1)
+    return SamePlaces(pairs, (float(before[at]), float(now[at])))

@@ -1,0 +1,69 @@
+"""Chips in the picture's upper corners: what it is drawn from, where that is not the photo and its true depth."""
+
+from __future__ import annotations
+
+from imgui_bundle import icons_fontawesome_6 as icons
+from imgui_bundle import imgui
+
+from viewer.model.actions import Action
+from viewer.model.free_camera import LeaveCamera, is_at_end
+from viewer.model.layout import Layout
+from viewer.model.lens.photographic_units import mean_depth
+from viewer.model.state.app_state import AppState
+from viewer.model.state.model_download import ShowOffer
+from viewer.ui.style import DARK
+from viewer.ui.widgets import tooltip
+
+CHIP, BADGE = "free camera", "guess"
+FULL, SHORT = "Free camera: off the plane of views. C returns", "Free camera. C returns"
+AT_END = "The photo ends here. C returns"
+GUESS_TIP = "Depth is guessed: it moves, it is not true."
+GAP = 8.0
+_BARE = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_background
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.no_focus_on_appearing
+    | imgui.WindowFlags_.always_auto_resize
+)
+
+
+def chips(state: AppState, layout: Layout) -> list[Action]:
+    """The free camera's in the right corner, which goes back when pressed; a guess's in the left one, which offers true
+    depth again.
+    """
+    frame, scene = layout.frame, state.scene
+    if frame is None or scene is None or state.inspection.shows_grid or state.shows_before:
+        return []
+    camera = state.free_camera
+    actions: list[Action] = []
+    if camera is not None:
+        words = AT_END if is_at_end(camera, mean_depth(scene)) else FULL
+        if imgui.calc_text_size(words).x + 6 * GAP * layout.ui_scale > frame.width:
+            words = SHORT
+        if _chip(CHIP, f"{icons.ICON_FA_VIDEO}  {words}###leave", layout, is_right=True):
+            actions.append(LeaveCamera())
+    elif scene.is_guessed and imgui.calc_text_size(BADGE).x + 4 * GAP * layout.ui_scale <= frame.width:
+        actions += [ShowOffer(True)] if _chip(BADGE, BADGE, layout, GUESS_TIP) else []
+    return actions
+
+
+def _chip(name: str, words: str, layout: Layout, tip: str = "", is_right: bool = False) -> bool:
+    """Whether it was pressed. Its colours are those of overlays: below is a photo, whatever the theme."""
+    frame, gap = layout.frame, GAP * layout.ui_scale
+    assert frame is not None
+    x = frame.x + frame.width - gap if is_right else frame.x + gap
+    imgui.set_next_window_pos(imgui.ImVec2(x, frame.y + gap), 0, imgui.ImVec2(float(is_right), 0))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
+    imgui.begin(name, None, _BARE)
+    colors = {imgui.Col_.button: (*DARK.background[:3], 0.85), imgui.Col_.button_hovered: DARK.frame_hovered}
+    for which, color in (colors | {imgui.Col_.text: DARK.warning}).items():
+        imgui.push_style_color(which, imgui.ImVec4(*color))
+    pressed = imgui.button(words)
+    imgui.pop_style_color(3)
+    tooltip(tip, layout)
+    imgui.end()
+    imgui.pop_style_var()
+    return bool(pressed)
