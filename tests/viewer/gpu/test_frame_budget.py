@@ -103,3 +103,4 @@ def test_stretched_against_plain_interpolation(width: int, height: int, to: tupl
     expected = along(along(image.astype(float), to[1]).swapaxes(0, 1), to[0]).swapaxes(0, 1)
     assert stretch_image(image, to).shape == (to[1], to[0], 3)
     assert np.abs(stretch_image(image, to) - expected).max() <= 0.51
+    np.testing.assert_array_equal(stretch_image(image, to, 3), stretch_image(image, to)[::3, ::3])

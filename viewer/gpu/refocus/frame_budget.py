@@ -63,18 +63,21 @@ def scale_size(size_px: ScreenSize, scale: float) -> ScreenSize:
     return ScreenSize(max(round(width * scale), 1), max(round(height * scale), 1))
 
 
-def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize) -> NDArray[np.uint8]:
-    """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it."""
-    rows, columns = (_taps(there, here) for there, here in zip(size_px[::-1], image.shape))
+def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize, every: int = 1) -> NDArray[np.uint8]:
+    """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it.
+
+    every: of the pixels there, only each so manieth, both ways.
+    """
+    rows, columns = (_taps(there, here, every) for there, here in zip(size_px[::-1], image.shape))
     light = image.astype(np.float32)
     light = light[rows[0]] + rows[2][:, None, None] * (light[rows[1]] - light[rows[0]])
     light = light[:, columns[0]] + columns[2][:, None] * (light[:, columns[1]] - light[:, columns[0]])
     return np.rint(light).astype(np.uint8)
 
 
-def _taps(there: int, here: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
-    """For each pixel there: the two beside its place here, and how much the second counts."""
-    places = np.clip((np.arange(there) + 0.5) * (here / there) - 0.5, 0, here - 1)
+def _taps(there: int, here: int, every: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
+    """For each pixel asked for: the two beside its place here, and how much the second counts."""
+    places = np.clip((np.arange(0, there, every) + 0.5) * (here / there) - 0.5, 0, here - 1)
     low = places.astype(np.intp)
     return low, np.minimum(low + 1, here - 1), (places - low).astype(np.float32)
 

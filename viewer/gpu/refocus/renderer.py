@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from iibr_core.rendering.gloss.shading import GlossMaps
 
 PREPARED_SIZE = ScreenSize(16, 16)
+JUDGED_EVERY = 3
+"""The pixels, both ways, that tell how far a picture is from the converged one: all of them would take a frame."""
 
 
 class Renderer:
@@ -203,7 +205,7 @@ class Renderer:
             return
         accumulation = self._current()
         if self._errors.is_new and not self.is_renewing:
-            self._errors.add(self.read_image(), 0)
+            self._errors.add(self.read_image(JUDGED_EVERY), 0)
         start = time.perf_counter()
         pass_before, done_before, programs_before = accumulation.pass_index, accumulation.done, len(self.programs)
         self._draw(budget_s, passes=len(accumulation.places))
@@ -218,7 +220,7 @@ class Renderer:
         if accumulation.pass_index > pass_before and (
             accumulation.is_complete or math.log2(accumulation.pass_index).is_integer()
         ):
-            self._errors.add(self.read_image(), accumulation.pass_index)
+            self._errors.add(self.read_image(JUDGED_EVERY), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
     def start_picture(self, settings: RenderSettings, field: LightFieldTexture | None = None) -> PictureDrawing:
@@ -272,11 +274,14 @@ class Renderer:
         """GL name of the renderer's own image (RGBA8, rows bottom-up). Another picture may change it."""
         return self._screen.shown.image.textures[0].glo
 
-    def read_image(self) -> NDArray[np.uint8]:
-        """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller."""
+    def read_image(self, every: int = 1) -> NDArray[np.uint8]:
+        """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller.
+
+        every: see `stretch_image`.
+        """
         image, drawn_px = self._screen.read(), self._screen.shown.size_px
         size_px = self._accumulation.size_px if self._accumulation else drawn_px
-        return image if drawn_px == size_px else stretch_image(image, size_px)
+        return image[::every, ::every] if drawn_px == size_px else stretch_image(image, size_px, every)
 
     def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
         """The picture at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
