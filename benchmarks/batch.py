@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -26,14 +27,15 @@ from benchmarks.harness.report import emit, head, parser_of, row, start
 from benchmarks.harness.scenes import write_photos
 from benchmarks.harness.timing import Cost, in_turns, median_cost
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.exports.batch.archive import photos_in
+from iibr_core.exports.batch.processes import local_workers
+from iibr_core.exports.batch.task import BatchSettings, PhotoTask, Place, key_of, target_name
+from iibr_core.exports.batch.threads import QUIET_AND_SAFE, set_environment, thread_variables
+from iibr_core.exports.batch.work import export_photo
+from iibr_core.exports.batch.workers import outcomes_of
 from iibr_core.runtime.allocator import limit_arenas
-from viewer.app.batch.archive import photos_in
-from viewer.app.batch.processes import local_workers
-from viewer.app.batch.task import BatchSettings, PhotoTask, Place, key_of, target_name
-from viewer.app.batch.threads import QUIET_AND_SAFE, set_environment, thread_variables
-from viewer.app.batch.work import export_photo
-from viewer.app.batch.workers import outcomes_of
-from viewer.model.state.scene import Source
+from iibr_core.scenes.scene import Source
+from viewer.display.scene_drawer import open_drawn
 
 Run = Callable[[Sequence[PhotoTask]], object]
 
@@ -46,7 +48,7 @@ def tasks_for(photos: Path, settings: BatchSettings) -> list[PhotoTask]:
 
 
 def export(task: PhotoTask) -> None:
-    outcome = export_photo(task)
+    outcome = export_photo(task, open_drawn)
     assert not outcome.reason, outcome.reason
 
 
@@ -100,13 +102,14 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
         write_photos(Path(scratch, "photos"), given.photos, given.megapixels)
         tasks = tasks_for(Path(scratch, "photos"), settings)
+        work = partial(export_photo, open_drawn=open_drawn)
         stack.enter_context(set_environment(thread_variables(1) | QUIET_AND_SAFE))
         pipes = [plain_process(stack) for _ in range(given.workers)]
         workers = stack.enter_context(local_workers(given.workers, 1))
         runs: dict[str, Run] = {
             "one process": lambda tasks: in_plain_processes(pipes[:1], tasks),
             f"{given.workers} on their own": lambda tasks: in_plain_processes(pipes, tasks),
-            f"{given.workers} workers": lambda tasks: list(outcomes_of(workers, tasks)),
+            f"{given.workers} workers": lambda tasks: list(outcomes_of(workers, tasks, work)),
         }
         folders = (Path(scratch, str(number)) for number in count())
         ways = {name: lambda run=run: measure(run, tasks, next(folders)) for name, run in runs.items()}

@@ -29,15 +29,15 @@ from benchmarks.window import is_settled, settle
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
+from iibr_core.exports.batch.threads import set_environment, thread_variables
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.tiling import never
+from iibr_core.scenes.scene import Source
 from iibr_core.types import ImageSize, InputError
 from tests.xvfb import private_display
-from viewer.app.batch.threads import set_environment, thread_variables
 from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import OpenPath
 from viewer.model.state.model_download import UseModel
-from viewer.model.state.scene import Source
 
 THREADS, SIDE = 2, 518
 LOAD_S, ESTIMATE_S, ADDED_MB, TURN_MS = 1.5, 1.2, 700, 50

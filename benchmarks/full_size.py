@@ -67,8 +67,8 @@ def measured(what: str, command: Sequence[object], pictures: tuple[Path, Path] |
 
 def first_picture(photo: Path) -> None:
     """Open a photo as the window does, up to its first picture."""
+    from iibr_core.scenes.scene import Source
     from viewer.app.headless import HeadlessViewer
-    from viewer.model.state.scene import Source
 
     with HeadlessViewer() as viewer:
         viewer.open_scene(Source(str(photo)), 1.0, lambda progress: None)

@@ -187,10 +187,10 @@ def cfgs() -> list[Seed]:
 
 
 def saved_settings() -> list[Seed]:
+    from iibr_core.rendering.optics import ApertureMask, ApertureShape, Optics
+    from iibr_core.scenes.scene import Source
     from viewer.model.saved_settings import settings_text
-    from viewer.model.state.optics import ApertureMask, ApertureShape, Optics
     from viewer.model.state.saving import SavedSettings
-    from viewer.model.state.scene import Source
 
     mask = ApertureShape("mask", mask=ApertureMask("m", 2, 2, b"\x01\xff\x00\x10"))
     text = settings_text(SavedSettings(Optics(aperture_shape=mask), 1.0, Source(""), (64, 48))).encode()

@@ -134,10 +134,11 @@ def bounds(*megapixels: str) -> Iterator[str]:
 
 def day() -> Iterator[str]:
     """Memory of this process after photos of several sizes: opened by the worker, uploaded, every third left early."""
-    from viewer.background.scene_worker import SceneRequest, SceneWorker
+    from iibr_core.scenes.opening import SceneRequest
+    from iibr_core.scenes.scene import Source
+    from viewer.background.scene_worker import SceneWorker
     from viewer.display.scene_view import SceneView
     from viewer.gpu.headless_context import create_headless
-    from viewer.model.state.scene import Source
 
     limit_arenas()  # as the program does
     yield head("photos", "memory, MiB")
@@ -157,8 +158,8 @@ def take(worker: Any, scene_view: Any, generation: int, views: int) -> None:
     """Take what the worker posts until so many views of this photo are uploaded."""
     import time
 
+    from iibr_core.scenes.opening import SceneReady, ViewReady
     from viewer.background.jobs import Failed
-    from viewer.background.scene_worker import SceneReady, ViewReady
 
     seen = 0
     while seen < views:

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from benchmarks.harness.report import emit, head, parser_of, row, start
 from benchmarks.harness.scenes import read_views
 from benchmarks.harness.timing import cost_of
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.state.optics import Optics
 
 FRAMES = 12
 

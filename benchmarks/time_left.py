@@ -147,9 +147,9 @@ def run_job(words: list[str]) -> list[Record]:
 
 
 def open_field(path: str) -> None:
-    from viewer.background.scene_worker import SceneRequest, results_of
-    from viewer.model.state.optics import CENTRE
-    from viewer.model.state.scene import Source
+    from iibr_core.rendering.optics import CENTRE
+    from iibr_core.scenes.opening import SceneRequest, results_of
+    from iibr_core.scenes.scene import Source
 
     for _ in results_of(SceneRequest(1, Source(path)), lambda: False, lambda: CENTRE):
         pass

@@ -24,21 +24,22 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from iibr_core.exports.options import ExportOptions
 from iibr_core.formats.images.photo import write_image
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.runtime.allocator import limit_arenas
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import Action, DismissNotices, DoTask, EndGesture, OpenPath, Redo, ShowPrompt, Undo
 from viewer.model.free_camera import LeaveCamera, MoveCamera
-from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Paint
-from viewer.model.state.exporting import ExportOptions, ExportTask
+from viewer.model.state.exporting import ExportTask
 from viewer.model.state.folder import ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import OVERLAYS, Compare, KeepState, SetOverlay, ShowEpis, ShowGrid
 from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture, SetGloss
-from viewer.model.state.scene import Source
 from viewer.model.state.tasks import SaveTask
 from viewer.model.zoom import SetZoom, Zoom
 

@@ -19,12 +19,12 @@ import psutil
 
 from benchmarks.harness.report import emit, head, holds, parser_of, row, start
 from benchmarks.harness.scenes import DEMO
+from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import OpenPath
 from viewer.model.state.optics import SetAperture
-from viewer.model.state.scene import Source
 
 MOVES = 150
 STEP_PX = 2

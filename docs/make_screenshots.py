@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
+from viewer.model.state.scene import Source
 
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import ViewOffset
@@ -21,7 +22,6 @@ from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetOverlay, ShowEpis, ShowValues
 from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetApertureShape, SetFocus
 from viewer.model.state.preferences import Section
-from viewer.model.state.scene import Source
 
 SIZE = 1200, 760
 MOST_BYTES = 700_000

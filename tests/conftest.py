@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -28,3 +29,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture
 def regenerate_golden(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--regenerate-golden"))
+
+
+@pytest.fixture
+def photo_path(tmp_path: Path) -> Path:
+    """A photo with its map, see `write_scene`."""
+    from tests.viewer.conftest import write_scene
+
+    return write_scene(tmp_path)

@@ -20,8 +20,8 @@ GUARD = re.compile(r"os\.name|sys\.platform|hasattr\((os|signal)|fcntl is (not )
 USERS = {
     "iibr_core/formats/unfinished.py": {"fcntl", "os.O_NOFOLLOW", "os.O_NONBLOCK"},
     "iibr_core/runtime/machine.py": {"os.sched_getaffinity", "resource"},
-    "viewer/app/batch/ledger.py": {"fcntl"},
-    "viewer/app/batch/processes.py": {"resource", "signal.SIG_BLOCK", "signal.pthread_sigmask"},
+    "iibr_core/exports/batch/ledger.py": {"fcntl"},
+    "iibr_core/exports/batch/processes.py": {"resource", "signal.SIG_BLOCK", "signal.pthread_sigmask"},
     "viewer/app/window_slot.py": {"fcntl"},
     "viewer/entry.py": {"resource"},
 }

@@ -33,7 +33,7 @@ from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import InputError, Quality
 
 if TYPE_CHECKING:
-    from viewer.model.state.scene import Source
+    from iibr_core.scenes.scene import Source
 
 ROOT = Path(__file__).resolve().parents[1]
 PART = (slice(150, 310), slice(200, 400))
@@ -116,7 +116,7 @@ def _text(path: Path) -> str:
 
 def _take_steps(folder: Path, begin: Callable[[], None], should_stop: ShouldStop) -> set[str]:
     """Each step in whichever process is free. Returns the files of kernels that were read or written."""
-    from viewer.app.batch.processes import local_workers
+    from iibr_core.exports.batch.processes import local_workers
 
     with local_workers(core_count(), 1) as workers:
         steps = [workers.executor.submit(_work_in, folder, step) for step in STEPS]
@@ -160,8 +160,8 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
     from iibr_core.formats.images.photo import read_photo, write_image
     from iibr_core.formats.maps.reader import read_map
     from iibr_core.formats.maps.writer import write_map
+    from iibr_core.scenes.scene import Source
     from viewer.model.demo import demo_photo
-    from viewer.model.state.scene import Source
 
     photo = scratch / ("photo.exr" if is_hdr else "photo.png")
     colors = read_photo(demo_photo()).pixels[PART]
@@ -176,16 +176,16 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
 
 def _open(source: Source) -> None:
     """All that the window's worker does with a photo."""
-    from viewer.background.scene_worker import SceneRequest, results_of
-    from viewer.model.state.optics import CENTRE
+    from iibr_core.rendering.optics import CENTRE
+    from iibr_core.scenes.opening import SceneRequest, results_of
 
     for _ in results_of(SceneRequest(0, source), lambda: False, lambda: CENTRE):
         pass
 
 
 def _show_first_picture(scratch: Path) -> None:
-    from viewer.background.scene_worker import SceneRequest, results_of
-    from viewer.model.state.optics import CENTRE
+    from iibr_core.rendering.optics import CENTRE
+    from iibr_core.scenes.opening import SceneRequest, results_of
 
     next(results_of(SceneRequest(0, _photo(scratch)), lambda: False, lambda: CENTRE))
 
@@ -217,7 +217,7 @@ def _open_hdr(scratch: Path) -> None:
 
 def _paint(scratch: Path) -> None:
     """What the first stroke of the depth brush needs."""
-    from viewer.background.loaded_photo import prepare_brush
+    from iibr_core.scenes.loaded_photo import prepare_brush
 
     prepare_brush()
 
@@ -227,8 +227,8 @@ def _look_around(scratch: Path) -> None:
     import numpy as np
 
     from iibr_core.generation.free_views import FreeViews, inverse_depth_of, steered
+    from iibr_core.scenes.loaded_photo import load_photo
     from iibr_core.types import Camera
-    from viewer.background.loaded_photo import load_photo
 
     loaded = load_photo(_photo(scratch))
     size = loaded.photo.size
@@ -240,11 +240,11 @@ def _look_around(scratch: Path) -> None:
 def _find_gloss(scratch: Path) -> None:
     """What the window waits for when a surface becomes glossy, with a light that is to be found in the photo, too."""
     from iibr_core.rendering.gloss.settings import Gloss, GlossLight
-    from viewer.background.gloss import GlossRequest, answer
-    from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
+    from iibr_core.rendering.optics import CENTRE
+    from iibr_core.scenes.gloss import GlossRequest, answer
+    from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
+    from iibr_core.scenes.scene import Source
     from viewer.model.demo import demo_photo
-    from viewer.model.state.optics import CENTRE
-    from viewer.model.state.scene import Source
 
     large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
     ready = next(results_of(SceneRequest(0, large), lambda: False, lambda: CENTRE))
@@ -257,11 +257,11 @@ def _draw_at_own_size(scratch: Path) -> None:
     """What a picture at the photo's own size needs, with all that the photo hides, through a lens."""
     import numpy as np
 
-    from viewer.app.full_picture import FullPicture
-    from viewer.background.loaded_photo import load_photo, make_plan
-    from viewer.background.scene_worker import SceneReady, SceneRequest, results_of
-    from viewer.model.layout import ScreenSize
-    from viewer.model.state.optics import CENTRE, Optics
+    from iibr_core.exports.full_picture import FullPicture
+    from iibr_core.rendering.optics import CENTRE, Optics
+    from iibr_core.scenes.loaded_photo import load_photo, make_plan
+    from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
+    from iibr_core.scenes.screen_size import ScreenSize
 
     small = replace(_photo(scratch), max_pixels=16_000)
     loaded = load_photo(small)
@@ -278,7 +278,7 @@ def _search_views(scratch: Path) -> None:
     import numpy as np
 
     from iibr_core.formats.images.photo import write_image
-    from viewer.model.state.scene import Source
+    from iibr_core.scenes.scene import Source
 
     folder = scratch / "field"
     folder.mkdir()

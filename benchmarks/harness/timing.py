@@ -22,10 +22,10 @@ import numpy as np
 import psutil
 
 from benchmarks.harness.scenes import BenchScene
+from iibr_core.exports.batch.threads import set_environment
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import FloatImage, Quality, ReportProgress, StoredColors, ignore_progress
-from viewer.app.batch.threads import set_environment
 
 COMMAND_LINE = (sys.executable, "-P", "-m", "viewer")
 PEAK_RESET, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")

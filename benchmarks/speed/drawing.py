@@ -22,11 +22,11 @@ from iibr_core.evaluation.refocus import FocalStack, Focus
 from iibr_core.generation.cost_model import CORES
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import FloatImage, GridShape, ReportProgress, ViewOffset
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, scale_size, stretch_image
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.state.optics import Optics
 
 APERTURE_VIEWS = 6.0
 BETWEEN = ViewOffset(-0.5, 1.5)

@@ -8,17 +8,12 @@ import numpy as np
 import pytest
 
 from benchmarks.harness.scenes import BenchScene
-from benchmarks.speed.drawing import (
-    APERTURE_VARIANTS,
-    PINHOLE_VARIANTS,
-    best_pictures,
-    measure_drawing,
-)
+from benchmarks.speed.drawing import APERTURE_VARIANTS, PINHOLE_VARIANTS, best_pictures, measure_drawing
 from iibr_core.evaluation.metrics import psnr
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import ViewOffset
 from tests.iibr_core.known_scenes import disparity_of_square, offsets_of, view_of_square
 from viewer.gpu.context import GLContext
-from viewer.model.state.optics import Optics
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ PRELOADED = (
     "viewer.entry",
     "viewer.cli.main",
     "viewer.app.headless",
-    "viewer.background.loaded_photo",
+    "iibr_core.scenes.loaded_photo",
     "iibr_core.depth.search",
     "iibr_core.generation.light_field",
     "iibr_core.formats.light_fields.hci",

@@ -14,17 +14,18 @@ from PIL import Image
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.formats.images.settings_text import ATTRIBUTE
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, GridShape, ViewUpdate
 from viewer.app.image_export import SavedShot, export_picture
-from viewer.model.layout import ScreenSize
-from viewer.model.saved_settings import ATTRIBUTE, settings_text
-from viewer.model.state.optics import Optics
+from viewer.model.saved_settings import settings_text
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Source
 
 HEIGHT, WIDTH = 24, 32
 

@@ -53,9 +53,9 @@ def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
 @contextmanager
 def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[HeadlessViewer]:
     """A scene opened without a window, its notices gone; open_sections: of the panel, the usual ones if none."""
+    from iibr_core.scenes.scene import Source
     from viewer.app.headless import HeadlessViewer
     from viewer.model.actions import DismissNotice
-    from viewer.model.state.scene import Source
 
     try:
         viewer = HeadlessViewer("egl")
@@ -76,11 +76,6 @@ def viewer(opened: HeadlessViewer) -> Iterator[HeadlessViewer]:
     before = opened.state
     yield opened
     opened.state = before
-
-
-@pytest.fixture
-def photo_path(tmp_path: Path) -> Path:
-    return write_scene(tmp_path)
 
 
 @pytest.fixture(scope="session")
@@ -220,11 +215,11 @@ def no_egl_context() -> Iterator[None]:
 @pytest.fixture
 def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
     """Opens the viewer on a photo; closes it after the test."""
+    from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
     from viewer.model.actions import OpenPath
     from viewer.model.state.app_state import AppState
     from viewer.model.state.preferences import Preferences
-    from viewer.model.state.scene import Source
 
     apps = []
 

@@ -59,7 +59,7 @@ main()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("name", ["viewer.cli.main", "typer.core", "iibr_core.types", "viewer.background.loaded_photo"])
+@pytest.mark.parametrize("name", ["viewer.cli.main", "typer.core", "iibr_core.types", "iibr_core.scenes.loaded_photo"])
 def test_interruption_while_modules_are_imported_is_one_line(number: int, name: str) -> None:
     """It strikes when the module is looked for: the first of the program's own, and one that a command needs."""
     done = run(start=(sys.executable, "-P", "-c", STRIKE.format(name=name, number=int(number))))
@@ -150,9 +150,9 @@ def test_a_home_that_is_none_leaves_nothing_in_the_working_folder(tmp_path: Path
 def test_what_nobody_expected_is_one_line_and_tells_more_when_asked(failure: str) -> None:
     code = f"""
 import sys
-import viewer.background.loaded_photo
+import iibr_core.scenes.loaded_photo
 def load_photo(*_): raise {failure}
-viewer.background.loaded_photo.load_photo = load_photo
+iibr_core.scenes.loaded_photo.load_photo = load_photo
 sys.argv = ["iibr", "plan", "photo.png"]
 from viewer.entry import main
 main()

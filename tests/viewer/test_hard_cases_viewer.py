@@ -22,7 +22,11 @@ import pytest
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
+from iibr_core.formats.images.settings_text import settings_text_in
 from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
@@ -30,11 +34,9 @@ from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
 from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.background.jobs import Failed
-from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
-from viewer.model.saved_settings import read_settings, settings_text_in
+from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import CENTRE, MoveEye, SetAperture
-from viewer.model.state.scene import Source
+from viewer.model.state.optics import MoveEye, SetAperture
 
 GRID = GridShape(3, 3)
 

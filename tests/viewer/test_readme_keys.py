@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.model.actions import ShowPrompt
 from viewer.model.commands import COMMANDS
-from viewer.model.layout import ScreenSize
 from viewer.ui.overlays.prompts import MOUSE
 
 README = Path(__file__).parents[2] / "README.md"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
-from viewer.model.layout import ScreenSize
-from viewer.model.lens.limits import aperture_limit
 from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetFocus
 
 TILE_WIDTH = 480

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from iibr_core.scenes.loaded_photo import LoadedPhoto
 from viewer.background.depth_estimate import DepthEstimates, Estimated, EstimateRequest, EstimateResult
 from viewer.background.jobs import Failed
-from viewer.background.loaded_photo import LoadedPhoto
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify
 from viewer.model.reducers.depth_models import wanted_model

@@ -8,17 +8,18 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from iibr_core.exports.kinds import export_kind
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.registry import export_path, require_export_place, writer_of
+from iibr_core.exports.source import ExportSource
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
-from viewer.app.exports.registry import export_path, require_export_place, writer_of
-from viewer.app.exports.source import ExportSource
 from viewer.app.job import Job
 from viewer.app.job_queue import JobQueue
 from viewer.model.actions import Action, Notify, ShowPrompt
-from viewer.model.export_kinds import export_kind
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import ExportOptions, ExportPrompt, ExportTask
+from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.notices import Notice
 
 Write = Callable[[Path, ExportSource, ExportOptions], str | None]

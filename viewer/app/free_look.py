@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
 from viewer.background.jobs import Failed, Job, JobThread
-from viewer.background.loaded_photo import LoadedPhoto
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
 from viewer.model.actions import Action, Notify
 from viewer.model.free_camera import FORWARD_LIMITS, MOST_ASIDE, CameraProgress, FreeCamera, Poses
-from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 

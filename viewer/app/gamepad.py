@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from iibr_core.scenes.lens_limits import aperture_limit, focus_span
 from iibr_core.types import ViewOffset
 from viewer.model.actions import Action, ReturnHome
-from viewer.model.lens.limits import aperture_limit, focus_span
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from viewer.background.gloss import GlossFound, GlossRequest, GlossWorker
+from iibr_core.scenes.gloss import GlossFound, GlossRequest
+from viewer.background.gloss import GlossWorker
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify
 from viewer.model.state.app_state import AppState

@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ViewUpdate, ignore_progress
-from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
-from viewer.app.save_places import require_size
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full, needs_smaller
+from iibr_core.exports.render_settings import RenderSettings, require_size
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ignore_progress
 from viewer.background.comparison_worker import ComparisonJob
-from viewer.background.gloss import answer
-from viewer.background.loaded_photo import LoadedPhoto
-from viewer.background.scene_worker import SceneReady, SceneRequest, ViewReady, results_of
 from viewer.display.inspection_view import InspectionView
+from viewer.display.scene_drawer import prepare_gloss
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
@@ -30,13 +31,10 @@ from viewer.model.inspection_request import (
     beside_of,
     make_inspection_request,
 )
-from viewer.model.layout import BACKGROUND, Layout, Rect, ScreenSize, layout_of, letterbox
+from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterbox
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.inspection import Probed
-from viewer.model.state.optics import CENTRE, Optics
-from viewer.model.state.scene import Progress, Scene, Source
 
 LAYOUT_FRAMES = 3
 """ImGui knows the size of a text only after it was built once."""
@@ -151,7 +149,7 @@ class HeadlessViewer:
         x, y, box_width, box_height = layout.frame_px
         box_size = layout.frame_px.size
         require_size(box_size)
-        self._prepare_gloss(self.state.optics)
+        prepare_gloss(self._scene_view, self.state.optics.gloss)
         if is_full(scene, self.state.optics, box_size):
             light = self._full_picture(scene, box_size, report_progress)
             pixels = encode_light(light, is_linear, color_space, scene.color_space)
@@ -175,12 +173,6 @@ class HeadlessViewer:
             full = full.with_smaller(self._scene_view.picture(full.smaller_settings))
         return full.draw(report_progress=report_progress)
 
-    def _prepare_gloss(self, optics: Optics) -> None:
-        """Have at hand what the optics' gloss means here. Raises InputError where its surroundings cannot be read."""
-        request = self._scene_view.gloss_request(optics.gloss)
-        if request is not None:
-            self._scene_view.take_gloss(answer(request))
-
     @property
     def scene(self) -> Scene:
         """What is open."""
@@ -200,22 +192,6 @@ class HeadlessViewer:
         """Whether `picture` at this size is drawn from the photo's own pixels: it takes long after the views."""
         return is_full(self.scene, self.state.optics, size or self.scene.size)
 
-    def draw(self, settings: RenderSettings) -> NDArray[Any]:
-        """A picture for an export, see `viewer.app.exports.source.Draw`."""
-        require_size(settings.size_px)
-        self._prepare_gloss(settings.optics)
-        return self._scene_view.picture(settings)
-
-    @property
-    def centre(self) -> ViewUpdate | None:
-        """The centre view of what is open."""
-        return self._scene_view.centre
-
-    @property
-    def loaded(self) -> LoadedPhoto | None:
-        """The photo that is open, None for a light field."""
-        return self._scene_view.loaded
-
     def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
         """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
         from viewer.ui.host import UiHost  # pictures alone need no ImGui
@@ -233,7 +209,7 @@ class HeadlessViewer:
             zoom=self.state.zoom,
             own_width=self.own_size.width if scene else None,
         )
-        self._prepare_gloss(self.state.optics)
+        prepare_gloss(self._scene_view, self.state.optics.gloss)
         has_picture = layout.frame_px and self._scene_view.converge(self.state, layout.frame_px.size, layout.part)
         texture = self._scene_view.texture if has_picture else None
         textures = self._draw_inspection(layout) if has_picture else NO_INSPECTION_TEXTURES

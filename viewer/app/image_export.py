@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import is_folder
 from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage
-from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
 
@@ -40,7 +40,8 @@ def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
     """
     from iibr_core.formats.images.metadata import PictureMetadata, read_metadata
     from iibr_core.formats.images.picture_writers import write_picture
-    from viewer.model.saved_settings import ATTRIBUTE, settings_text
+    from iibr_core.formats.images.settings_text import ATTRIBUTE
+    from viewer.model.saved_settings import settings_text
 
     of_photo = PictureMetadata() if shot.photo is None else read_metadata(shot.photo)
     texts = {ATTRIBUTE: settings_text(shot.settings)}

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from iibr_core.exports.source import ExportSource
+from iibr_core.rendering.optics import Optics
 from iibr_core.runtime.time_left import TimeLeft
-from viewer.app.exports.source import ExportSource
-from viewer.background.scene_worker import SceneRequest
+from iibr_core.scenes.opening import SceneRequest
+from iibr_core.scenes.scene import Scene, Source
 from viewer.display.snapshot import SceneSnapshot
 from viewer.model.actions import Action
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WAITING_FOR_VIEWS, JobKind, JobProgress
-from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Scene, Source
 
 Needs = Literal["shown", "scene", "views"]
 """What of the scene must be there before a job begins: what is on the screen; its photo and plan; all its views."""

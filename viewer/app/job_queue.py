@@ -14,19 +14,19 @@ from pathlib import Path
 
 from iibr_core.formats.outputs import release_place
 from iibr_core.runtime.tiling import Cancelled, raise_if_stopped
+from iibr_core.scenes.opening import SceneRequest
+from iibr_core.scenes.scene import Source, is_same_field
 from viewer.app.job import Job, Lane
 from viewer.app.job_scene import JobScenes
 from viewer.app.save_places import inputs_of_scene
 from viewer.app.window_work import WindowWork
 from viewer.background.file_worker import Done, FileRequest, FileWorker
-from viewer.background.scene_worker import SceneRequest
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.state.app_state import AppState
-from viewer.model.state.filling import ViewsFilled, is_same_field
+from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.jobs import JobProgress, JobsChanged
 from viewer.model.state.notices import Notice
-from viewer.model.state.scene import Source
 
 
 class JobQueue:

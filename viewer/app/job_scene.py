@@ -12,20 +12,18 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from iibr_core.exports.render_settings import RenderSettings, require_size
+from iibr_core.exports.source import ExportSource
+from iibr_core.rendering.optics import CENTRE
 from iibr_core.runtime.tiling import raise_if_stopped
+from iibr_core.scenes.gloss import GlossRequest, answer
+from iibr_core.scenes.opening import SceneReady, ViewReady, results_of
+from iibr_core.scenes.scene import FilledField, Progress
 from iibr_core.types import ViewUpdate
-from viewer.app.exports.source import ExportSource
 from viewer.app.job import Job
-from viewer.app.save_places import require_size
 from viewer.app.window_work import Result, Steps, WindowWork
-from viewer.background.gloss import GlossRequest, answer
-from viewer.background.scene_worker import SceneReady, ViewReady, results_of
 from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot
-from viewer.gpu.refocus.render_settings import RenderSettings
-from viewer.model.state.filling import FilledField
-from viewer.model.state.optics import CENTRE
-from viewer.model.state.scene import Progress
 
 MAKING_VIEWS = "making views"
 DRAWING = "drawing"

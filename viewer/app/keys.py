@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
+from iibr_core.rendering.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
 from viewer.model.actions import Action, SetFullscreen, ShowBefore, ShowPrompt
@@ -15,7 +16,7 @@ from viewer.model.free_camera import LeaveCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke, SetBrush
 from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
-from viewer.model.state.optics import CENTRE, MoveEye, SetGlossBrush
+from viewer.model.state.optics import MoveEye, SetGlossBrush
 
 ARROW_STEP_VIEWS = 0.5
 

@@ -10,26 +10,26 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full, needs_smaller
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, is_float
 from iibr_core.formats.outputs import AlreadyThereError, make_folder
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.app.clipboard import copied_path, copy_picture
-from viewer.app.exports.source import ExportSource
-from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
 from viewer.app.image_export import SavedShot, export_map, export_picture, shot_of
 from viewer.app.job import Job, Needs
 from viewer.app.job_queue import JobQueue
 from viewer.app.save_places import map_path, picture_path
 from viewer.background.jobs import message_of
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
-from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import Optics
 from viewer.model.state.prompts import SavePrompt
-from viewer.model.state.scene import Scene
 from viewer.model.state.tasks import SaveTask
 
 NO_MAP = "this scene has no disparity map of its own"

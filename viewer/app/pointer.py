@@ -6,17 +6,17 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from iibr_core.scenes.lens_limits import focus_limits
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model.actions import Action, EndGesture, ReturnHome, SetHover
 from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, Rect, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
-from viewer.model.lens.limits import focus_limits
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush
 from viewer.model.state.inspection import MoveDivider
 from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
-from viewer.model.state.scene import Scene
 from viewer.model.zoom import SetZoom
 
 DRAG_THRESHOLD = 4.0

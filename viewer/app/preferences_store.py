@@ -14,15 +14,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from iibr_core.exports.photo_folder import FolderOrder
 from iibr_core.formats.files import read_text, status_of
 from iibr_core.formats.outputs import atomic_write
+from iibr_core.scenes.lens_limits import clamp
 from iibr_core.types import InputError
-from viewer.model.lens.limits import FONT_SCALE_LIMITS, clamp
 from viewer.model.reducers.worker_events import RECENT_KEPT
 from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import FolderOrder
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SECTIONS, Preferences, Section, Theme, Units
+from viewer.model.window_limits import FONT_SCALE_LIMITS
 
 PREFERENCES_FILE = "preferences.json"
 RECENT_FILE = "recent.json"

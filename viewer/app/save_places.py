@@ -8,33 +8,15 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from iibr_core.depth.sidecar import map_to_read
+from iibr_core.exports.render_settings import require_size
 from iibr_core.formats.files import is_file
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, require_picture_format
 from iibr_core.formats.outputs import require_file_place
+from iibr_core.scenes.inputs import inputs_of, named_by
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
-from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import AppState
-from viewer.model.state.scene import Source
 from viewer.model.state.tasks import SaveTask
-
-MAX_PIXELS = 100_000_000
-"""Of a picture: as float light it then takes 1.2 GB."""
-
-
-def inputs_of(source: Source) -> tuple[Path, ...]:
-    """What is read to open it, the map beside it and folders of models included: nothing may be written there. See
-    `require_file_place`.
-    """
-    named, found = _named_by(source), map_to_read(Path(source.path), source.depth)
-    return named if found is None or found in named else (*named, found)
-
-
-def _named_by(source: Source) -> tuple[Path, ...]:
-    """Its photo or folder, its map and its folders of models, as far as they are named."""
-    models = (source.depth.model or "", source.inpaint.partition(":")[2])
-    folders = [path for path in map(os.path.expanduser, models) if path and os.path.lexists(path)]  # else: names
-    return tuple(Path(path) for path in (source.path, source.depth.file, *folders) if path)
 
 
 def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
@@ -46,7 +28,7 @@ def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     origin = state.scene.depth_origin if state.scene is not None else None
     truth, gloss, poses = state.inspection.truth, state.optics.gloss, state.poses
     beside = (origin and origin.file, truth and truth.path, gloss and gloss.environment, poses and poses.file)
-    found = [path for source in sources for path in (_named_by(source) if is_open else inputs_of(source))]
+    found = [path for source in sources for path in (named_by(source) if is_open else inputs_of(source))]
     settings = [path for path in (sidecar_of(Path(source.path)) for source in sources if source.path) if is_file(path)]
     return (*found, *settings, *(Path(os.path.expanduser(path)) for path in beside if path))
 
@@ -81,13 +63,6 @@ def map_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
     path = _path_of(task, ".pfm")
     require_file_place(path, inputs, task.may_replace)
     return path
-
-
-def require_size(size_px: ScreenSize) -> None:
-    """Raise InputError for a picture (width, height) of no pixel or more than MAX_PIXELS."""
-    width, height = size_px
-    if min(size_px) < 1 or width * height > MAX_PIXELS:
-        raise InputError(f"{width}x{height} px: a picture may have 1 to {MAX_PIXELS // 10**6} million pixels")
 
 
 def _path_of(task: SaveTask, suffix: str) -> Path:

@@ -6,22 +6,16 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+from iibr_core.scenes.loaded_photo import LoadedPhoto, prepare_brush, without_history
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, WantedPhoto, sketch_of
+from iibr_core.scenes.scene import DepthSettings, Source, source_beside
 from iibr_core.types import InputError, ViewOffset
 from viewer.app.depth_finder import DepthFinder
 from viewer.background.depth_estimate import same_places
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed, ProgressReport
-from viewer.background.loaded_photo import LoadedPhoto, prepare_brush, without_history
-from viewer.background.read_ahead import PhotoAhead, ReadAhead, WantedPhoto, photos_within_budget, read_whole_photo
-from viewer.background.scene_worker import (
-    PhotosFound,
-    SceneReady,
-    SceneRequest,
-    SceneResult,
-    SceneWorker,
-    ViewReady,
-    sketch_of,
-)
+from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_whole_photo
+from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWorker
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
@@ -29,10 +23,9 @@ from viewer.model.actions import Action, Notify, OpenFailed, OpenPath, ProgressM
 from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.folder import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DepthSettings, DropStroke
+from viewer.model.state.depth_editing import DropStroke
 from viewer.model.state.folder import ShowFilmstrip
 from viewer.model.state.notices import Notice
-from viewer.model.state.scene import Source, source_beside
 
 SKETCHES_FIRST = 3
 """A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work.

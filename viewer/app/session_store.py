@@ -16,6 +16,7 @@ from pathlib import Path
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.formats.files import is_folder, ordinary_file, read_text
 from iibr_core.formats.outputs import atomic_write
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
 from viewer.background.file_worker import FileRequest, FileWorker
@@ -24,7 +25,6 @@ from viewer.model.actions import Action, Notify, RestoreSession, SessionsKept, T
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Scene, Source
 
 FOLDER = "sessions"
 SIDECAR_ENDING = ".iibr"

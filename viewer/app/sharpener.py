@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full, needs_smaller
 from iibr_core.runtime.tiling import Cancelled
+from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, FloatImage
-from viewer.app.full_picture import FullPicture, encode_light, is_full, needs_smaller
 from viewer.background.jobs import Failed, Job, JobThread
-from viewer.background.loaded_photo import LoadedPhoto
-from viewer.display.scene_view import SceneView
+from viewer.display.scene_view import SceneView, window_of
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.model.actions import Action, Notify
-from viewer.model.layout import WHOLE, ScreenSize
+from viewer.model.layout import WHOLE
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.notices import Notice
 
@@ -100,7 +101,8 @@ class Sharpener:
         is_finer = picture.size_px.width / picture.part.width > scene.width
         if not is_finer or loaded is self._refused or not is_full(scene, picture.optics, scene.own_size):
             return None
-        return FullPicture(scene, scene.plan, loaded, picture.optics, ScreenSize(*picture.size_px), part=picture.part)
+        part = window_of(picture.part)
+        return FullPicture(scene, scene.plan, loaded, picture.optics, ScreenSize(*picture.size_px), part=part)
 
     def _start(self, request: FullPicture) -> None:
         if not needs_smaller(request.optics):

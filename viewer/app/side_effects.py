@@ -10,6 +10,9 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from iibr_core.exports.photo_folder import list_photos
+from iibr_core.rendering.optics import ApertureMask
+from iibr_core.scenes.scene import Source, source_beside
 from viewer.app.clipboard import Pasted, paste_picture
 from viewer.app.dialogs import Dialog, SaveDialog, has_dialogs
 from viewer.app.exporter import add_export
@@ -22,7 +25,6 @@ from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.background.model_download import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
-from viewer.background.photo_folder import list_photos
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, AskForPath, Notify, OpenPath, ShowPrompt, Sway, TaskTaken, Touch
 from viewer.model.commands import action_for_path
@@ -41,10 +43,9 @@ from viewer.model.state.model_download import (
     ModelsListed,
 )
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import ApertureMask, SetApertureShape
+from viewer.model.state.optics import SetApertureShape
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
-from viewer.model.state.scene import Source, source_beside
 from viewer.model.state.tasks import (
     ChoosePlaceTask,
     ChooseTask,
@@ -119,7 +120,7 @@ class SideEffects:
             case ReadFactsTask(path):
                 self._submit(partial(_read_facts, path))
             case ListFolderTask(path):
-                self._submit(partial(list_photos, path))
+                self._submit(partial(_list_folder, path))
             case SaveTask():
                 return add_save(task, state, self._inputs(state), self._jobs)
             case ExportTask():
@@ -249,3 +250,7 @@ def _read_mask(path: Path) -> ApertureMask:
     from viewer.model.lens.aperture_mask import read_mask
 
     return read_mask(path)
+
+
+def _list_folder(path: str) -> FolderListed:
+    return FolderListed(path, list_photos(path))

@@ -13,9 +13,9 @@ import imgui_bundle  # noqa: F401
 import glfw
 
 # isort: on
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.app.gamepad import Gamepad
-from viewer.model.layout import ScreenSize
 
 WINDOW_SIZE = (1280, 800)
 

@@ -19,9 +19,9 @@ from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.runtime.extras import is_installed
+from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, Quality, StoredColors, ViewOffset
 from viewer.background.jobs import Failed, Job, JobThread
-from viewer.background.loaded_photo import LoadedPhoto
 from viewer.model.inspection_request import InspectionRequest
 
 if TYPE_CHECKING:

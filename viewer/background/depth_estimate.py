@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from iibr_core.scenes.loaded_photo import LoadedPhoto, deepen
+from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage
 from viewer.background.jobs import Failed, Job, JobThread
-from viewer.background.loaded_photo import LoadedPhoto, deepen
 from viewer.model.actions import SamePlaces
-from viewer.model.state.scene import Source
 
 COMPARED = 200
 """So many rows and columns of two maps are compared, at most."""

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.scenes.scene import Progress
 from iibr_core.types import InputError
-from viewer.model.state.scene import Progress
 
 QUEUED_RESULTS = 8
 """Results that may wait for the window: enough to keep a thread busy, few enough to cost no memory."""

@@ -5,23 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 
 from iibr_core.generation.memory_model import PHOTO_BYTES, READING_BYTES, budget_of, whole_bytes
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.tiling import ShouldStop
+from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo, make_plan
+from iibr_core.scenes.opening import WantedPhoto
+from iibr_core.scenes.scene import Scene
 from viewer.background.jobs import Job, JobThread
-from viewer.background.loaded_photo import LoadedPhoto, load_photo, make_plan
-from viewer.model.state.scene import Scene, Source
 
 Read = TypeVar("Read")
-
-
-class WantedPhoto(NamedTuple):
-    """A photo, its views planned with this depth strength."""
-
-    source: Source
-    depth_strength: float
 
 
 _Job = Job[WantedPhoto, tuple[WantedPhoto, Read | None]]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.exports.kinds import EXPORTS
 from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
@@ -17,10 +18,10 @@ from viewer.cli.option_records import with_option_records
 from viewer.cli.options import Force, Grid, Literal, require_memory, require_model
 from viewer.cli.scene_options import PhotoOptions
 from viewer.cli.terminal import show_progress
-from viewer.model.export_kinds import EXPORTS
 
 if TYPE_CHECKING:
-    from viewer.app.batch.workers import WorkerSource
+    from iibr_core.exports.batch.workers import WorkerSource
+    from iibr_core.exports.opening import OpenDrawn
 
 MOST_WORKERS = 1024
 
@@ -52,14 +53,14 @@ class WorkerOptions:
         if tls and (len(tls) < 3 or self.scheduler is None):
             raise InputError("--tls-ca, --tls-cert, --tls-key: give all three, with --scheduler")
         if self.scheduler is None:
-            from viewer.app.batch.run import workers_here
+            from iibr_core.exports.batch.run import workers_here
 
             return workers_here(self.workers)
         if self.workers is not None:
             raise InputError("--workers starts processes here, --scheduler uses those elsewhere: leave one out")
         require_extra("batch", "distributed")
-        from viewer.app.batch.scheduler import TlsFiles, remote_workers
-        from viewer.app.batch.workers import WorkerSource
+        from iibr_core.exports.batch.scheduler import TlsFiles, remote_workers
+        from iibr_core.exports.batch.workers import WorkerSource
 
         return WorkerSource(partial(remote_workers, self.scheduler, TlsFiles(*tls) if tls else None), None)
 
@@ -89,14 +90,14 @@ def batch(
     worker_source = workers.source()
     source = photo.source("", grid, is_literal=literal)
     require_memory(photo.memory, keeps_views=to.is_drawn)
-    from viewer.app.batch.archive import photos_in
-    from viewer.app.batch.ledger import FAILURES, Ledger, require_batch_place
-    from viewer.app.batch.run import run_batch
-    from viewer.app.batch.task import BatchSettings
+    from iibr_core.exports.batch.archive import photos_in
+    from iibr_core.exports.batch.ledger import FAILURES, Ledger, require_batch_place
+    from iibr_core.exports.batch.run import run_batch
+    from iibr_core.exports.batch.task import BatchSettings
 
     require_model(source.depth)
     if gloss is not None:
-        from viewer.background.gloss import read_environment
+        from iibr_core.scenes.gloss import read_environment
 
         read_environment(gloss.gloss)
     name = next(name for name, kind in EXPORTS.items() if kind is to)
@@ -107,8 +108,11 @@ def batch(
     if not photos:
         raise InputError(f"{' and '.join(map(str, folders))}: no photos there")
     require_batch_place(output, folders, force)
+    open_drawn: OpenDrawn | None = None
+    if to.is_drawn:
+        from viewer.display.scene_drawer import open_drawn
     with Ledger(output, force) as ledger, show_progress("looking", counts=True) as show:
-        done = run_batch(ledger, settings, photos, worker_source, show)
+        done = run_batch(ledger, settings, photos, worker_source, open_drawn, show)
     print(f"{output}: {done.written} written, {done.there_before} there before, {done.failed} failed")
     if done.failed:
         raise InputError(f"{output / FAILURES}: tells what failed, and why")

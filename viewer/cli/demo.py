@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iibr_core.formats.outputs import make_folder, require_files_in
+from iibr_core.scenes.inputs import inputs_of
 from iibr_core.types import InputError
-from viewer.app.save_places import inputs_of
 from viewer.cli.options import SCREEN_SIZE
 from viewer.cli.terminal import show_progress
 from viewer.model.demo import demo_photo
 
 if TYPE_CHECKING:
-    from viewer.model.state.scene import Source
+    from iibr_core.scenes.scene import Source
 
 DEMO_FOLDER = Path("out")
 
@@ -23,10 +23,10 @@ def demo() -> None:
 
     Example: iibr demo
     """
+    from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath
-    from viewer.model.state.scene import Source
 
     source = Source(str(demo_photo()))
     try:

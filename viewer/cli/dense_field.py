@@ -13,7 +13,7 @@ from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.registry import WriterFactory
-    from viewer.model.state.scene import Source
+    from iibr_core.scenes.scene import Source
 
 NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
 """Options that say nothing about views between those of a light field."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.rendering.gloss.settings import Gloss
-from viewer.app.exports.registry import export_path, require_export_place, writer_of
+from iibr_core.exports.kinds import require_ending
+from iibr_core.exports.registry import export_path, require_export_place, writer_of
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.option_records import with_option_records
@@ -28,11 +29,13 @@ from viewer.cli.options import (
 )
 from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
-from viewer.model.export_kinds import require_ending
 
 if TYPE_CHECKING:
-    from viewer.app.exports.source import ExportSource
-    from viewer.model.state.scene import Scene, Source
+    from iibr_core.exports.kinds import ExportKind
+    from iibr_core.exports.opening import OpenDrawn
+    from iibr_core.exports.options import ExportOptions
+    from iibr_core.exports.source import ExportSource
+    from iibr_core.scenes.scene import Scene, Source
 
 
 @with_option_records
@@ -76,7 +79,7 @@ def export(
     require_ending(to, output)
     inputs = inputs_of_command(context, source)
     if keys is not None:
-        from viewer.app.exports.animation import read_keys
+        from iibr_core.exports.animation import read_keys
 
         read_keys(keys)
     if not to.path:
@@ -87,56 +90,36 @@ def export(
 
     def require_place(made: Scene) -> None:
         nonlocal target
+        if to.is_drawn:
+            lens.require_within(made)
         target = export_path(to, output, made, options)
         require_export_place(to, target, inputs, force)
 
-    def write(made: ExportSource) -> None:
-        said = writer_of(to)(target, made, options)
-        print(target)
-        print_depth(made.scene.depth_origin)
-        print_notes(made.scene.notes + lens.notes(made.optics) + ((said,) if said else ()))
-
-    if to.is_drawn:
-        _export_drawn(source, scene.depth_strength, lens, require_place, write)
-    else:
-        gloss = lens.gloss.gloss if lens.gloss else None
-        _export_undrawn(source, scene.depth_strength, gloss, not to.layout, require_place, write)
+    made, said = _carry_out(to, source, scene.depth_strength, lens, require_place, lambda: target, options)
+    print(target)
+    print_depth(made.scene.depth_origin)
+    print_notes(made.scene.notes + lens.notes(made.optics) + ((said,) if said else ()))
 
 
-def _export_drawn(
+def _carry_out(
+    kind: ExportKind,
     source: Source,
     depth_strength: float,
     lens: LensOptions,
-    require_place: Callable[[Scene], None],
-    write: Callable[[ExportSource], None],
-) -> None:
-    """Make the scene's views and draw them."""
-    from viewer.app.exports.opening import open_drawn
-    from viewer.app.headless import HeadlessViewer
+    on_ready: Callable[[Scene], None],
+    target: Callable[[], Path],
+    options: ExportOptions,
+) -> tuple[ExportSource, str | None]:
+    """Open the scene and write it; a graphics card is needed for what is drawn alone. target: known by `on_ready`."""
+    from iibr_core.exports.opening import open_for_export
 
-    def look_at(scene: Scene) -> None:
-        lens.require_within(scene)
-        require_place(scene)
+    open_drawn: OpenDrawn | None = None
+    with ExitStack() as held:
+        if kind.is_drawn:
+            from viewer.display.scene_drawer import SceneDrawer
 
-    with HeadlessViewer() as viewer:
+            open_drawn = held.enter_context(SceneDrawer()).open
         with show_progress("reading") as show:
-            made = open_drawn(viewer, source, depth_strength, lens.actions(), look_at, untimed(show))
+            made = open_for_export(kind, source, depth_strength, lens.choice, on_ready, open_drawn, untimed(show))
         with show_progress("exporting") as show:
-            write(replace(made, report_progress=show))
-
-
-def _export_undrawn(
-    source: Source,
-    depth_strength: float,
-    gloss: Gloss | None,
-    needs_disparity: bool,
-    require_place: Callable[[Scene], None],
-    write: Callable[[ExportSource], None],
-) -> None:
-    """Make the scene's views, for what is made of them without a graphics card. needs_disparity: see `open_undrawn`."""
-    from viewer.app.exports.opening import open_undrawn
-
-    with show_progress("reading") as show:
-        made = open_undrawn(source, depth_strength, needs_disparity, require_place, untimed(show), gloss)
-    with show_progress("exporting") as show:
-        write(replace(made, report_progress=show))
+            return made, writer_of(kind)(target(), replace(made, report_progress=show), options)

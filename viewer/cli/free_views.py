@@ -18,8 +18,8 @@ from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.model.free_camera import Poses
 
 if TYPE_CHECKING:
-    from viewer.background.loaded_photo import LoadedPhoto
-    from viewer.model.state.scene import Source
+    from iibr_core.scenes.loaded_photo import LoadedPhoto
+    from iibr_core.scenes.scene import Source
 
 OWN_FILES = r"view_\d{4,5}\.(png|exr)"
 NOT_WITH_POSES = {"format": "--format", "depth_strength": "--depth-strength", "with_disparity": "--with-disparity",
@@ -70,7 +70,7 @@ def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_lit
     require_model(source.depth)
     known = poses_of(poses, photo_pose)
     with show_progress("reading") as show:
-        from viewer.background.loaded_photo import load_photo
+        from iibr_core.scenes.loaded_photo import load_photo
 
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
     from iibr_core.generation.free_views import fitted_cameras
@@ -102,7 +102,7 @@ def _written(
     from iibr_core.generation.stored_views import encode_for_storage
     from iibr_core.inpainting.registry import load_inpainter
     from iibr_core.runtime.tiling import never
-    from viewer.background.loaded_photo import inpainting_aids
+    from iibr_core.scenes.loaded_photo import inpainting_aids
 
     photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])
     canvas = reach_of(cameras[given], cameras, depths_of(inverse_depth)).margins.around(photo.size)

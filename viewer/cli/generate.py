@@ -12,12 +12,7 @@ from iibr_core.formats.light_fields.registry import is_light_field, writer_for
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field import NOT_FOR_DENSE_FIELDS, write_dense_field
-from viewer.cli.free_views import (
-    require_heeded_with_poses,
-    require_poses_for,
-    require_views_folder,
-    write_free_views,
-)
+from viewer.cli.free_views import require_heeded_with_poses, require_poses_for, require_views_folder, write_free_views
 from viewer.cli.lens_options import GlossFile
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import (
@@ -38,7 +33,7 @@ from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.registry import WriterFactory
-    from viewer.model.state.scene import Source
+    from iibr_core.scenes.scene import Source
 
 
 @with_option_records
@@ -119,9 +114,9 @@ def _write_light_field(
 
     from iibr_core.color import photo_in_srgb
     from iibr_core.generation.light_field import generate as generated
-    from viewer.background.gloss import add_gloss
-    from viewer.background.loaded_photo import inpainting_aids, load_photo, make_plan
-    from viewer.background.scene_worker import scene_of_photo
+    from iibr_core.scenes.gloss import add_gloss
+    from iibr_core.scenes.loaded_photo import inpainting_aids, load_photo, make_plan
+    from iibr_core.scenes.opening import scene_of_photo
 
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)

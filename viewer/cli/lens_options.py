@@ -13,9 +13,10 @@ from iibr_core.types import InputError, ViewOffset
 from viewer.cli.options import not_negative_from_text, number_option, view_from_text
 
 if TYPE_CHECKING:
+    from iibr_core.rendering.optics import Optics
+    from iibr_core.scenes.lens_limits import LensChoice
+    from iibr_core.scenes.scene import Scene
     from viewer.model.actions import Action
-    from viewer.model.state.optics import Optics
-    from viewer.model.state.scene import Scene
 
 View = Annotated[
     ViewOffset | None,
@@ -78,6 +79,13 @@ class LensOptions:
     aperture: Aperture = None
     gloss: GlossFile = None
 
+    @property
+    def choice(self) -> LensChoice:
+        """For what knows no window."""
+        from iibr_core.scenes.lens_limits import LensChoice
+
+        return LensChoice(self.view, self.focus, self.aperture, self.gloss.gloss if self.gloss else None)
+
     def actions(self) -> list[Action]:
         """What sets the lens so."""
         from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss
@@ -91,7 +99,7 @@ class LensOptions:
         """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.
         Where there is a single view, it is what every viewpoint shows.
         """
-        from viewer.model.lens.limits import eye_limits
+        from iibr_core.scenes.lens_limits import eye_limits
 
         if self.view is None or scene.grid == (1, 1):
             return

@@ -28,7 +28,7 @@ from viewer.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from viewer.model.state.scene import Source
+    from iibr_core.scenes.scene import Source
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class PhotoOptions:
             raise InputError(
                 "--depth-strength, --focus-disparity: mean nothing to disparity that counts as it is given"
             )
-        from viewer.model.state.scene import Source
+        from iibr_core.scenes.scene import Source
 
         choice, quality = self.depth_choice, self.quality
         return Source(str(path), choice, grid, focus_disparity, self.max_pixels, quality, self.inpaint, is_literal)

@@ -28,11 +28,11 @@ from viewer.model.demo import demo_photo
 
 def open_window() -> None:
     """The window with what was open last, if that is still there. Raises InputError where no window can be opened."""
+    from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import last_opened, user_folder
     from viewer.model.actions import OpenPath
     from viewer.model.state.app_state import AppState
-    from viewer.model.state.scene import Source
 
     last = last_opened(user_folder())
     run(initial_state(OpenPath(Source(last))) if last is not None else AppState(), user_folder())

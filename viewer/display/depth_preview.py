@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.depth.editing.edits import DepthEdits
-from viewer.background.loaded_photo import LoadedPhoto, still_disparity
+from iibr_core.scenes.loaded_photo import LoadedPhoto, still_disparity
+from iibr_core.scenes.scene import Scene
 from viewer.display.scene_view import SceneView
 from viewer.model.reducers.depth_editing import current_depth_settings
 from viewer.model.state.app_state import AppState
-from viewer.model.state.scene import Scene
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas

@@ -12,20 +12,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import DEFAULT_QUALITY, ViewUpdate
-from viewer.background.comparison_worker import (
-    ComparisonInputs,
-    ComparisonResult,
-    EntropyReady,
-    PairReady,
-    PairScored,
-)
+from viewer.background.comparison_worker import ComparisonInputs, ComparisonResult, EntropyReady, PairReady, PairScored
 from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView, window_of
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle, SheetCell
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model.actions import Action, Notify
 from viewer.model.colormap import VIRIDIS
@@ -37,11 +33,10 @@ from viewer.model.inspection_request import (
     sheet_cells,
     view_near,
 )
-from viewer.model.layout import WHOLE, Layout, Rect, ScreenSize
+from viewer.model.layout import WHOLE, Layout, Rect
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
 from viewer.model.state.notices import Notice
-from viewer.model.state.scene import Scene
 
 INPAINTED_RGB = (255, 184, 60)
 ROUNDING = 1

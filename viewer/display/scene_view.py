@@ -14,25 +14,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.exports.render_settings import RenderSettings, TargetWindow
 from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.optics import CENTRE, Optics
+from iibr_core.scenes.gloss import GlossFound, GlossRequest
+from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.opening import SceneReady
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
-from viewer.background.gloss import GlossFound, GlossRequest
-from viewer.background.loaded_photo import LoadedPhoto
-from viewer.background.scene_worker import SceneReady
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
 from viewer.gpu.gloss_textures import GlossTextures
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
-from viewer.gpu.refocus.lens import TargetWindow
 from viewer.gpu.refocus.open_field import field_that_fits
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.layout import WHOLE, Rect, ScreenSize
+from viewer.model.layout import WHOLE, Rect
 from viewer.model.state.app_state import AppState, DrawReport, Picture
-from viewer.model.state.optics import CENTRE, Optics
-from viewer.model.state.scene import Scene
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from iibr_core.scenes.gloss import GlossFound
+from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewUpdate
-from viewer.background.gloss import GlossFound
-from viewer.background.loaded_photo import LoadedPhoto
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.model.state.scene import Scene
 
 
 @dataclass(eq=False)

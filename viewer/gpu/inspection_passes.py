@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, srgb_from_linear
 from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
-from viewer.model.layout import WHOLE, Rect, ScreenSize
-from viewer.model.state.optics import Optics
+from viewer.model.layout import WHOLE, Rect
 
 MAX_VIEWS = 128
 """As in shaders/epi.frag: of one row or column of the grid."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.exports.loops import LoopKind
+from iibr_core.scenes.scene import Progress, Scene, Source
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport, Hover
 from viewer.model.state.depth_editing import DepthAction
@@ -14,14 +16,12 @@ from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
-from viewer.model.state.motion import LoopKind
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import LensAction, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import Section, Theme, Units
 from viewer.model.state.prompts import ChoiceOf, Prompt, Saved
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Progress, Scene, Source
 from viewer.model.state.tasks import Task
 from viewer.model.zoom import SetZoom
 

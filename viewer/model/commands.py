@@ -11,6 +11,8 @@ from pathlib import PurePath
 from typing import Literal
 
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
+from iibr_core.exports.loops import LOOPS, LoopKind
+from iibr_core.scenes.scene import Source, source_beside, source_with_map
 from viewer.model.actions import (
     Action,
     AskToSave,
@@ -56,13 +58,11 @@ from viewer.model.state.inspection import (
     ShowValues,
 )
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
-from viewer.model.state.motion import LOOPS, LoopKind
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetGloss
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
-from viewer.model.state.scene import Source, source_beside, source_with_map
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask
 from viewer.model.zoom import SetZoom, Zoom
 

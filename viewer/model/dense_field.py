@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from iibr_core.scenes.scene import Scene, Source, is_same_field
 from iibr_core.types import GridShape
-from viewer.model.state.filling import is_same_field
 from viewer.model.state.jobs import STOPPING, JobProgress
-from viewer.model.state.scene import Scene, Source
 
 HALVINGS = 3
 MOST_ACROSS = 33

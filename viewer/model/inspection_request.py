@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.layout import Beside, Rect
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Comparison, GroundTruth, ViewIndex
-from viewer.model.state.scene import Scene
 
 SHEET_GAP = 3.0
 DIFFERENCE_GAIN = 4

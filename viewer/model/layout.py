@@ -8,21 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.zoom import MOST_ZOOM, Zoom
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0
 """Behind the picture, where the theme is dark."""
 PANEL_WIDTH = 300.0
 MARGIN = 12.0
-
-
-class ScreenSize(NamedTuple):
-    """Width and height in pixels: the order of GL, GLFW and ImGui. Images have an `ImageSize`; no type checker lets
-    one pass for the other.
-    """
-
-    width: int
-    height: int
 
 
 class PixelRect(NamedTuple):

@@ -18,16 +18,16 @@ import msgspec
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
 from iibr_core.formats.files import file_within, printable
+from iibr_core.formats.images.settings_text import settings_text_in
 from iibr_core.rendering.gloss.settings import require_sound as require_sound_gloss
+from iibr_core.rendering.optics import ApertureShape, Optics
+from iibr_core.scenes.lens_limits import BLADES_LIMITS
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, Quality
-from viewer.model.layout import ScreenSize
-from viewer.model.lens.limits import BLADES_LIMITS
 from viewer.model.painting_work import require_bounded
-from viewer.model.state.optics import ApertureShape, Optics
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Source
 
-ATTRIBUTE = "iibr:settings"
 FORMAT = 1
 MOST_CHARACTERS = 16_000_000
 """A thousand strokes take 1.3 million."""
@@ -140,35 +140,6 @@ def require_saved_size(saved: SavedSettings, path: Path) -> None:
         raise InputError(
             f"{path}: its settings ask for a picture of {width}x{height} px; give a smaller one with --size"
         )
-
-
-def settings_text_in(path: Path) -> str:
-    """The text of the settings in a picture's header, "" without. Raises InputError where it is no picture."""
-    import OpenImageIO as oiio
-
-    from iibr_core.formats.files import require_file
-    from iibr_core.formats.images.avif import is_avif
-    from iibr_core.formats.images.heic import is_heic
-    from iibr_core.formats.images.metadata import text_in_xmp, unpack_text
-    from iibr_core.formats.images.oiio_names import oiio_name
-    from iibr_core.formats.images.oiio_reader import complaint_of
-
-    require_file(path)
-    if is_heic(path):
-        return ""  # this program writes none
-    if is_avif(path):
-        return text_in_xmp(path, ATTRIBUTE)
-    source = oiio.ImageInput.open(oiio_name(path))
-    if source is None:
-        raise InputError(f"{path}: is no picture ({' '.join(complaint_of(oiio).split())[:120] or 'no reason given'})")
-    try:
-        if source.format_name() == "webp":
-            return text_in_xmp(path, ATTRIBUTE)
-        return unpack_text(str(source.spec().get_string_attribute(ATTRIBUTE)), path)
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: its settings are damaged (no text); set them by hand") from error
-    finally:
-        source.close()
 
 
 def source_like(source: Source, saved: SavedSettings, given: Collection[str]) -> Source:

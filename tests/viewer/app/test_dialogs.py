@@ -7,8 +7,8 @@ import os
 import pytest
 from imgui_bundle import portable_file_dialogs
 
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.app.dialogs import Dialog, SaveDialog
-from viewer.model.layout import ScreenSize
 from viewer.model.state.prompts import SavePrompt
 
 

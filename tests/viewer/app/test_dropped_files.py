@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape
 from viewer.app.dropped_files import actions_from_drop
 from viewer.model.actions import OpenPath
 from viewer.model.state.app_state import AppState
-from viewer.model.state.scene import Scene, Source
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
 STATE = AppState(source=SCENE.source, scene=SCENE)

@@ -13,14 +13,17 @@ from imgui_bundle import imgui
 from PIL import Image, ImageSequence
 
 from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.runtime.tiling import raise_if_stopped
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
-from viewer.app.exports.source import ExportSource
 from viewer.app.main_loop import App
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import (
     Action,
     DismissNotice,
@@ -32,12 +35,10 @@ from viewer.model.actions import (
     SetDepthStrength,
     ShowPrompt,
 )
-from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Paint, SetTone
-from viewer.model.state.exporting import ExportOptions, ExportPrompt, ExportTask
+from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, CancelJobTask
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss, SetTilt
-from viewer.model.state.scene import Source
 from viewer.model.state.tasks import SaveTask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import DEADLINE_S, Driver, Opener
 from viewer.app.preferences_store import store_preferences
 from viewer.app.reduced_motion import prefers_reduced_motion
 from viewer.model.actions import OpenPath
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import CENTRE
-from viewer.model.state.scene import Source
 
 
 @pytest.fixture

@@ -12,16 +12,15 @@ import pytest
 from imgui_bundle import imgui
 from PIL import ImageGrab
 
+from iibr_core.scenes.opening import ViewReady, WantedPhoto
+from iibr_core.scenes.scene import Progress, Source
 from iibr_core.types import GridShape, ViewUpdate
-from tests.viewer.background.test_scene_worker import write_large_photo
+from tests.iibr_core.scenes.test_opening import write_large_photo
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.main_loop import App
 from viewer.background import scene_worker
-from viewer.background.read_ahead import WantedPhoto
-from viewer.background.scene_worker import ViewReady
 from viewer.model.actions import OpenPath
 from viewer.model.state.folder import StepPhoto
-from viewer.model.state.scene import Progress, Source
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.iibr_core.known_scenes import write_llff_row, write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
@@ -16,7 +17,6 @@ from viewer.app.headless import HeadlessViewer
 from viewer.app.side_effects import read_truth
 from viewer.model.layout import layout_of
 from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture
-from viewer.model.state.scene import Source
 
 
 @pytest.fixture

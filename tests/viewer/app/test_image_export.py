@@ -11,19 +11,19 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.color import srgb_from_linear
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_float
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_save
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import JobsChanged
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
-from viewer.model.state.scene import Source
 from viewer.model.state.tasks import SaveTask
 
 

@@ -13,17 +13,18 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.loaded_photo import load_photo
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.main_loop import App, initial_state
-from viewer.background.loaded_photo import load_photo
 from viewer.model.actions import OpenPath, SetLoop, ToggleSection
 from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Compare, KeepState, SetOverlay, ShowEpis
-from viewer.model.state.optics import MoveEye, Optics
-from viewer.model.state.scene import Source
+from viewer.model.state.optics import MoveEye
 from viewer.model.state.tasks import ReadTruthTask
 
 GRID = GridShape(5, 5)

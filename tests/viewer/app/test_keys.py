@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model.actions import Action, AskToSave, SetFullscreen, ShowPrompt, Undo
@@ -17,7 +18,6 @@ from viewer.model.state.folder import StepPhoto
 from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
 from viewer.model.state.optics import MoveEye, ResetOptics
 from viewer.model.state.prompts import PalettePrompt
-from viewer.model.state.scene import Scene, Source
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
 STATE = AppState(source=SCENE.source, scene=SCENE)

@@ -15,6 +15,7 @@ from iibr_core.depth.estimators.catalog import fetch, known_model, model_here
 from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled, ShouldStop
+from iibr_core.scenes.scene import Source, source_beside
 from iibr_core.types import GridShape, ViewOffset, ignore_progress
 from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import Hub, local_hub
@@ -26,7 +27,6 @@ from viewer.model.reducers.depth_models import offered_model
 from viewer.model.state.depth_editing import Brush, Paint, SetBrush
 from viewer.model.state.model_download import ModelsPrompt, SetEstimatesDepth, UseModel
 from viewer.model.state.optics import FocusOn, MoveEye, SetAperture, SetFocus
-from viewer.model.state.scene import Source, source_beside
 
 MODEL = known_model("depth-anything-v2-small")
 GRID = GridShape(3, 3)

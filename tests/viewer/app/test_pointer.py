@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.pointer import (
     DRAG_ACROSS_GRID,
@@ -22,8 +24,7 @@ from viewer.model.layout import Rect as R
 from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.history import History
-from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, Optics, SetFocus
-from viewer.model.state.scene import Scene, Source
+from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, SetFocus
 from viewer.model.zoom import SetZoom, Zoom
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")

@@ -9,13 +9,15 @@ from pathlib import Path
 import pytest
 
 from iibr_core.depth.choice import DepthChoice, DepthOrigin
+from iibr_core.exports.render_settings import require_size
 from iibr_core.formats.outputs import AlreadyThereError
+from iibr_core.scenes.inputs import inputs_of
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import write_scene
-from viewer.app.save_places import inputs_of, inputs_of_scene, map_path, picture_path, require_size
+from viewer.app.save_places import inputs_of_scene, map_path, picture_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import GroundTruth, Inspection
-from viewer.model.state.scene import Scene, Source
 from viewer.model.state.tasks import SaveTask
 
 

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.exports.full_picture import FullPicture
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.rendering.lens_light import mean_of_areas
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
-from viewer.app.full_picture import FullPicture
 from viewer.app.image_export import export_picture
 from viewer.app.job_queue import JobQueue
 from viewer.app.main_loop import SETTLING_FRAMES
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.actions import AskToSave, DismissNotice, DoTask
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING, CancelJobTask, JobProgress

@@ -15,18 +15,19 @@ import pytest
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.opened_files import watch
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.session_store import sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
-from viewer.model.layout import ScreenSize
 from viewer.model.reducers.root import EDITS_KEPT
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
-from viewer.model.state.optics import MoveEye, Optics, SetAperture, SetFocus, SetGloss
+from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss
 from viewer.model.state.saving import SavedSettings, WriteSidecarTask
-from viewer.model.state.scene import Source
 
 ONE = GridShape(1, 1)
 AS_LEFT = "As you left it"

@@ -14,6 +14,7 @@ from iibr_core.formats.light_fields.registry import writer_for
 from iibr_core.formats.quilts import Quilt, lay_out
 from iibr_core.generation import dense_field
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ImageSize, ViewOffset, ViewUpdate
 from tests.iibr_core.known_scenes import view_of_wall
 from tests.viewer.conftest import Driver
@@ -23,7 +24,6 @@ from viewer.model.dense_field import with_views_between
 from viewer.model.state.filling import FillTask
 from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.optics import SetAperture, SetFocus
-from viewer.model.state.scene import Scene
 
 SIZE = 48, 64
 DISPARITY = 1.0

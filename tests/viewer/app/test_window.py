@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener, write_scene
 from viewer.app.main_loop import App
@@ -18,8 +20,7 @@ from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model.actions import SetDepthStrength
-from viewer.model.state.optics import MoveEye, Optics
-from viewer.model.state.scene import Source
+from viewer.model.state.optics import MoveEye
 
 
 @pytest.fixture

@@ -11,17 +11,19 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.formats.images.photo import read_photo, write_image
+from iibr_core.formats.images.settings_text import ATTRIBUTE
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.preferences_store import load_preferences
 from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
-from viewer.model.saved_settings import ATTRIBUTE, read_settings
+from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.optics import MoveEye, Optics, SetAperture
+from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
-from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")

@@ -7,6 +7,7 @@ import dataclasses
 import pytest
 
 from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
 from viewer.model.actions import Action, Notify, SetDepthStrength, SetFontScale, SetTheme, ShowPrompt, ShowTiltHandles
@@ -14,10 +15,8 @@ from viewer.model.lens.focal_plane import handle_points, sharp_disparity
 from viewer.model.state.app_state import TiltHandles
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
-    ApertureShape,
     ApplyPreset,
     MoveEye,
-    Optics,
     SetApertureShape,
     SetDolly,
     SetFocusRange,

@@ -9,6 +9,7 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.formats.images.photo import write_image
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.app.window_slot import STEP
@@ -28,7 +29,6 @@ from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
-from viewer.model.state.scene import Source
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 

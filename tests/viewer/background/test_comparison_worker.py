@@ -21,6 +21,8 @@ from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
+from iibr_core.scenes.loaded_photo import load_photo
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
 from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import write_scene
@@ -34,10 +36,8 @@ from viewer.background.comparison_worker import (
     PairScored,
 )
 from viewer.background.jobs import Failed
-from viewer.background.loaded_photo import load_photo
 from viewer.model.inspection_request import InspectionRequest
 from viewer.model.state.inspection import GroundTruth
-from viewer.model.state.scene import Source
 
 GRID = GridShape(3, 3)
 DEADLINE_S = 60.0

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 import pytest
 
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.scenes.opening import WantedPhoto
+from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
-from viewer.background.read_ahead import ReadAhead, WantedPhoto
-from viewer.model.state.scene import Source
+from viewer.background.read_ahead import ReadAhead
 
 DEADLINE_S = 60.0
 

@@ -9,36 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
+from iibr_core.rendering.optics import CENTRE
 from iibr_core.runtime import compiling
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.scene import DepthSettings, Progress, Source
 from iibr_core.types import GridShape, InputError, ViewUpdate
-from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanford, write_stereo_pair
-from tests.viewer.background.test_light_field_job import showings
 from viewer.background.jobs import QUEUED_RESULTS, Failed
-from viewer.background.light_field_job import UNKNOWN_DISPARITY_RANGE_PX
-from viewer.background.loaded_photo import load_photo, sketch_photo, without_history
-from viewer.background.read_ahead import WantedPhoto
-from viewer.background.scene_worker import (
-    SceneReady,
-    SceneRequest,
-    SceneResult,
-    SceneWork,
-    SceneWorker,
-    ViewReady,
-    _telling_compiling,
-    results_of,
-    sketch_of,
-)
+from viewer.background.scene_worker import SceneResult, SceneWork, SceneWorker, _telling_compiling
 from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.lens.photographic_units import equivalent_f_number
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DepthSettings
-from viewer.model.state.optics import CENTRE, SetAperture
-from viewer.model.state.scene import Progress, Source
+from viewer.model.state.optics import SetAperture
 
 DEADLINE_S = 120.0
 VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)
@@ -99,59 +83,6 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
     assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
 
 
-def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") -> Path:
-    """A photo that takes a while to read."""
-    rows, columns = np.mgrid[:1200, :1600]
-    pixels = np.stack([rows % 256, columns % 256, (rows // 100 + columns // 100) % 2 * 200], axis=2)
-    path = folder / f"{name}.{ending}"
-    Image.fromarray(pixels.astype(np.uint8)).save(path)
-    return path
-
-
-@pytest.mark.parametrize("ending", ["jpg", "png", "webp"])
-def test_a_large_photo_has_a_sketch(tmp_path: Path, ending: str) -> None:
-    source = Source(str(write_large_photo(tmp_path, ending=ending)), grid=GridShape(3, 3))
-    sketch = sketch_of(WantedPhoto(source, 1.0))
-    whole = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
-    assert isinstance(whole, SceneReady)
-    assert sketch is not None
-    assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
-    assert sketch.scene.is_sketch
-    assert sketch.loaded is None
-    assert sketch.centre.colors.shape == (360, 480, 3)
-    assert sketch.scene.name == whole.scene.name
-    assert (whole.scene.size, whole.scene.is_sketch) == ((1600, 1200), False)
-    assert whole.loaded is not None
-
-
-@pytest.mark.parametrize("changes", [{"max_pixels": 10_000}, {"is_literal": True}], ids=str)
-def test_what_is_read_in_no_time_or_taken_literally_has_no_sketch(tmp_path: Path, changes: dict[str, object]) -> None:
-    source = replace(Source(str(write_large_photo(tmp_path)), grid=GridShape(3, 3)), **changes)  # type: ignore[arg-type]
-    assert sketch_photo(source) is None
-
-
-def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) -> None:
-    path = write_large_photo(tmp_path)
-    path.write_bytes(path.read_bytes()[:20_000])
-    assert sketch_of(WantedPhoto(Source(str(path)), 1.0)) is None
-    with pytest.raises(InputError, match=r"large\.jpg"):
-        list(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
-
-
-@pytest.mark.parametrize("takes_drafts", [True, False])
-def test_views_come_twice_where_they_may_and_progress_counts_them_once(photo_path: Path, takes_drafts: bool) -> None:
-    source = Source(str(photo_path), grid=GridShape(3, 3))
-    request = SceneRequest(1, source, takes_drafts=takes_drafts)
-    ready, *results = results_of(request, lambda: False, lambda: CENTRE)
-    views = [result for result in results if isinstance(result, ViewReady)]
-    assert isinstance(ready, SceneReady)
-    assert [view.view.is_final for view in views] == [True] + [False] * 8 * takes_drafts + [True] * 8
-    expected = [(done, max(done - 1, 0) if takes_drafts else 0) for done in range(1, 10)]
-    expected += [(9, drafts) for drafts in range(7, -1, -1)] if takes_drafts else []
-    assert [(view.progress.done, view.progress.drafts) for view in views] == expected
-    assert [view.progress.is_complete for view in views] == [False] * (len(views) - 1) + [True]
-
-
 def test_a_lost_worker_says_so_and_the_next_request_starts_another(
     desk_for: Callable[..., Desk], capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -171,24 +102,6 @@ def test_a_lost_worker_says_so_and_the_next_request_starts_another(
     assert "a library tried" in capfd.readouterr().err
 
 
-def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path, tmp_path: Path) -> None:
-    from iibr_core.formats.images.photo import read_photo, write_image
-
-    known = tmp_path / "known.png"
-    write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
-    for path, expected in ((photo_path, None), (known, read_photo(known).focal_px)):
-        ready = next(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
-        assert isinstance(ready, SceneReady)
-        assert ready.scene.focal_px == expected
-    assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
-
-
-def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
-    ready = next(results_of(SceneRequest(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
-    assert isinstance(ready, SceneReady)
-    assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
-
-
 def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> None:
     """The views are others, the aperture is carried over to them: its f-number stays."""
     source, loaded, stops, state = Source(str(photo_path)), None, [], AppState()
@@ -204,97 +117,6 @@ def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> No
         stops.append(equivalent_f_number(ready.scene, state.optics.aperture_diameter))
     assert ready.scene.found_span_px < 0.5 * np.ptp(ready.scene.disparity_range_px)
     assert stops == pytest.approx([stops[0]] * 3)
-
-
-def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
-    source = Source(str(photo_path), grid=GridShape(1, 1))
-    first = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
-    assert isinstance(first, SceneReady)
-    photo_path.unlink()
-    again = next(results_of(SceneRequest(2, source, 2.0, first.loaded), lambda: False, lambda: CENTRE))
-    assert isinstance(again, SceneReady)
-    assert again.loaded is first.loaded
-    assert again.scene.plan is not None
-    assert first.scene.plan is not None
-    assert again.scene.plan.disparity_scale == pytest.approx(2 * first.scene.plan.disparity_scale)
-
-
-@pytest.mark.parametrize("with_disparity", [True, False])
-def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
-    from iibr_core.formats.light_fields.hci import HciWriter
-
-    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)), takes_drafts=False)
-    made = list(results_of(request, lambda: False, lambda: CENTRE))
-    folder = tmp_path / "field"
-    with HciWriter(folder, GridShape(3, 3), 100.0, "field", with_disparity) as writer:
-        for result in made:
-            if isinstance(result, ViewReady):
-                writer.add(result.view)
-    results = results_of(SceneRequest(2, Source(str(folder))), lambda: False, lambda: CENTRE)
-    ready, views = next(showings(results))
-    assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
-    assert ready.scene.has_view_disparity == with_disparity
-    assert ready.scene.disparity_range_px[0] < ready.scene.disparity_range_px[1]
-    assert len(views) == 9
-
-
-@pytest.mark.parametrize(
-    ("write", "grid", "range_px", "depth_source"),
-    [
-        (lambda to: write_stanford(to, 2, 3), (2, 3), UNKNOWN_DISPARITY_RANGE_PX, "none"),
-        (write_stereo_pair, (1, 2), (7.5, 7.5), "none"),  # the map is the left view's, the middle is the right one
-        (write_grid, (3, 3), (0.5, 2.0), "light field"),
-    ],
-)
-def test_what_evaluation_reads_opens_here(
-    tmp_path: Path,
-    write: Callable[[Path], Path],
-    grid: tuple[int, int],
-    range_px: tuple[float, float],
-    depth_source: str,
-) -> None:
-    source = Source(str(write(tmp_path / "field")))
-    ready, views = next(showings(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)))
-    scene = ready.scene
-    assert (scene.name, scene.grid, scene.disparity_range_px) == ("field", grid, range_px)
-    assert (scene.depth_source, scene.has_view_disparity) == (depth_source, False)
-    assert len(views) == grid[0] * grid[1]
-
-
-def test_views_that_stand_on_no_grid_are_refused_in_one_line(tmp_path: Path) -> None:
-    source = Source(str(write_llff_row(tmp_path / "fern")))
-    with pytest.raises(InputError, match=r"fern.*no regular grid.*`iibr evaluate` reads them"):
-        next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
-
-
-def test_a_folder_without_views_is_told_what_would_be_some(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds no light field; laid out as HCI, Stanford"):
-        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: False, lambda: CENTRE))
-
-
-def test_generating_stops_between_row_bands(photo_path: Path) -> None:
-    """Asked to stop once the scene is there, it ends without another view."""
-    kinds: list[type] = []
-    asked = []
-
-    def should_stop() -> bool:
-        asked.append(len(kinds))
-        return bool(kinds)
-
-    for result in results_of(
-        SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE
-    ):
-        kinds.append(type(result))
-    assert asked[-1] > 0
-    assert kinds[0] is SceneReady
-    assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
-
-
-def test_reading_stops_too(photo_path: Path) -> None:
-    """Asked to stop while it refines depth."""
-    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
-    with pytest.raises(Cancelled):
-        next(results_of(request, lambda: True, lambda: CENTRE))
 
 
 def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> None:
@@ -442,27 +264,6 @@ def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> 
     desk.worker.submit(request(1))
     desk.next()
     assert seen == [ViewOffset(1, 2)]
-
-
-def test_an_avif_photo_opens(tmp_path: Path) -> None:
-    """It is read by another library than the settings in saved pictures."""
-    from PIL import Image
-
-    from viewer.background.loaded_photo import load_photo
-
-    Image.new("RGB", (48, 32), (200, 80, 60)).save(tmp_path / "a.avif")
-    loaded = load_photo(Source(str(tmp_path / "a.avif")))
-    assert (loaded.photo.size, loaded.settings) == ((32, 48), "")
-
-
-def test_a_photo_that_is_left_keeps_its_map_and_nothing_of_its_strokes(photo_path: Path) -> None:
-    loaded = load_photo(Source(str(photo_path)))
-    edits = DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 0.5),))
-    painted = loaded.canvas.apply(edits)
-    left = without_history(loaded)
-    assert left.canvas is not loaded.canvas
-    np.testing.assert_array_equal(left.disparity.values, loaded.disparity.values)
-    np.testing.assert_array_equal(left.canvas.apply(edits), painted)
 
 
 def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,14 +15,14 @@ import pytest
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Source
 from iibr_core.types import TOTAL_PARALLAX
 from tests.iibr_core import red_inpainter
 from tests.opened_files import watch
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from viewer.cli.main import main
-from viewer.model.state.optics import Optics
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Source
 
 ROOT = Path(__file__).parents[3]
 
@@ -305,7 +305,8 @@ def test_like_opens_no_file_that_the_picture_names(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:
     from iibr_core.formats.images.photo import write_image
-    from viewer.model.saved_settings import ATTRIBUTE, settings_text
+    from iibr_core.formats.images.settings_text import ATTRIBUTE
+    from viewer.model.saved_settings import settings_text
 
     (tmp_path / "elsewhere").mkdir()
     secret = write_scene(tmp_path / "elsewhere", "secret")
@@ -414,7 +415,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(
 
 
 def test_a_bug_is_shown_as_one(monkeypatch: pytest.MonkeyPatch, photo_path: Path) -> None:
-    monkeypatch.setattr("viewer.background.loaded_photo.load_photo", lambda source: 1 / 0)
+    monkeypatch.setattr("iibr_core.scenes.loaded_photo.load_photo", lambda source: 1 / 0)
     monkeypatch.setattr(sys, "argv", ["iibr", "plan", str(photo_path)])
     with pytest.raises(ZeroDivisionError):
         main()
@@ -424,7 +425,7 @@ def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, photo_path: Path)
     def interrupted(source: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("viewer.background.loaded_photo.load_photo", interrupted)
+    monkeypatch.setattr("iibr_core.scenes.loaded_photo.load_photo", interrupted)
     assert run(monkeypatch, "plan", photo_path) == 130
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import write_image
-from viewer.model.saved_settings import ATTRIBUTE, settings_text_in
+from iibr_core.formats.images.settings_text import ATTRIBUTE, settings_text_in
 
 MIB = 2**20
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits and peaks as Linux has them")

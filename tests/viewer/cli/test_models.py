@@ -16,14 +16,15 @@ import typer
 
 from iibr_core.depth.estimators.catalog import KNOWN_MODELS, known_model
 from iibr_core.depth.estimators.download import VERIFIED, require_unchanged
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
+from iibr_core.scenes.scene import Progress, Source
 from iibr_core.types import GridShape, InputError
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import write_scene
 from viewer.background.jobs import ProgressReport
-from viewer.background.scene_worker import SceneReady, SceneRequest, SceneWorker, results_of
+from viewer.background.scene_worker import SceneWorker
 from viewer.cli.options import depth_start_from_text, refine_from_text
-from viewer.model.state.optics import CENTRE
-from viewer.model.state.scene import Progress, Source
 
 
 def run_models(

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.model.state.optics import MoveEye, SetAperture
-from viewer.model.state.scene import Source
 
 PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255))
 IN_SRGB = converted(np.array([PATCHES], np.uint8), profile_bytes())[0].astype(float)

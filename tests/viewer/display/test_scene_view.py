@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.scenes.opening import SceneReady
+from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.background.scene_worker import SceneReady
 from viewer.display import scene_view
 from viewer.display.scene_view import SceneView
-from viewer.gpu.refocus.render_settings import RenderSettings
-from viewer.model.layout import ScreenSize
 from viewer.model.state.optics import SetAperture
 
 SIZE = ScreenSize(384, 256)

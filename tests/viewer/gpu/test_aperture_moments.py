@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.rendering.optics import CENTRE, ApertureMask, ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import ApertureSample, aperture_samples
-from viewer.model.state.optics import CENTRE, ApertureMask, ApertureShape, Optics
 
 GRID = GridShape(17, 17)
 FULL = np.ones(GRID, bool)

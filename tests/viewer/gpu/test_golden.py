@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.headless_context import Backend, create_headless
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.state.optics import Optics
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 GRID = GridShape(5, 5)

@@ -15,14 +15,14 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms
 from viewer.gpu.context import GLContext
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.lens.limits import eye_limits
-from viewer.model.state.optics import Optics
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
 SIZE = SCENE.width, SCENE.height

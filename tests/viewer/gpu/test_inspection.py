@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
@@ -15,7 +16,6 @@ from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, Inspecti
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.colormap import VIRIDIS, map_color
-from viewer.model.state.optics import Optics
 
 GRID = GridShape(5, 7)
 SCENE = TwoPlanes()

@@ -10,13 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.rendering.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
-from viewer.gpu.refocus.lens import HIGHLIGHT_GAIN
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
-from viewer.model.state.optics import CENTRE, ApertureMask, ApertureShape, Optics
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)

@@ -9,14 +9,15 @@ import pytest
 from numpy.typing import NDArray
 
 from iibr_core.color import srgb_from_linear
+from iibr_core.exports.render_settings import WHOLE
+from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms
-from viewer.gpu.refocus.lens import WHOLE, Lens, lens_of
+from viewer.gpu.refocus.lens import Lens, lens_of
 from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import pinhole_sources
 from viewer.gpu.render_targets import RenderTargets
-from viewer.model.state.optics import CENTRE, Optics
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=96, back=-4.0, front=5.0, radius_px=25.0)

@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 import pytest
 
+from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.context import GLContext
@@ -18,7 +19,6 @@ from viewer.gpu.refocus.accumulation import EDGE_PASSES, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import QualityLevel
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.state.optics import CENTRE, Optics
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=0.0, radius_px=25.0)

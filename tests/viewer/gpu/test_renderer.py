@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
-from viewer.model.state.optics import Optics
 
 GRID = GridShape(5, 5)
 CENTRE = ViewOffset(0.0, 0.0)

@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.color import srgb_from_linear
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.tiling import MARGIN_PX, PART_PX, picture_tiles
-from viewer.model.state.optics import ApertureShape, Optics
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=1.0, radius_px=25.0)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.view_sampling import aperture_samples, nearest_present, pinhole_sources
-from viewer.model.lens.limits import clamp_to_grid
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.scenes.scene import Source
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import AskToSave
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
@@ -16,7 +17,6 @@ from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
-from viewer.model.state.scene import Source
 from viewer.model.state.tasks import ChooseTask
 
 

@@ -8,6 +8,8 @@ import pytest
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.generation.dense_field import require_steps
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import FilledField, Scene, Source, source_beside
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import DoTask, OpenPath
 from viewer.model.commands import COMMANDS
@@ -15,10 +17,8 @@ from viewer.model.dense_field import MOST_ACROSS, chosen_grid, denser_grids, nex
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.filling import FilledField, FillTask, ViewsFilled
+from viewer.model.state.filling import FillTask, ViewsFilled
 from viewer.model.state.jobs import STOPPING, JobProgress
-from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Scene, Source, source_beside
 
 GIVEN, DENSE = GridShape(3, 3), GridShape(5, 5)
 FIELD = Scene(Source("field"), "field", 60, 40, GIVEN, (-2.0, 3.0), "light field", given_grid=GIVEN)

@@ -19,6 +19,10 @@ from iibr_core.depth.editing.edits import (
     Stroke,
 )
 from iibr_core.formats.maps.disparity_file import read_disparity
+from iibr_core.scenes.loaded_photo import apply_depth_settings, load_photo, make_plan
+from iibr_core.scenes.opening import SceneRequest, results_of
+from iibr_core.scenes.scene import DepthSettings, Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ImageSize, InputError
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
 from tests.viewer.model.test_history import after
@@ -28,11 +32,9 @@ from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_map, settings_of
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.app.pointer import Pointer, actions_from_pointer
-from viewer.background.loaded_photo import apply_depth_settings, load_photo, make_plan
-from viewer.background.scene_worker import SceneRequest, results_of
 from viewer.model.actions import AskToSave, EndGesture, OpenFailed, OpenPath, Redo, SceneOpened, Undo
 from viewer.model.commands import BY_NAME, action_for_path
-from viewer.model.layout import ScreenSize, layout_of
+from viewer.model.layout import layout_of
 from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
@@ -40,7 +42,6 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import (
     Brush,
     DepthSample,
-    DepthSettings,
     DropStroke,
     Paint,
     PickDepth,
@@ -52,7 +53,6 @@ from viewer.model.state.depth_editing import (
 from viewer.model.state.model_download import UseModel
 from viewer.model.state.optics import MoveEye, SetFocus
 from viewer.model.state.prompts import PathPrompt, SavePrompt
-from viewer.model.state.scene import Source
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
 GRID = GridShape(3, 3)

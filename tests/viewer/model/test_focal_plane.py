@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import EndGesture, ShowTiltHandles
@@ -22,7 +23,7 @@ from viewer.model.lens.focal_plane import (
 )
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import TiltHandles
-from viewer.model.state.optics import FocusOn, MoveTiltHandle, Optics
+from viewer.model.state.optics import FocusOn, MoveTiltHandle
 
 shares = st.floats(-1, 1)
 places = st.tuples(shares, shares)

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.exports.photo_folder import FolderPhoto, in_order
+from iibr_core.scenes.scene import Source
 from tests.viewer.model.test_reducers import scene_of
 from viewer.model.actions import OpenFailed, OpenPath, SceneOpened, StopWork
-from viewer.model.reducers.folder import AHEAD, filmstrip_range, in_order, photos_ahead
+from viewer.model.reducers.folder import AHEAD, filmstrip_range, photos_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import FolderListed, FolderPhoto, ScrollFilmstrip, SetFolderOrder, StepPhoto
-from viewer.model.state.scene import Source
+from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto
 
 NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 

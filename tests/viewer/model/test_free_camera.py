@@ -8,6 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import Camera, ImageSize
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 from tests.viewer.model.test_reducers import scene_of, state_with
@@ -26,13 +29,11 @@ from viewer.model.free_camera import (
     is_at_end,
     seen_share,
 )
-from viewer.model.layout import ScreenSize
 from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import CENTRE, MoveEye, ResetOptics, SetAperture, SetFocus
+from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetFocus
 from viewer.model.state.prompts import SavePrompt
-from viewer.model.state.scene import Source
 
 
 def poses_of(count: int, given: int) -> Poses:

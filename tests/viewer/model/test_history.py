@@ -6,6 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.model.actions import (
@@ -29,7 +31,6 @@ from viewer.model.state.optics import (
     ApplyPreset,
     FocusOn,
     MoveEye,
-    Optics,
     ResetOptics,
     SetAperture,
     SetExposure,
@@ -37,7 +38,6 @@ from viewer.model.state.optics import (
     SetFocusRange,
     SetTilt,
 )
-from viewer.model.state.scene import Source
 
 values = st.floats(0, 3)
 edits = st.one_of(

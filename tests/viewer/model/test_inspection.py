@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover, SetUnits
 from viewer.model.colormap import VIRIDIS, map_color
@@ -46,7 +47,6 @@ from viewer.model.state.inspection import (
     TruthRead,
 )
 from viewer.model.state.optics import MoveEye
-from viewer.model.state.scene import Scene, Source
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.overlays.inspection import legend_words, status_text
 from viewer.ui.overlays.reticle import hover_text

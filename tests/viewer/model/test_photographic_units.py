@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import focus_limits
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import plan_of, scene_of
-from viewer.model.lens.limits import focus_limits
 from viewer.model.lens.photographic_units import (
     ASSUMED_DISTANCE_M,
     disparity_at,
@@ -24,8 +26,6 @@ from viewer.model.lens.photographic_units import (
     relative_distance,
 )
 from viewer.model.state.app_state import Hover
-from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Scene
 from viewer.ui.overlays.reticle import hover_text
 
 FOCAL_PX, STEP_M = 1000.0, 0.01

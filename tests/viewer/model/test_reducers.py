@@ -11,6 +11,17 @@ from hypothesis import strategies as st
 
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.rendering.optics import APERTURE_KINDS, EXPOSURE_LIMIT_STOPS, ApertureMask, ApertureShape, Optics
+from iibr_core.scenes.lens_limits import (
+    STEEPEST_TILT,
+    aperture_limit,
+    dolly_limit,
+    eye_margin,
+    focus_limits,
+    focus_span,
+    is_finite,
+)
+from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import (
     DismissNotice,
@@ -30,33 +41,18 @@ from viewer.model.actions import (
     TakeSettings,
     Undo,
 )
-from viewer.model.lens.limits import (
-    DEPTH_STRENGTH_LIMIT,
-    STEEPEST_TILT,
-    aperture_limit,
-    dolly_limit,
-    eye_margin,
-    focus_limits,
-    focus_span,
-    is_finite,
-)
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.lens import carry_optics
 from viewer.model.reducers.notices import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover, Picture
-from viewer.model.state.depth_editing import DepthSettings, SetTone
+from viewer.model.state.depth_editing import SetTone
 from viewer.model.state.jobs import JobProgress, JobsChanged, QuitWhenDone
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import (
-    APERTURE_KINDS,
-    EXPOSURE_LIMIT_STOPS,
-    ApertureMask,
-    ApertureShape,
     ApplyPreset,
     FocusOn,
     MoveEye,
-    Optics,
     ResetOptics,
     SetAperture,
     SetApertureShape,
@@ -68,7 +64,7 @@ from viewer.model.state.optics import (
     SetTilt,
 )
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Progress, Scene, Source
+from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)

@@ -16,24 +16,23 @@ from hypothesis import strategies as st
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.settings_text import ATTRIBUTE, settings_text_in
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
+from iibr_core.rendering.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import SceneOpened
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import (
-    ATTRIBUTE,
     MOST_CHARACTERS,
     left_out_note,
     read_settings,
     settings_from_text,
     settings_text,
-    settings_text_in,
     source_like,
 )
-from viewer.model.state.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Source
 
 numbers = st.floats(-1e3, 1e3)
 masks = st.builds(lambda n: ApertureMask("ünïcode “mask”.png", 2, n, bytes([255] * 2 * n)), st.integers(1, 64))

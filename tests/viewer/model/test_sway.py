@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.rendering.optics import CENTRE, Optics
+from iibr_core.scenes.lens_limits import FIRST_APERTURE
+from iibr_core.scenes.scene import Progress, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_reducers import SOURCE, scene_of
 from viewer.model.actions import (
@@ -20,13 +23,11 @@ from viewer.model.actions import (
     Tick,
     Touch,
 )
-from viewer.model.lens.presets import FIRST_APERTURE
 from viewer.model.reducers.camera_motion import SWAY_TURN_S, SWAY_TURNS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import CENTRE, MoveEye, Optics, SetFocus
+from viewer.model.state.optics import MoveEye, SetFocus
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Progress, Source
 from viewer.model.state.tasks import MaySwayTask
 
 GRID = GridShape(9, 9)

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
 from viewer.model.actions import OpenPath, SceneOpened
-from viewer.model.layout import WHOLE, Beside, Layout, ScreenSize, layout_of, pixel_at
+from viewer.model.layout import WHOLE, Beside, Layout, layout_of, pixel_at
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.scene import Scene, Source
 from viewer.model.zoom import MOST_ZOOM, SetZoom, Zoom
 
 WINDOW, SIZE, OWN_WIDTH = ScreenSize(1280, 800), ScreenSize(600, 400), 4800

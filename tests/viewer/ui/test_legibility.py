@@ -12,24 +12,20 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.exports.options import ANIMATIONS
+from iibr_core.rendering.optics import APERTURE_KINDS, ApertureShape
+from iibr_core.scenes.scene import DepthSettings
+from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.background.model_download import list_models
 from viewer.model.actions import SetFontScale, SetUnits, ShowPrompt
-from viewer.model.layout import PANEL_WIDTH, ScreenSize
+from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DepthSettings
-from viewer.model.state.exporting import ANIMATIONS, ExportPrompt
+from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import ModelsPrompt
-from viewer.model.state.optics import (
-    APERTURE_KINDS,
-    ApertureShape,
-    SetAperture,
-    SetApertureShape,
-    SetFocusRange,
-    SetTilt,
-)
+from viewer.model.state.optics import SetAperture, SetApertureShape, SetFocusRange, SetTilt
 from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, Quality
 from viewer.model.state.app_state import DrawReport
-from viewer.model.state.scene import Progress, Scene, Source
 from viewer.ui.panel import progress_text, report_text, size_text
 
 

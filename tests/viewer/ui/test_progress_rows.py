@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from viewer.model.actions import DoTask
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WRITING, CancelJobTask, JobProgress
 from viewer.model.state.model_download import CancelGetTask, DepthModels, Downloading
-from viewer.model.state.scene import Source
 from viewer.ui.overlays.progress_rows import progress_rows
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.rendering.optics import APERTURE_KINDS, ApertureKind, ApertureMask, ApertureShape
+from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import (
@@ -34,18 +36,10 @@ from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import (
-    APERTURE_KINDS,
-    ApertureKind,
-    ApertureMask,
-    ApertureShape,
-    SetAperture,
-    SetApertureShape,
-)
+from viewer.model.state.optics import SetAperture, SetApertureShape
 from viewer.model.state.preferences import SECTIONS, Section
 from viewer.model.state.prompts import PalettePrompt
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.scene import Progress, Source
 from viewer.ui.overlays.progress_rows import job_text
 from viewer.ui.style import DARK, LIGHT
 

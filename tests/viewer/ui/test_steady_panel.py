@@ -9,22 +9,14 @@ from typing import Any
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.rendering.optics import APERTURE_KINDS, ApertureMask, ApertureShape
+from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import Action, SetLoop, ShowTiltHandles
-from viewer.model.layout import ScreenSize
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
 from viewer.model.state.inspection import Compare, KeepState, SetOverlay, ShowEpis
-from viewer.model.state.optics import (
-    APERTURE_KINDS,
-    FIRST_GLOSS,
-    ApertureMask,
-    ApertureShape,
-    GlossBrush,
-    SetApertureShape,
-    SetGloss,
-    SetGlossBrush,
-)
+from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetApertureShape, SetGloss, SetGlossBrush
 from viewer.model.state.preferences import SECTIONS
 
 MASK = ApertureMask("star.png", 1, 1, b"\xff")

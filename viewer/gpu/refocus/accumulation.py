@@ -10,15 +10,16 @@ from dataclasses import field as dataclass_field
 
 import moderngl
 
+from iibr_core.exports.render_settings import WHOLE, PictureCell
+from iibr_core.scenes.lens_limits import clamp_to_grid
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.lens import WHOLE, Lens, PictureCell
+from viewer.gpu.refocus.lens import Lens
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
 from viewer.gpu.refocus.view_sampling import ApertureSample, nearest_present
 from viewer.gpu.render_targets import RenderTarget, RenderTargets
-from viewer.model.layout import ScreenSize
-from viewer.model.lens.limits import clamp_to_grid
 
 MAX_PASSES = 16
 """A still picture is the mean of at most so many passes, each with its samples elsewhere."""

@@ -11,8 +11,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.gpu.refocus.aperture_shape import opening
-from viewer.model.state.optics import ApertureShape
+from iibr_core.rendering.aperture_shape import opening, openness
+from iibr_core.rendering.optics import ApertureShape
 
 LEAST_SCALE = 0.4
 """An opening still smaller would leave next to no sample."""
@@ -52,19 +52,6 @@ def scale_of(
         return second_moment(barrel * weights, t, s) - wanted
 
     return _root(too_wide, LEAST_SCALE, 1.0, TOLERANCE * own)
-
-
-def openness(
-    shape: ApertureShape,
-    t: NDArray[np.float64],
-    s: NDArray[np.float64],
-    diameter: float,
-    widest: float,
-    width: float,
-) -> NDArray[np.float64]:
-    """Share of each sample that passes the opening, cut off to a square `widest` across. See `opening`."""
-    within = 0.5 + (widest / 2 - np.maximum(np.abs(t), np.abs(s))) / width
-    return np.minimum(opening(shape, t, s, diameter, width), np.clip(within, 0, 1))
 
 
 def second_moment(weights: NDArray[np.float64], t: NDArray[np.float64], s: NDArray[np.float64]) -> float:

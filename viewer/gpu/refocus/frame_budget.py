@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.refocus.view_sampling import MAX_SOURCES
-from viewer.model.layout import ScreenSize
 
 
 @dataclass(frozen=True)

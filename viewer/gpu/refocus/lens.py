@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.exports.render_settings import WHOLE_PICTURE, TargetWindow
+from iibr_core.rendering.optics import HIGHLIGHT_GAIN, Optics
 from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.view_sampling import UNMOVED, ApertureSample, aperture_samples
-from viewer.model.state.optics import Optics
-
-HIGHLIGHT_GAIN = 15.0
-"""Full highlight recovery lets clipped pixels count for four stops more."""
 
 FADE_FROM_PX, FADE_TO_PX = 4.0, 6.0
 """Over these widths of the whole blur, light moves from the sharp layer to those that are smoothed."""
@@ -26,47 +23,6 @@ LEAST_ACROSS = 2.0
 
 SPARSE_UP_TO_PX = 1.2
 """As long as the whole blur of a tile is narrower, every other sample across and down shows the same."""
-
-
-class PictureCell(NamedTuple):
-    """A part of the picture in texture coordinates."""
-
-    left: float
-    top: float
-    right: float
-    bottom: float
-
-    def within(self, rows: PictureCell) -> PictureCell | None:
-        """What of it lies in these rows, None if nothing."""
-        top, bottom = max(self.top, rows.top), min(self.bottom, rows.bottom)
-        return PictureCell(self.left, top, self.right, bottom) if top < bottom else None
-
-
-WHOLE = PictureCell(0.0, 0.0, 1.0, 1.0)
-
-
-class TargetWindow(NamedTuple):
-    """The part of the picture that the targets hold, in texture coordinates."""
-
-    left: float
-    top: float
-    width: float
-    height: float
-
-    def window(self, inner: TargetWindow) -> TargetWindow:
-        """A part of what these targets hold, in texture coordinates of the picture. inner: in those of the targets."""
-        left, top = self.left + inner.left * self.width, self.top + inner.top * self.height
-        return TargetWindow(left, top, inner.width * self.width, inner.height * self.height)
-
-    def in_target(self, cell: PictureCell) -> PictureCell:
-        """A part of the picture in texture coordinates of the targets, as far as they hold it."""
-        x = ((edge - self.left) / self.width for edge in (cell.left, cell.right))
-        y = ((edge - self.top) / self.height for edge in (cell.top, cell.bottom))
-        (left, right), (top, bottom) = ((min(max(edge, 0.0), 1.0) for edge in edges) for edges in (x, y))
-        return PictureCell(left, top, right, bottom)
-
-
-WHOLE_PICTURE = TargetWindow(0.0, 0.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from iibr_core.exports.render_settings import WHOLE_PICTURE, PictureCell
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
-from viewer.gpu.refocus.lens import WHOLE_PICTURE, Lens, PictureCell
+from viewer.gpu.refocus.lens import Lens
 from viewer.gpu.refocus.picture_cells import cells_between_views, covering_pixels, pixels_of
 from viewer.gpu.refocus.view_sampling import (
     MAX_SOURCES,

@@ -8,8 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from iibr_core.exports.render_settings import WHOLE, PictureCell
 from iibr_core.types import GridShape
-from viewer.gpu.refocus.lens import WHOLE, Lens, PictureCell
+from viewer.gpu.refocus.lens import Lens
 
 
 def cells_between_views(grid: GridShape, lens: Lens) -> Iterator[PictureCell]:

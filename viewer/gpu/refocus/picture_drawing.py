@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.exports.render_settings import TargetWindow
 from iibr_core.types import ColorSpace
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
-from viewer.gpu.refocus.lens import TargetWindow
 from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.refocus.tiling import PictureTile, picture_tiles
 from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind

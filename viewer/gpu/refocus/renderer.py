@@ -15,6 +15,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.exports.render_settings import WHOLE_PICTURE, RenderSettings, TargetWindow
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
@@ -31,14 +34,11 @@ from viewer.gpu.refocus.frame_budget import (
     scale_size,
     stretch_image,
 )
-from viewer.gpu.refocus.lens import WHOLE_PICTURE, TargetWindow, lens_of
+from viewer.gpu.refocus.lens import lens_of
 from viewer.gpu.refocus.open_field import OpenField
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
-from viewer.gpu.refocus.render_settings import RenderSettings
 from viewer.gpu.refocus.screen_image import ScreenImage
-from viewer.model.layout import ScreenSize
 from viewer.model.state.app_state import DrawReport
-from viewer.model.state.optics import Optics
 
 if TYPE_CHECKING:
     from iibr_core.rendering.gloss.shading import GlossMaps

@@ -6,9 +6,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.render_targets import RenderTargets
-from viewer.model.layout import ScreenSize
 
 KEPT_SIZES = 2
 """Of the picture: one drawn in a hurry is smaller than the one that follows it."""

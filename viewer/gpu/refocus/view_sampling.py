@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.rendering.aperture_shape import openness
+from iibr_core.rendering.optics import ApertureShape
+from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.aperture_moments import openness, scale_of
-from viewer.model.lens.limits import clamp_to_grid
-from viewer.model.state.optics import ApertureShape
+from viewer.gpu.refocus.aperture_moments import scale_of
 
 MAX_SOURCES = 4
 DISC = ApertureShape()

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.rendering.optics import ApertureMask
 from iibr_core.types import InputError
-from viewer.model.state.optics import ApertureMask
 
 LARGEST_SIDE = 64
 """Cells of the aperture; more than there are samples in it."""

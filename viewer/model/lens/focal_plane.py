@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Scene
 from viewer.model.layout import Rect
 from viewer.model.state.app_state import TiltHandles
-from viewer.model.state.optics import Optics
-from viewer.model.state.scene import Scene
 
 Place = tuple[float, float]
 

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from viewer.model.lens.limits import aperture_limit, focus_span
-from viewer.model.state.optics import ApertureShape, Optics, PresetName
-from viewer.model.state.scene import Scene
+from iibr_core.rendering.optics import ApertureShape, Optics
+from iibr_core.scenes.lens_limits import aperture_limit, focus_span
+from iibr_core.scenes.scene import Scene
+from viewer.model.state.optics import PresetName
 
 PRESETS: tuple[PresetName, ...] = ("portrait", "macro", "everything sharp")
 
 PORTRAIT_APERTURE = 0.6
-FIRST_APERTURE = 0.3
-"""Of the widest: enough to see what focusing does."""
 PORTRAIT_RANGE = 0.06
 """Of all the disparity there is: a face is sharp from nose to ear."""
-
-
-def first_aperture(scene: Scene) -> float:
-    """In view steps: what focusing opens a pinhole to; 0 where there is one view."""
-    return FIRST_APERTURE * aperture_limit(scene.grid)
 
 
 def preset_optics(name: PresetName, optics: Optics, scene: Scene, has_chosen_focus: bool) -> Optics:

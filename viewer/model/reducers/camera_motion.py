@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from iibr_core.exports.loops import point_on_loop
+from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.state.motion import LoopKind, Motion, MotionKind
-from viewer.model.state.optics import CENTRE, Optics
+from viewer.model.state.motion import Motion, MotionKind
 
 HOME_S, SWAY_TURN_S = 0.4, 8.0
 SWAY_TURNS = 8
@@ -21,9 +22,6 @@ LONGEST_STEP_S = 0.1
 
 EASE_IN_TURNS = 0.2
 """A loop leaves the viewpoint it began at over this part of its first turn."""
-
-LOOP_REACH = 0.8
-"""Of the grid's radius: the loops stay within what is stored."""
 
 
 def start_motion(motion: Motion, kind: MotionKind | None, optics: Optics) -> Motion:
@@ -67,21 +65,6 @@ def _swayed(start: ViewOffset, turns: float, grid: GridShape) -> ViewOffset:
     angle, size = 2 * math.pi * turns, ease(turns) * ease(SWAY_TURNS - turns)
     down, right = (size * reach * (views - 1) / 2 for reach, views in zip(SWAY_REACH, grid))
     return ViewOffset(start.t - down * math.cos(angle), start.s + right * math.sin(angle))
-
-
-def point_on_loop(kind: LoopKind | None, turns: float, grid: GridShape) -> ViewOffset:
-    """The viewpoint on a loop after so many turns, in view steps from the middle of the grid's views."""
-    angle = 2 * math.pi * turns
-    match kind:
-        case "circle":
-            down, right = -math.cos(angle), math.sin(angle)
-        case "eight":
-            down, right = math.sin(2 * angle) / 2, math.sin(angle)
-        case _:
-            down, right = 0.0, math.sin(angle)
-    (rows, columns), (v, u) = grid, grid.centre
-    radius_t, radius_s = LOOP_REACH * (rows - 1) / 2, LOOP_REACH * (columns - 1) / 2
-    return ViewOffset((rows - 1) / 2 - v + down * radius_t, (columns - 1) / 2 - u + right * radius_s)
 
 
 def ease(share: float) -> float:

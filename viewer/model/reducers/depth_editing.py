@@ -14,14 +14,14 @@ from iibr_core.depth.editing.edits import (
     DepthEdits,
     Stroke,
 )
-from viewer.model.lens.limits import clamp
+from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.scene import DepthSettings
 from viewer.model.reducers.history import record_edit
 from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import (
     Brush,
     DepthAction,
-    DepthSettings,
     DropStroke,
     Paint,
     PickDepth,

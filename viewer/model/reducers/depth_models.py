@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from iibr_core.scenes.scene import Scene, source_with_depth
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import (
     DepthEstimated,
@@ -19,7 +20,6 @@ from viewer.model.state.model_download import (
     ShowOffer,
     UseModel,
 )
-from viewer.model.state.scene import Scene, source_with_depth
 
 
 def wanted_model(state: AppState) -> str | None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
+from iibr_core.exports.photo_folder import FolderPhoto, in_order
+from iibr_core.scenes.scene import Source, source_beside
 from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import FolderOrder, FolderPhoto, PhotoFolder
-from viewer.model.state.scene import Source, source_beside
+from viewer.model.state.folder import PhotoFolder
 
 AHEAD = (1, -1, 2)
 """Photos read ahead, in steps on in the direction of the last step, the likeliest first."""
@@ -23,12 +23,6 @@ def list_folder(state: AppState, path: str, photos: Iterable[FolderPhoto]) -> Ap
     if state.folder is not None and (state.folder.path, state.folder.photos) == (path, ordered):
         return state
     return replace(state, folder=PhotoFolder(path, ordered))
-
-
-def in_order(photos: Iterable[FolderPhoto], order: FolderOrder) -> tuple[FolderPhoto, ...]:
-    """By name as people count, IMG_9 before IMG_10, or by time."""
-    by_name = sorted(photos, key=lambda photo: _counted(photo.name))
-    return tuple(by_name if order == "name" else sorted(by_name, key=lambda photo: photo.modified_s))
 
 
 def place_of_photo(folder: PhotoFolder, source: Source | None) -> int | None:
@@ -89,9 +83,3 @@ def scroll_filmstrip(state: AppState, photos: int) -> AppState:
     place = place_of_photo(folder, state.source) or 0
     scrolled = min(max(folder.scrolled + photos, -place), len(folder.photos) - 1 - place)
     return replace(state, folder=replace(folder, scrolled=scrolled))
-
-
-def _counted(name: str) -> tuple[tuple[int, int, str], ...]:
-    """A key that sorts numbers in names by their value."""
-    parts = re.split(r"(\d+)", name.casefold())
-    return tuple((0, int(part[:18]), "") if part.isdecimal() else (1, 0, part) for part in parts)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from iibr_core.rendering.optics import Optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.history import Edit, History
 from viewer.model.state.motion import Motion
-from viewer.model.state.optics import Optics
 
 EDITS_KEPT = 200
 

@@ -6,7 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from viewer.model.lens.limits import clamp
+from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.scene import Scene
 from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import (
@@ -27,7 +28,6 @@ from viewer.model.state.inspection import (
     TruthRead,
 )
 from viewer.model.state.notices import Notice
-from viewer.model.state.scene import Scene
 from viewer.model.state.tasks import ChooseTask
 
 DIVIDER_MARGIN = 0.02

@@ -7,11 +7,21 @@ from itertools import pairwise
 from math import hypot
 
 from iibr_core.rendering.gloss.settings import MOST_POINTS, Gloss, GlossStroke
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import (
+    aperture_limit,
+    clamp,
+    clamp_eye,
+    clamp_optics,
+    first_aperture,
+    has_sound_gloss,
+    is_finite,
+)
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import ViewOffset
 from viewer.model.actions import SamePlaces
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
-from viewer.model.lens.limits import aperture_limit, clamp, clamp_eye, clamp_optics, has_sound_gloss, is_finite
-from viewer.model.lens.presets import first_aperture, preset_optics
+from viewer.model.lens.presets import preset_optics
 from viewer.model.reducers.notices import add_notice
 from viewer.model.state.app_state import AppState, TiltHandles
 from viewer.model.state.notices import Notice
@@ -22,7 +32,6 @@ from viewer.model.state.optics import (
     LensAction,
     MoveEye,
     MoveTiltHandle,
-    Optics,
     PaintGloss,
     ResetOptics,
     SetAperture,
@@ -35,7 +44,6 @@ from viewer.model.state.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.state.scene import Scene, Source
 
 POINT_SPACING = 1 / 6
 """Of the radius: a stroke of the gloss brush is remembered by places this far apart."""

@@ -7,6 +7,9 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from iibr_core.rendering.gloss.settings import STROKE_RADIUS_LIMITS
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import clamp, clamp_optics, is_finite
+from iibr_core.scenes.scene import DepthSettings, Progress, Source, is_same_field
 from viewer.model.actions import (
     Action,
     AskForPath,
@@ -54,14 +57,6 @@ from viewer.model.actions import (
     WorkerLost,
 )
 from viewer.model.free_camera import FreeCameraAction
-from viewer.model.lens.limits import (
-    DEPTH_STRENGTH_LIMIT,
-    FONT_SCALE_LIMITS,
-    SPEED_LIMITS,
-    clamp,
-    clamp_optics,
-    is_finite,
-)
 from viewer.model.reducers.camera_motion import advance_motion, start_motion
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
 from viewer.model.reducers.depth_models import reduce_models
@@ -74,30 +69,21 @@ from viewer.model.reducers.lens import reduce_lens, take_back_opening, with_focu
 from viewer.model.reducers.notices import add_notice
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
-from viewer.model.state.depth_editing import DepthAction, DepthSettings
+from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.exporting import AskToExport
-from viewer.model.state.filling import ViewsFilled, is_same_field
+from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import (
-    FocusOn,
-    GlossBrush,
-    LensAction,
-    MoveEye,
-    Optics,
-    ResetOptics,
-    SetDolly,
-    SetGlossBrush,
-)
+from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetDolly, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import SECTIONS, Preferences
 from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
 from viewer.model.state.saving import SavedSettings, path_beside
-from viewer.model.state.scene import Progress, Source
+from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT, FONT_SCALE_LIMITS, SPEED_LIMITS
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."

@@ -6,25 +6,23 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import clamp_optics, first_aperture, focus_limits
+from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
-from viewer.model.lens.limits import clamp_optics, focus_limits
-from viewer.model.lens.presets import first_aperture
 from viewer.model.reducers.folder import is_stepped_to
 from viewer.model.reducers.history import map_optics
 from viewer.model.reducers.lens import carry_optics, carry_to_depth, with_focus_of
 from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DepthSettings
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History
 from viewer.model.state.inspection import of_next_scene
 from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import Optics
 from viewer.model.state.photo_facts import ReadFactsTask
-from viewer.model.state.scene import Progress, Scene
 from viewer.model.state.tasks import MaySwayTask
 from viewer.model.window_words import notice_in_window
 

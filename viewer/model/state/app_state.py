@@ -8,10 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import AS_FOUND, DepthSettings, FilledField, Progress, Scene, Source
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.free_camera import FreeCamera, Poses
-from viewer.model.layout import WHOLE, Rect, ScreenSize
-from viewer.model.state.depth_editing import AS_FOUND, Brush, DepthSettings
-from viewer.model.state.filling import FilledField
+from viewer.model.layout import WHOLE, Rect
+from viewer.model.state.depth_editing import Brush
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
@@ -19,11 +21,10 @@ from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import DepthModels
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import GlossBrush, Optics
+from viewer.model.state.optics import GlossBrush
 from viewer.model.state.photo_facts import NO_FACTS, FactsRead
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import Prompt
-from viewer.model.state.scene import Progress, Scene, Source
 from viewer.model.state.tasks import Task
 from viewer.model.zoom import Zoom
 

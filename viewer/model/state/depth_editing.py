@@ -7,18 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.depth.editing.edits import UNEDITED, BrushTool, DepthEdits
-
-
-@dataclass(frozen=True)
-class DepthSettings:
-    """What disparity is made of what was found: refined this far (see `DepthChoice.refine`), then edited."""
-
-    refine: float = 1.0
-    edits: DepthEdits = UNEDITED
-
-
-AS_FOUND = DepthSettings()
+from iibr_core.depth.editing.edits import BrushTool, DepthEdits
 
 
 @dataclass(frozen=True)

@@ -4,20 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.types import ViewUpdate
-from viewer.model.state.scene import Scene, Source
-
-
-@dataclass(frozen=True, eq=False)
-class FilledField:
-    """A light field with all views between those on disk. views: of all its places, the centre first."""
-
-    scene: Scene
-    views: tuple[ViewUpdate, ...]
-
-    def is_of(self, source: Source) -> bool:
-        """Whether opening this shows these views."""
-        return is_same_field(self.scene.source, source) and self.scene.source.filled_grid == source.filled_grid
+from iibr_core.scenes.scene import FilledField, Source
 
 
 @dataclass(frozen=True)
@@ -32,9 +19,3 @@ class ViewsFilled:
     """They are all there."""
 
     field: FilledField
-
-
-def is_same_field(one: Source, other: Source) -> bool:
-    """Whether the views of both are the same, but for those between: a map of its own gives them another disparity."""
-    same_map = one.depth.file == other.depth.file
-    return one.path == other.path and same_map and one.inpaint == other.inpaint

@@ -6,17 +6,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
-FolderOrder = Literal["name", "time"]
-
-
-@dataclass(frozen=True)
-class FolderPhoto:
-    """A photo by its name. modified_s: when it was written, seconds since 1970."""
-
-    name: str
-    modified_s: float = 0.0
+from iibr_core.exports.photo_folder import FolderOrder, FolderPhoto
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape
-from viewer.model.state.optics import Optics
 
 OverlayKind = Literal["disparity", "entropy", "inpainted"]
 OVERLAYS: tuple[OverlayKind, ...] = ("disparity", "entropy", "inpainted")

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from iibr_core.exports.loops import LoopKind
+from iibr_core.rendering.optics import CENTRE
 from iibr_core.types import ViewOffset
-from viewer.model.state.optics import CENTRE
 
-LoopKind = Literal["circle", "eight", "swing"]
-LOOPS: tuple[LoopKind, ...] = ("circle", "eight", "swing")
 MotionKind = LoopKind | Literal["home", "sway"]
 """home: a glide to the middle. sway: slow and small, for a while, as long as nobody touches anything."""
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
 from iibr_core.formats.images.picture_kinds import PictureFormat
-from viewer.model.layout import ScreenSize
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
 from iibr_core.formats.images.picture_kinds import PictureFormat
-from viewer.model.layout import ScreenSize
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.exporting import ExportTask
 from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import ListFolderTask

@@ -8,16 +8,17 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from iibr_core.exports.kinds import EXPORTS, ExportKind
+from iibr_core.exports.options import ANIMATIONS, AnimationKind, ExportOptions
+from iibr_core.exports.settings import MOST_FRAMES, RATE_LIMITS, ExportSettings, settle, size_of_width
 from iibr_core.formats.quilts import DEVICES
+from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, DoTask, ShowPrompt
-from viewer.model.export_kinds import EXPORTS, ExportKind
-from viewer.model.export_settings import MOST_FRAMES, RATE_LIMITS, ExportSettings, settle, size_of_width
 from viewer.model.layout import Layout
-from viewer.model.lens.limits import clamp
 from viewer.model.reducers.exporting import export_path_beside
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import ANIMATIONS, AnimationKind, ExportOptions, ExportPrompt, ExportTask
-from viewer.model.state.scene import Scene
+from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.ui.overlays.prompt_rows import (
     choice_row,
     focus_on_appearing,

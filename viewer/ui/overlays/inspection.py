@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.inspection_request import (
@@ -18,7 +19,6 @@ from viewer.model.layout import Layout, Rect
 from viewer.model.lens.photographic_units import metres, metres_text
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Comparison, Origin, Probe
-from viewer.model.state.scene import Scene
 from viewer.ui.overlays.reticle import WORD_GAP, hover_text
 from viewer.ui.style import DARK, Color, pack_color, palette_of
 

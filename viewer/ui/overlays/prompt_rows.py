@@ -9,9 +9,9 @@ from imgui_bundle import imgui
 
 from viewer.model.actions import Action, ShowPrompt
 from viewer.model.layout import Layout
-from viewer.model.lens.limits import LARGEST_SIDE_PX
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import Prompt
+from viewer.model.window_limits import LARGEST_SIDE_PX
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, combo, gap, label, tooltip
 

@@ -7,14 +7,15 @@ import math
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import DEPTH_TOOLS
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.scene import Scene
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
-from viewer.model.lens.limits import aperture_limit
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
-from viewer.model.state.optics import GlossBrush, Optics
+from viewer.model.state.optics import GlossBrush
 from viewer.model.state.preferences import Units
-from viewer.model.state.scene import Scene
 from viewer.ui.style import DARK, pack_color
 
 HINT = "Drag to look"

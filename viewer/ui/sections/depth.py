@@ -8,16 +8,16 @@ from imgui_bundle import imgui
 
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
+from iibr_core.scenes.scene import Scene, source_with_depth
 from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthStrength, ShowPrompt
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
-from viewer.model.lens.limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
 from viewer.model.state.model_download import DepthModels, ModelsPrompt, SetEstimatesDepth, UseModel
-from viewer.model.state.scene import Scene, source_with_depth
 from viewer.model.state.tasks import ChooseTask
+from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
 from viewer.ui.widgets import button, checkbox, choice, combo, gap, label, last_part, quiet, slider, tooltip

@@ -7,12 +7,12 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import DepthEdits, Levels, invert_tone_curve, tone_curve
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action
 from viewer.model.colormap import map_color
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import SetTone
-from viewer.model.state.scene import Scene
 from viewer.ui.style import pack_color, palette_of
 from viewer.ui.widgets import tooltip
 

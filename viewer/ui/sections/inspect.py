@@ -6,6 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, DoTask, SetUnits
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
@@ -23,7 +24,6 @@ from viewer.model.state.inspection import (
     ShowGrid,
     ShowValues,
 )
-from viewer.model.state.scene import Scene
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.widgets import button, checkbox, choice, quiet, slider
 

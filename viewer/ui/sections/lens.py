@@ -9,9 +9,17 @@ from typing import cast
 
 from imgui_bundle import imgui
 
+from iibr_core.rendering.optics import (
+    APERTURE_KINDS,
+    EXPOSURE_LIMIT_STOPS,
+    RING_INNER_LIMIT,
+    ApertureKind,
+    ApertureShape,
+)
+from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, DoTask, ShowTiltHandles
 from viewer.model.layout import Layout
-from viewer.model.lens.limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
 from viewer.model.lens.photographic_units import (
     ASSUMED_DISTANCE_M,
     disparity_at,
@@ -26,11 +34,6 @@ from viewer.model.lens.photographic_units import (
 )
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import (
-    APERTURE_KINDS,
-    EXPOSURE_LIMIT_STOPS,
-    RING_INNER_LIMIT,
-    ApertureKind,
-    ApertureShape,
     SetAperture,
     SetApertureShape,
     SetExposure,
@@ -39,7 +42,6 @@ from viewer.model.state.optics import (
     SetHighlightRecovery,
     SetTilt,
 )
-from viewer.model.state.scene import Scene
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette

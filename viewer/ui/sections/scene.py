@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape
 from viewer.model.actions import Action, DoTask
 from viewer.model.dense_field import chosen_grid, denser_grids, with_views_between
@@ -13,7 +14,6 @@ from viewer.model.layout import Layout
 from viewer.model.state.filling import FillTask
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.photo_facts import FactsRead
-from viewer.model.state.scene import Scene, Source
 from viewer.model.window_words import words_in_window
 from viewer.ui.widgets import combo, gap, label, quiet
 

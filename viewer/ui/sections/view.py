@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from iibr_core.exports.loops import LOOPS
+from iibr_core.scenes.lens_limits import dolly_limit
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, PauseMotion, ReturnHome, SetLoop, SetSpeed
 from viewer.model.commands import LOOP_WORDS
 from viewer.model.layout import Layout
-from viewer.model.lens.limits import SPEED_LIMITS, dolly_limit
 from viewer.model.state.app_state import AppState
-from viewer.model.state.motion import LOOPS
 from viewer.model.state.optics import SetDolly
-from viewer.model.state.scene import Scene
+from viewer.model.window_limits import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
 from viewer.ui.style import Palette, pack_color
 from viewer.ui.widgets import button, choice, slider, tooltip

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
+from iibr_core.scenes.lens_limits import eye_limits
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action
 from viewer.model.layout import Layout, Rect
-from viewer.model.lens.limits import eye_limits
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye
-from viewer.model.state.scene import Scene
 from viewer.ui.style import Palette, pack_color
 
 PAD_SIDE = 136.0

@@ -1,0 +1,44 @@
+"""Whole pictures in frames of another shape, black where they leave room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import ExportSource
+from iibr_core.scenes.screen_size import ScreenSize
+
+THINNEST_BAR_PX = 2
+"""Of less room than that at both sides together, the picture takes all: it comes of whole numbers of pixels."""
+
+
+def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: float | None = None) -> NDArray[Any]:
+    """The picture whole and undistorted in a frame of the settings' size.
+
+    frame_aspect: width / height that the frame is shown with, where that is another than its pixels'.
+    """
+    part, frame = settings.part, settings.size_px
+    aspect = part.width * source.scene.width / (part.height * source.scene.height)
+    size = fitted(aspect, frame, frame_aspect or frame.width / frame.height)
+    pixels = source.draw(replace(settings, size_px=size))
+    if size == frame:
+        return pixels
+    whole: NDArray[Any] = np.zeros((frame.height, frame.width, 3), pixels.dtype)
+    top, left = (frame.height - size.height) // 2, (frame.width - size.width) // 2
+    whole[top : top + size.height, left : left + size.width] = pixels
+    return whole
+
+
+def fitted(aspect: float, frame: ScreenSize, frame_aspect: float) -> ScreenSize:
+    """The size of a picture of this aspect, whole in a frame that is shown with frame_aspect."""
+    width, height = frame
+    if aspect > frame_aspect:
+        height = max(round(height * frame_aspect / aspect), 1)
+    else:
+        width = max(round(width * aspect / frame_aspect), 1)
+    room = frame.width - width + frame.height - height
+    return frame if room < THINNEST_BAR_PX else ScreenSize(width, height)

@@ -1,0 +1,123 @@
+"""Every kind of export: the command line and the window's menu ask here. A new kind is a file of its own in
+`iibr_core.exports` and one line.
+
+Light, so that they can be listed before anything is loaded: functions are "module:name" there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from iibr_core.formats.animations import VIDEOS
+from iibr_core.types import InputError
+
+LIGHT_FIELD = ("light_field:write_light_field",)
+MAP = (".pfm", ".exr", ".npy", ".png")
+PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
+DATA = (".png",)
+MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
+STACK_FILES = r"((focus|aperture)_\d+|all_in_focus)\.(png|tif)|disparity\.pfm"
+CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
+STACK = ("view", "focus", "aperture", "size", "frames")
+EYES = ("focus", "aperture", "size", "eyes")
+
+
+@dataclass(frozen=True)
+class ExportKind:
+    """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
+    names of the options about exports and the lens that mean something to it. path: makes the file's name what players
+    expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
+    expression. needs: packages, of the extra `export`. frames: pictures of a stack. rate: frames a second.
+    most_width_px: of pictures whose size nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it.
+    """
+
+    words: str
+    endings: tuple[str, ...]
+    write: str
+    heeds: tuple[str, ...] = ()
+    path: str = ""
+    layout: str = ""
+    own_files: str = ""
+    needs: tuple[str, ...] = ()
+    frames: int = 0
+    rate: float = 0.0
+    most_width_px: int = 0
+    has_colors: bool = True
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the graphics card draws it; else it is made of the views themselves."""
+        return "aperture" in self.heeds
+
+    @property
+    def is_video(self) -> bool:
+        """Whether its width and height must be even."""
+        return bool(set(self.endings) & set(VIDEOS))
+
+
+EXPORTS = {
+    "quilt": ExportKind(
+        "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device", "show"),
+        path="quilt:quilt_path",
+    ),
+    "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside"),
+    "rgbd-left": ExportKind("Picture with depth at the left", PICTURE, "rgbd:write_before"),
+    "rgbd-below": ExportKind("Picture with depth below", PICTURE, "rgbd:write_below"),
+    "sbs": ExportKind("Side by side", PICTURE, "stereo:write_side_by_side", EYES, "stereo:full_path"),
+    "half-sbs": ExportKind(
+        "Side by side, half width", PICTURE, "stereo:write_half_side_by_side", EYES, "stereo:half_path"
+    ),
+    "over-under": ExportKind("Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path"),
+    "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES),
+    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES),
+    "spatial-photo": ExportKind("Spatial photo, HEIC", (".heic",), "spatial_photo:write_spatial", EYES),
+    "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",), rate=30),
+    "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",), rate=30),
+    "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
+    "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING, rate=25, most_width_px=960),
+    "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
+    "focal-stack": ExportKind(
+        "Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES, frames=16
+    ),
+    "focal-stack-tiff": ExportKind(
+        "Focal stack, 16-bit TIFFs", (), "stack:write_focal_tiffs", STACK, own_files=STACK_FILES, frames=16
+    ),
+    "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK, frames=16),
+    "aperture-sweep": ExportKind(
+        "Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES, frames=9
+    ),
+    "aperture-sweep-tiff": ExportKind(
+        "Aperture sweep, 16-bit TIFFs", (), "stack:write_aperture_tiffs", STACK, own_files=STACK_FILES, frames=9
+    ),
+    "aperture-sweep-exr": ExportKind(
+        "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK, frames=9
+    ),
+    "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",)),
+    "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity", has_colors=False),
+    "depth": ExportKind("Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False),
+    "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians"),
+    "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud"),
+    "llff": ExportKind("Cameras, LLFF", (), "cameras:write_llff_folder", own_files=CAMERA_FILES),
+    "nerfstudio": ExportKind("Cameras, nerfstudio", (), "cameras:write_nerfstudio_folder", own_files=CAMERA_FILES),
+    "colmap": ExportKind("Cameras, COLMAP", (), "cameras:write_colmap_folder", own_files=CAMERA_FILES),
+    "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci"),
+    "numbered-grid": ExportKind("Light field, numbered views", (), *LIGHT_FIELD, layout="numbered-grid"),
+    "stanford": ExportKind("Light field, Stanford archive", (), *LIGHT_FIELD, layout="stanford"),
+    "eslf": ExportKind("Light field, lenslet image", ("_eslf.png",), *LIGHT_FIELD, layout="eslf"),
+    "exr": ExportKind("Light field, one OpenEXR file", (".exr",), *LIGHT_FIELD, layout="exr"),
+}  # fmt: skip
+"""By the name that people type."""
+
+
+def export_kind(name: str) -> ExportKind:
+    """Raises InputError for a kind that nobody knows."""
+    if name not in EXPORTS:
+        raise InputError(f"{name!r} is nothing that can be exported: give {', '.join(EXPORTS)}")
+    return EXPORTS[name]
+
+
+def require_ending(kind: ExportKind, path: Path) -> None:
+    """Raise InputError where a file's name does not say that it is of this kind."""
+    if kind.endings and not path.name.lower().endswith(kind.endings):
+        raise InputError(f"{path}: is to end in {' or '.join(kind.endings)}")

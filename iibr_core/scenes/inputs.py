@@ -1,0 +1,24 @@
+"""What is read to open a scene."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from iibr_core.depth.sidecar import map_to_read
+from iibr_core.scenes.scene import Source
+
+
+def inputs_of(source: Source) -> tuple[Path, ...]:
+    """What is read to open it, the map beside it and folders of models included: nothing may be written there. See
+    `require_file_place`.
+    """
+    named, found = named_by(source), map_to_read(Path(source.path), source.depth)
+    return named if found is None or found in named else (*named, found)
+
+
+def named_by(source: Source) -> tuple[Path, ...]:
+    """Its photo or folder, its map and its folders of models, as far as they are named."""
+    models = (source.depth.model or "", source.inpaint.partition(":")[2])
+    folders = [path for path in map(os.path.expanduser, models) if path and os.path.lexists(path)]  # else: names
+    return tuple(Path(path) for path in (source.path, source.depth.file, *folders) if path)

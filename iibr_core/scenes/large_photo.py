@@ -1,0 +1,92 @@
+"""The photo that is open, at its own size: read again when a picture of that size is asked for, not kept meanwhile."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.generation.plan import ScenePlan
+from iibr_core.rendering.large_views import LargePhoto
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.scenes.loaded_photo import LoadedPhoto, stamp_of
+from iibr_core.scenes.scene import Source
+from iibr_core.types import Disparity, FloatImage, InputError, Photo
+
+
+def load_large(
+    source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int, should_stop: ShouldStop = never
+) -> LargePhoto:
+    """The photo of `source`, which was `loaded` smaller, at max_pixels at most, with the same disparity, its edges
+    drawn to the larger photo's. Without `fills`.
+
+    Raises InputError where the file is another one by now, Cancelled once should_stop is true.
+    """
+    from iibr_core.depth.search import read_shown_photo
+
+    path = Path(source.path)
+    if stamp_of(path) != loaded.stamp:
+        raise InputError(f"{path}: was changed since it was opened; open it again")
+    photo = read_shown_photo(path, max_pixels, loaded.origin.kind)
+    raise_if_stopped(should_stop)
+    enlarged = photo.size.width / loaded.photo.size.width
+    values = _disparity(source, loaded, photo, should_stop)
+    raise_if_stopped(should_stop)
+    field = plan.field_disparity(Disparity(values / np.float32(enlarged), loaded.disparity.source))
+    return LargePhoto(photo.pixels, field.values * np.float32(enlarged))
+
+
+def complete_fills(
+    source: Source, loaded: LoadedPhoto, plan: ScenePlan, should_stop: ShouldStop = never
+) -> RaySet | None:
+    """The complete ray set of the light field, None where nothing is disoccluded.
+
+    Raises InputError where the inpainter cannot be had, Cancelled once should_stop is true.
+    """
+    from iibr_core.generation.light_field import ray_set
+    from iibr_core.inpainting.registry import load_inpainter
+
+    if not plan.has_disocclusion:
+        return None
+    disparity = plan.field_disparity(loaded.disparity)
+    rays, outer = ray_set(loaded.photo, disparity, plan, should_stop, load_inpainter(source.inpaint))
+    for _ in outer:
+        pass
+    return rays
+
+
+def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: ShouldStop) -> FloatImage:
+    """Of the larger photo, px of it; what was made of it in the smaller one is made of it too."""
+    from iibr_core.depth.edges.refine import refine
+    from iibr_core.depth.editing.canvas import apply_edits
+    from iibr_core.formats.maps.disparity_file import read_disparity
+    from iibr_core.formats.maps.resample import resample_surfaces
+
+    settings, enlarged = loaded.depth_settings, np.float32(photo.size.width / loaded.photo.size.width)
+    if enlarged == 1:
+        return loaded.disparity.values
+    file = _larger_map(loaded)
+    if file is not None:
+        given = read_disparity(file, photo.size, source.depth.file_scale, photo.pixels)
+        values, unknown = given.values, given.unknown
+    else:
+        values, unknown = resample_surfaces(loaded.disparity.values, photo.size) * enlarged, None
+    raise_if_stopped(should_stop)
+    if settings.refine > 0:
+        values = refine(photo.pixels, values, settings.refine, unknown, should_stop)
+    if file is None or settings.edits == UNEDITED:
+        return values
+    return apply_edits(photo.pixels, values / enlarged, settings.edits, should_stop) * enlarged
+
+
+def _larger_map(loaded: LoadedPhoto) -> Path | None:
+    """The map's file where it holds more than the disparity that was made of it."""
+    from iibr_core.formats.maps.reader import read_map_header
+
+    if loaded.origin.file is None:
+        return None
+    file = Path(loaded.origin.file)
+    return file if math.prod(read_map_header(file).size) > math.prod(loaded.photo.size) else None

@@ -1,0 +1,154 @@
+"""How far each quantity may go, for what is open. Sliders and clamps take their ends from here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+from iibr_core.rendering.gloss.settings import Gloss, require_sound
+from iibr_core.rendering.optics import CENTRE, LIMITS, ApertureShape, Optics
+from iibr_core.scenes.scene import Scene
+from iibr_core.types import GridShape, InputError, ViewOffset
+
+Record = TypeVar("Record", Optics, ApertureShape)
+
+LONE_VIEW_MARGIN = 0.5
+"""So far, in view steps, the viewpoint may leave a row of one view."""
+
+FIRST_APERTURE = 0.3
+"""Of the widest: enough to see what focusing does."""
+BLADES_LIMITS = (3, 11)
+STEEPEST_TILT = 4.0
+"""In spans of the focus from the picture's middle to its border: for tilt handles that are close together."""
+
+
+def clamp(value: float, low: float, high: float) -> float:
+    """The nearest value from low to high."""
+    return float(min(max(value, low), high))
+
+
+def eye_margin(views: int) -> float:
+    """How far the viewpoint may leave a row of views on each side: only where it could not move else. Nothing is known
+    of what shows there: outlines are those of pixels, and what they uncover is stretched.
+    """
+    return LONE_VIEW_MARGIN if views == 1 else 0.0
+
+
+def eye_limits(views: int) -> tuple[float, float]:
+    """Least and greatest view offset along a row of views."""
+    first, last = -(views // 2), views - 1 - views // 2
+    return first - eye_margin(views), last + eye_margin(views)
+
+
+def clamp_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:
+    """The nearest viewpoint within the limits."""
+    return ViewOffset(*(clamp(x, *eye_limits(views)) for x, views in zip(eye, grid)))
+
+
+def clamp_to_grid(eye: ViewOffset, grid: GridShape) -> ViewOffset:
+    """The point of the grid's rectangle nearest to the eye."""
+    first, last = grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)
+    return ViewOffset(min(max(eye.t, first.t), last.t), min(max(eye.s, first.s), last.s))
+
+
+def dolly_limit(grid: GridShape) -> float:
+    """How far forward or back the rays of the picture's borders still cross the stored views; 0 without any beside."""
+    return (grid.columns - 1) / 2
+
+
+def focus_limits(scene: Scene) -> tuple[float, float]:
+    """Least and greatest focus disparity worth setting: the scene's range and a tenth more on both sides."""
+    near_and_far = (*scene.disparity_range_px, 0.0)
+    margin = 0.1 * (max(near_and_far) - min(near_and_far)) or 0.1
+    return min(near_and_far) - margin, max(near_and_far) + margin
+
+
+def focus_span(scene: Scene) -> float:
+    """From the least focus disparity to the greatest: the most that focus range and tilt can use."""
+    low, high = focus_limits(scene)
+    return high - low
+
+
+def aperture_limit(grid: GridShape) -> float:
+    """The widest aperture in view steps: the whole grid; 0 where there is a single view."""
+    return float(max(grid) if max(grid) > 1 else 0)
+
+
+def is_finite(optics: Optics) -> bool:
+    """Whether every number of the optics is."""
+    return all(map(math.isfinite, (*_numbers_of(optics), *_numbers_of(optics.aperture_shape))))
+
+
+def has_sound_gloss(optics: Optics) -> bool:
+    """Whether its gloss, if there is any, makes sense."""
+    try:
+        if optics.gloss is not None:
+            require_sound(optics.gloss)
+    except InputError:
+        return False
+    return True
+
+
+def _numbers_of(record: Optics | ApertureShape) -> list[float]:
+    values = (getattr(record, field.name) for field in fields(record))
+    parts = (value if isinstance(value, tuple) else (value,) for value in values)
+    return [number for part in parts for number in part if isinstance(number, int | float)]
+
+
+def clamp_optics(optics: Optics, scene: Scene) -> Optics:
+    """The nearest optics that this scene allows. All numbers must be finite."""
+    span = focus_span(scene)
+    tilt_x, tilt_y = (clamp(tilt, -STEEPEST_TILT * span, STEEPEST_TILT * span) for tilt in optics.focus_tilt)
+    return replace(
+        _within_limits(optics),
+        eye=clamp_eye(optics.eye, scene.grid),
+        dolly=clamp(optics.dolly, -dolly_limit(scene.grid), dolly_limit(scene.grid)),
+        focus_disparity=clamp(optics.focus_disparity, *focus_limits(scene)),
+        focus_range=clamp(optics.focus_range, 0.0, span),
+        focus_tilt=(tilt_x, tilt_y),
+        aperture_diameter=clamp(optics.aperture_diameter, 0.0, aperture_limit(scene.grid)),
+        aperture_shape=_clamp_shape(optics.aperture_shape),
+    )
+
+
+def _clamp_shape(shape: ApertureShape) -> ApertureShape:
+    return replace(
+        _within_limits(shape),
+        kind="disc" if shape.kind == "mask" and shape.mask is None else shape.kind,
+        blades=round(clamp(shape.blades, *BLADES_LIMITS)),
+        rotation_deg=shape.rotation_deg % 360.0 % 360.0,  # the first may round up to 360
+    )
+
+
+def _within_limits(record: Record) -> Record:
+    """With every number clamped that states its limits, see `optics.within`."""
+    limited = [(field.name, field.metadata[LIMITS]) for field in fields(record) if LIMITS in field.metadata]
+    changes: dict[str, Any] = {name: clamp(getattr(record, name), *limits) for name, limits in limited}
+    return replace(record, **changes)
+
+
+def first_aperture(scene: Scene) -> float:
+    """In view steps: what focusing opens a pinhole to; 0 where there is one view."""
+    return FIRST_APERTURE * aperture_limit(scene.grid)
+
+
+@dataclass(frozen=True)
+class LensChoice:
+    """What is said of the lens before a scene is open, as `Optics` has it; None where nothing is."""
+
+    eye: ViewOffset | None = None
+    focus: float | None = None
+    aperture: float | None = None
+    gloss: Gloss | None = None
+
+    def optics_on(self, scene: Scene) -> Optics:
+        """As near to it as the scene allows. A pinhole shows everything sharp: focusing opens one a little."""
+        usual = 0.0 if self.focus is None else first_aperture(scene)
+        optics = Optics(
+            eye=self.eye or CENTRE,
+            focus_disparity=self.focus or 0.0,
+            aperture_diameter=usual if self.aperture is None else self.aperture,
+            gloss=self.gloss,
+        )
+        return clamp_optics(optics, scene)

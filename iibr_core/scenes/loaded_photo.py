@@ -1,0 +1,317 @@
+"""A photo and its disparity as the worker holds them: read once, then refined and edited as often as the user likes."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from iibr_core.depth.choice import DepthOrigin
+from iibr_core.depth.editing.edits import UNEDITED, Levels, levels_of
+from iibr_core.formats.files import require_file
+from iibr_core.generation.memory_model import (
+    Budget,
+    budget_of,
+    mebibytes,
+    pixels_within,
+    require_decoding,
+    require_map,
+    require_process,
+    require_reading,
+    require_views,
+)
+from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
+from iibr_core.generation.relief import measure_relief
+from iibr_core.inpainting.protocol import InpaintingAids
+from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.scenes.scene import DepthSettings, Progress, Source
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress
+
+if TYPE_CHECKING:
+    from iibr_core.depth.editing.canvas import DepthCanvas
+    from iibr_core.depth.search import PhotoWithDepth
+
+TELL_EVERY_S = 0.1
+SKETCH = ImageSize(height=480, width=480)
+"""A sketch fits within this."""
+SKETCH_WORTH_PIXELS = 1_500_000
+"""Smaller photos are read in no time."""
+NOT_YET = 0.0
+"""Disparity is read as it is, and refined afterwards: so often as the user wants to."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedPhoto:
+    """A photo as read and its disparity, kept so that another plan does not read them again.
+
+    disparity: what `depth_settings` made of what was `found`, by way of what was `refined`. origin: where it was found.
+    settings: text of the settings the photo was saved with by this program, "" without. model: name or path of the
+    depth model that its depth is from, None where it is from elsewhere. levels: of what was refined. canvas: what the
+    worker edits on; nobody else touches it. own_size: of the photo as its file has it, upright. stamp: of that file,
+    see `stamp_of`.
+    """
+
+    photo: Photo
+    disparity: Disparity
+    origin: DepthOrigin
+    settings: str
+    model: str | None
+    depth_settings: DepthSettings
+    found: Disparity
+    refined: Disparity
+    levels: Levels
+    canvas: DepthCanvas
+    own_size: ImageSize
+    stamp: tuple[int, ...]
+
+
+def stamp_of(path: Path) -> tuple[int, ...]:
+    """What tells a file from one that came in its place. Raises InputError where there is none."""
+    require_file(path)
+    status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def load_photo(
+    source: Source,
+    should_stop: ShouldStop = never,
+    report_progress: Callable[[Progress], None] = lambda progress: None,
+    depth_settings: DepthSettings | None = None,
+    keeps_views: bool = True,
+    asks_model: bool = True,
+) -> LoadedPhoto:
+    """Read a photo and find its disparity, telling what is going on, not more often than people can see.
+
+    depth_settings: what to make of the disparity, None for what the source says. keeps_views: its views will be shown:
+    the photo is then made as small as memory asks for, else refused. asks_model: see `open_with_depth`. Raises
+    InputError, and Cancelled once should_stop is true.
+    """
+    require_process(budget_of(source.depth.memory_bytes), keeps_views)
+    from iibr_core.depth.search import open_with_depth
+    from iibr_core.formats.images.settings_text import settings_text_in
+
+    said_at: dict[str, float] = {}
+
+    def report_at_times(done: float, total: float, doing: str) -> None:
+        now = time.perf_counter()
+        if now - said_at.get(doing, -math.inf) >= TELL_EVERY_S:
+            said_at[doing] = now
+            report_progress(Progress(doing=f"{doing}, {done / total:.0%}" if done and total else doing))
+
+    path = Path(source.path)
+    max_pixels, stored_size, notes = _pixels_to_read(source, keeps_views)
+    stamp = stamp_of(path)
+    found = open_with_depth(
+        path,
+        replace(source.depth, refine=NOT_YET),
+        max_pixels,
+        source.grid,
+        should_stop,
+        report_at_times,
+        asks_model,
+    )
+    found = replace(found, photo=replace(found.photo, notes=found.photo.notes + notes))
+    give_back_memory()
+    settings = settings_text_in(path)
+    settings_wanted = depth_settings or DepthSettings(source.depth.refine)
+    own_size = _turned_like(stored_size, found.photo.size)
+    return _prepare(found, settings, source, settings_wanted, (own_size, stamp), should_stop)
+
+
+def deepen(source: Source, loaded: LoadedPhoto, refine: float, should_stop: ShouldStop = never) -> LoadedPhoto:
+    """The same photo with what a depth model makes of it, refined so far and not edited.
+
+    Raises InputError, and Cancelled once should_stop is true.
+    """
+    from iibr_core.depth.search import ask_model
+
+    choice = replace(source.depth, refine=NOT_YET)
+    found = ask_model(Path(source.path), loaded.photo, choice, source.grid, should_stop)
+    file = loaded.own_size, loaded.stamp
+    return _prepare(found, loaded.settings, source, DepthSettings(refine), file, should_stop)
+
+
+def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto | None:
+    """A large photo in small, with depth that is found quickly: something to look at while it is read. None where that
+    is no use.
+
+    Raises InputError, and Cancelled once should_stop is true.
+    """
+    from iibr_core.depth.search import sketch_depth
+    from iibr_core.formats.images.photo import focal_px_from_fov
+    from iibr_core.formats.images.thumbnail import read_thumbnail
+
+    path = Path(source.path)
+    max_pixels, stored, _ = _pixels_to_read(source, keeps_views=True)
+    stamp = stamp_of(path)
+    if source.is_literal or min(math.prod(stored), max_pixels) < SKETCH_WORTH_PIXELS:
+        return None
+    pixels = read_thumbnail(path, SKETCH, should_stop)
+    encoded = pixels.astype(np.float32) / np.float32(255)
+    photo = Photo(encoded, focal_px_from_fov(encoded.shape[1]), path.stem, is_hdr=False)
+    found = sketch_depth(path, photo, source.depth, should_stop)
+    own_size = _turned_like(stored, photo.size)
+    return _prepare(found, "", source, DepthSettings(NOT_YET), (own_size, stamp), should_stop)
+
+
+def inpainting_aids(
+    source: Source, loaded: LoadedPhoto, report_progress: ReportProgress = ignore_progress
+) -> InpaintingAids:
+    """What inpainting this photo may ask: what gave its depth, where that was a model."""
+    from iibr_core.depth.search import PhotoWithDepth, estimator_of
+
+    found = PhotoWithDepth(loaded.photo, loaded.found, loaded.origin)
+    return InpaintingAids(estimator_of(found, source.depth), report_progress)
+
+
+def apply_depth_settings(
+    loaded: LoadedPhoto, depth_settings: DepthSettings, should_stop: ShouldStop = never
+) -> LoadedPhoto:
+    """The same with something else made of its disparity; only what changed is worked out.
+
+    Raises InputError, and Cancelled once should_stop is true.
+    """
+    if loaded.depth_settings == depth_settings:
+        return loaded
+    if loaded.depth_settings.refine != depth_settings.refine:
+        loaded = _refine(loaded, depth_settings.refine, should_stop)
+    values = loaded.canvas.apply(depth_settings.edits, should_stop)
+    return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
+
+
+def without_history(loaded: LoadedPhoto) -> LoadedPhoto:
+    """The same with a new canvas: one that was painted on keeps maps to go back to."""
+    from iibr_core.depth.editing.canvas import DepthCanvas
+
+    return replace(loaded, canvas=DepthCanvas(loaded.photo.pixels, loaded.refined.values))
+
+
+def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
+    """The size of a stored picture as it is upright."""
+    is_turned = (size.height < size.width) != (upright.height < upright.width) and size.height != size.width
+    return ImageSize(size.width, size.height) if is_turned else size
+
+
+def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, ImageSize, tuple[str, ...]]:
+    """How large a photo is read, how large it is stored, and a note where that is less than was asked for.
+
+    Raises InputError where memory does not allow it, before any of it is taken.
+    """
+    from iibr_core.formats.images.header import read_photo_header
+    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, size_within
+    from iibr_core.formats.light_fields.registry import is_view_file
+
+    path, wanted = Path(source.path), source.max_pixels or DEFAULT_MAX_PIXELS
+    if is_view_file(path):
+        raise InputError(
+            f"{path}: holds the views of a light field, not a photo; `iibr view`, export and depth read it"
+        )
+    budget = budget_of(source.depth.memory_bytes)
+    header = read_photo_header(path)
+    require_decoding(budget, path.name, header.decoding_bytes, keeps_views)
+    _require_map(source, budget, keeps_views)
+    size = size_within(header.size, wanted)
+    if not keeps_views:
+        require_reading(budget, size)
+        return wanted, header.size, ()
+    fitting = pixels_within(budget, source.grid)
+    is_less = fitting < size.height * size.width
+    size = size_within(size, fitting) if is_less else size
+    if source.grid is not None:
+        require_views(budget, path.name, size, source.grid)
+    note = f"{budget.said} {mebibytes(budget.bytes)}: no room for more than {fitting:,} pixels of the photo."
+    return (fitting, header.size, (note,)) if is_less else (wanted, header.size, ())
+
+
+def _require_map(source: Source, budget: Budget, keeps_views: bool) -> None:
+    """Raise InputError where the map to be read is too large; one that nobody named may be a bad one."""
+    from iibr_core.depth.sidecar import map_to_read
+    from iibr_core.formats.maps.reader import read_map_header
+
+    path = map_to_read(Path(source.path), source.depth)
+    if path is None:
+        return
+    try:
+        header = read_map_header(path)
+    except InputError:
+        if source.depth.file is not None:
+            raise
+        return
+    require_map(budget, path.name, header.size, header.bytes_beside, keeps_views)
+
+
+def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_views: bool = True) -> ScenePlan:
+    """The plan for viewing, or for disparity as it is given. What was not edited keeps its parallax: clips and strokes
+    must not move all the rest.
+
+    keeps_views: else each is written and forgotten. Raises InputError where an override is out of range.
+    """
+    if source.is_literal:
+        if source.grid is None:
+            raise InputError("--literal counts disparity in px from view to view: say how many with --grid")
+        memory = source.depth.memory_bytes
+        return plan_literal(
+            loaded.photo, loaded.disparity, source.grid, memory, source.quality, keeps_views, source.inpaint
+        )
+    zero = source.focus_disparity
+    if loaded.depth_settings.edits != UNEDITED:
+        zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
+        range_px, edited_px = (measure_relief(map_.values).range for map_ in (loaded.refined, loaded.disparity))
+        wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
+        depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
+    memory = source.depth.memory_bytes
+    overrides = PlanOverrides(source.grid, depth_strength, zero, memory, source.quality, source.inpaint)
+    return plan_for_viewing(loaded.photo, loaded.disparity, overrides, keeps_views)
+
+
+def still_disparity(source: Source, before_strokes: FloatImage) -> float:
+    """The disparity (as given) of the plane that stays still, wherever the brush goes."""
+    return float(np.median(before_strokes)) if source.focus_disparity is None else source.focus_disparity
+
+
+def prepare_brush() -> None:
+    """Have the brush's kernels loaded, or compiled, so that the first stroke does not wait for them."""
+    from iibr_core.depth.editing.canvas import DepthCanvas
+    from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
+
+    strokes = tuple(Stroke(tool, ((0.5, 0.5),), 0.1, 0.5) for tool in BRUSH_TOOLS)
+    DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).apply(DepthEdits(strokes=strokes))
+
+
+def _prepare(
+    found: PhotoWithDepth,
+    settings: str,
+    source: Source,
+    depth_settings: DepthSettings,
+    file: tuple[ImageSize, tuple[int, ...]],
+    should_stop: ShouldStop,
+) -> LoadedPhoto:
+    from iibr_core.depth.editing.canvas import DepthCanvas
+    from iibr_core.depth.estimators.catalog import USUAL_MODEL
+
+    values = found.disparity
+    canvas = DepthCanvas(found.photo.pixels, values.values)
+    as_found = DepthSettings(NOT_YET)
+    levels = levels_of(values.values)
+    model = (source.depth.model or USUAL_MODEL) if found.origin.kind == "model" else None
+    loaded = LoadedPhoto(
+        found.photo, values, found.origin, settings, model, as_found, values, values, levels, canvas, *file
+    )
+    return apply_depth_settings(loaded, depth_settings, should_stop)
+
+
+def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> LoadedPhoto:
+    from iibr_core.depth.edges.refine import refine
+    from iibr_core.depth.editing.canvas import DepthCanvas
+
+    values = loaded.found.values
+    if strength > 0:
+        values = refine(loaded.photo.pixels, values, strength, loaded.found.unknown, should_stop)
+    canvas = DepthCanvas(loaded.photo.pixels, values)
+    return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)

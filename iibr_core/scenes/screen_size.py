@@ -1,0 +1,14 @@
+"""Sizes of pictures, as graphics cards and windows give them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class ScreenSize(NamedTuple):
+    """Width and height in pixels: the order of GL, GLFW and ImGui. Images have an `ImageSize`; no type checker lets
+    one pass for the other.
+    """
+
+    width: int
+    height: int

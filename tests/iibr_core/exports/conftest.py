@@ -1,0 +1,46 @@
+"""A small scene that is open, and every kind of export of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iibr_core.exports.kinds import export_kind
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.registry import export_path, writer_of
+from iibr_core.exports.source import ExportSource
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.scene import Source
+from iibr_core.types import GridShape, InputError
+from tests.viewer.conftest import write_scene
+from viewer.display.scene_drawer import SceneDrawer
+
+
+@pytest.fixture(scope="package")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ExportSource]:
+    source = Source(str(write_scene(tmp_path_factory.mktemp("exports"))), grid=GridShape(3, 3))
+    with SceneDrawer() as drawer:
+        try:
+            opened = drawer.open(source, 1.0, LensChoice(), lambda scene: None)
+        except InputError as error:
+            pytest.skip(str(error))
+        yield opened
+
+
+@pytest.fixture
+def source(opened: ExportSource) -> ExportSource:
+    """The scene as it was opened: 3x3 views of 96x64, a near square before a far wall."""
+    return replace(opened, centre=None)
+
+
+def exported(source: ExportSource, kind: str, path: Path, optics: dict[str, Any] | None = None, **options: Any) -> Path:
+    """Where it was written to."""
+    source = replace(source, optics=replace(source.optics, **optics or {}))
+    asked = ExportOptions(**options)
+    target = export_path(export_kind(kind), path, source.scene, asked)
+    writer_of(export_kind(kind))(target, source, asked)
+    return target

@@ -1,0 +1,161 @@
+"""Quilts and stereo pictures, read by Pillow: which view lies where, what is held still, how the anaglyph is mixed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.exports.framing import fitted
+from iibr_core.exports.parallax import side_pictures
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import ExportSource
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.quilts import DEVICES
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import ImageSize, InputError, ViewOffset
+from tests.iibr_core.exports.conftest import exported
+
+
+def pixels(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def left_edge_of_square(picture: np.ndarray) -> float:
+    """Where the near square begins in the picture's middle row, to a part of a pixel: half of its light is there."""
+    redness = (picture[..., 0] - picture[..., 2])[picture.shape[0] // 2].astype(float)
+    start = int(np.argmax(redness > redness.max() / 2))
+    before, after = redness[start - 1], redness[start]
+    return start - (after - redness.max() / 2) / max(after - before, 1e-6)
+
+
+def test_quilt_has_its_first_view_at_the_bottom_left(source: ExportSource, tmp_path: Path) -> None:
+    out = exported(source, "quilt", tmp_path / "a.png")
+    assert out.name == "a_qs8x6a1.5.png"
+    quilt = pixels(out)
+    height, width = quilt.shape[0] // 6, quilt.shape[1] // 8
+    assert (height, width) == (64, 96)
+    for s, tile in ((-1.0, quilt[-height:, :width]), (1.0, quilt[:height, -width:])):
+        expected = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), ScreenSize(width, height)))
+        assert np.abs(tile - expected.astype(int)).max() <= 1
+    second = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, -1 + 2 / 47)), ScreenSize(width, height)))
+    assert np.abs(quilt[-height:, width : 2 * width] - second.astype(int)).max() <= 1
+
+
+def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
+    near = source.scene.disparity_range_px[1]
+    places = {}
+    for focus in (0.0, near):
+        both = RenderSettings(Optics(focus_disparity=focus), ScreenSize(288, 192))
+        drawn = [source.draw(eye).astype(int) for eye in side_pictures(source.scene, both, 2, 2.0)]
+        left, right = map(left_edge_of_square, drawn)
+        places[focus] = left - right
+    assert places[near] == pytest.approx(0, abs=0.4)
+    assert places[0.0] == pytest.approx(2 * near * 3, abs=0.8), "else it moves by its disparity, times the scale"
+
+
+def test_parts_that_are_held_still_are_as_wide_as_may_be(source: ExportSource) -> None:
+    """The first and the last reach the picture's two borders."""
+    both = RenderSettings(Optics(focus_disparity=1.5), ScreenSize(96, 64))
+    parts = [eye.part for eye in side_pictures(source.scene, both, 3, 2.0)]
+    assert max(part.left + part.width for part in parts) == pytest.approx(1)
+    assert min(part.left for part in parts) == pytest.approx(0)
+    assert all((part.top, part.height) == (0, 1) for part in parts)
+
+
+def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:
+    with pytest.raises(InputError, match="too much to be held still"):
+        side_pictures(source.scene, RenderSettings(Optics(focus_disparity=30.0), ScreenSize(96, 64)), 2, 2.0)
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_every_display_gets_what_it_asks_for(name: str) -> None:
+    quilt = DEVICES[name]
+    places = [quilt.place(view) for view in range(quilt.views)]
+    assert places[0][0].stop == quilt.size.height
+    assert places[0][1].start == 0
+    assert places[-1][0].start == quilt.size.height - quilt.rows * quilt.tile.height
+    assert places[-1][1].stop == quilt.columns * quilt.tile.width
+    assert len({(rows.start, columns.start) for rows, columns in places}) == quilt.views
+
+
+def test_tiles_of_a_display_are_stretched_to_its_shape(source: ExportSource, tmp_path: Path) -> None:
+    """The 16" display's tiles are square and shown 1.777 wide: a 3:2 picture, shown whole, is narrower than that."""
+    assert DEVICES["16-landscape"].tile == ImageSize(857, 857)
+    assert fitted(1.5, ScreenSize(857, 857), 1.777) == (round(857 * 1.5 / 1.777), 857)
+    assert fitted(2.5, ScreenSize(857, 857), 1.777) == (857, round(857 * 1.777 / 2.5))
+    assert fitted(741 / 500, ScreenSize(740, 500), 740 / 500) == (740, 500), "no bar of a single row"
+
+
+def test_a_size_of_another_shape_shows_the_whole_picture_undistorted(source: ExportSource, tmp_path: Path) -> None:
+    out = pixels(exported(source, "cross-eyed", tmp_path / "a.png", size=ScreenSize(96, 100)))
+    expected = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, 1.0)), ScreenSize(96, 64))).astype(int)
+    assert out.shape == (100, 192, 3)
+    assert np.array_equal(out[18:82, :96], expected)
+    assert not out[:18].any()
+    assert not out[82:].any()
+
+
+def test_stereo_pictures(source: ExportSource, tmp_path: Path) -> None:
+    size = ScreenSize(96, 64)
+    left, right = (source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), size)).astype(int) for s in (-1.0, 1.0))
+    expected = {
+        "sbs": ("a_LRF_Full_SBS.png", np.hstack([left, right])),
+        "over-under": ("a_TB.png", np.vstack([left, right])),
+        "cross-eyed": ("a.png", np.hstack([right, left])),
+    }
+    for kind, (name, whole) in expected.items():
+        out = exported(source, kind, tmp_path / "a.png")
+        assert out.name == name
+        assert np.array_equal(pixels(out), whole)
+    half = exported(source, "half-sbs", tmp_path / "a_LRF_Half_SBS.png")
+    assert (half.name, pixels(half).shape) == ("a_LRF_Half_SBS.png", (64, 96, 3))
+    left = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, -1.0)), ScreenSize(48, 64)))
+    assert np.abs(pixels(half)[:, :48] - left).max() <= 1
+
+
+def test_half_of_a_picture_of_one_column_is_one(source: ExportSource, tmp_path: Path) -> None:
+    assert pixels(exported(source, "half-sbs", tmp_path / "a.png", size=ScreenSize(1, 8))).shape == (8, 2, 3)
+
+
+def test_colour_of_an_anaglyph_is_not_coarser_than_its_light(source: ExportSource, tmp_path: Path) -> None:
+    """Or the eyes would mix: WebP has it so without loss only."""
+    png, webp, jpeg = (exported(source, "anaglyph", tmp_path / f"a{ending}") for ending in (".png", ".webp", ".jpg"))
+    assert np.array_equal(pixels(webp), pixels(png))
+    with Image.open(jpeg) as image:
+        assert [layer[1:3] for layer in image.layer] == 3 * [(1, 1)]  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("ending", [".jpg", ".webp", ".tif"])
+def test_pictures_are_of_the_kind_that_their_name_says(source: ExportSource, tmp_path: Path, ending: str) -> None:
+    png, other = (exported(source, "anaglyph", tmp_path / f"a{name}") for name in (".png", ending))
+    assert other.suffix == ending
+    assert np.abs(read_photo(png).pixels - read_photo(other).pixels).mean() < 0.02
+
+
+def test_eyes_stand_as_far_apart_as_asked(source: ExportSource, tmp_path: Path) -> None:
+    out = pixels(exported(source, "cross-eyed", tmp_path / "a.png", eyes=0.0))
+    assert np.array_equal(out[:, :96], out[:, 96:])
+
+
+def test_anaglyph_is_mixed_in_linear_light(source: ExportSource, tmp_path: Path) -> None:
+    """Dubois's matrices written out, for each eye alone, and cut off before they are added."""
+    left_from_rgb = [[0.437, 0.449, 0.164], [-0.062, -0.062, -0.024], [-0.048, -0.050, -0.017]]
+    right_from_rgb = [[-0.011, -0.032, -0.007], [0.377, 0.761, 0.009], [-0.026, -0.093, 1.234]]
+
+    def light(encoded: np.ndarray) -> np.ndarray:
+        x = encoded / 255
+        return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+
+    eyes = [source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64))) for s in (-1.0, 1.0)]
+    total = sum(
+        np.clip(np.einsum("ij,yxj->yxi", matrix, light(eye)), 0, 1)
+        for matrix, eye in zip((left_from_rgb, right_from_rgb), eyes)
+    )
+    linear = np.clip(total, 0, 1)
+    encoded = np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055)
+    out = pixels(exported(source, "anaglyph", tmp_path / "a.png"))
+    assert np.abs(out - encoded * 255).max() <= 0.51

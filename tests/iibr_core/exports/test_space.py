@@ -1,0 +1,242 @@
+"""Cameras, points and maps, read by plyfile, OpenImageIO and our own readers: all agree on where things are."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from PIL import Image
+from plyfile import PlyData
+
+from iibr_core.exports.cameras import cameras_of
+from iibr_core.exports.points import SAME_DISPARITY_PX, _new, scene_points
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import ExportSource
+from iibr_core.formats.cameras import FieldCameras
+from iibr_core.formats.light_fields.llff import read_llff
+from iibr_core.formats.light_fields.registry import open_light_field
+from iibr_core.formats.maps.pfm import read_pfm
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
+from tests.iibr_core.exports.conftest import exported
+
+GRID, SIZE = GridShape(3, 3), ImageSize(64, 96)
+
+
+def colmap_model(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
+    """Projection matrices and places by picture, and points with their colours (N, 6)."""
+    model = folder / "sparse" / "0"
+    intrinsics = {}
+    for line in (model / "cameras.txt").read_text().splitlines():
+        name, kind, width, height, *numbers = line.split()
+        assert (kind, width, height) == ("PINHOLE", "96", "64")
+        fx, fy, cx, cy = map(float, numbers)
+        intrinsics[name] = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    projections, places = {}, {}
+    for line in (model / "images.txt").read_text().splitlines()[::2]:
+        _, w, x, y, z, *moved, camera, name = line.split()
+        assert (float(w), float(x), float(y), float(z)) == (1, 0, 0, 0)
+        translation = np.array(moved, float)
+        projections[name] = intrinsics[camera] @ np.column_stack([np.eye(3), translation])
+        places[name] = -translation
+    points = np.array([line.split()[1:7] for line in (model / "points3D.txt").read_text().splitlines()], float)
+    return projections, places, points
+
+
+def test_colmap_points_lie_on_their_colours_in_every_view(source: ExportSource, tmp_path: Path) -> None:
+    """The near square's points are red; where they are seen in other views, these are red too."""
+    folder = exported(source, "colmap", tmp_path / "scene")
+    projections, _, points = colmap_model(folder)
+    assert len(projections) == 9
+    red = points[points[:, 3] - points[:, 5] > 100]
+    inner = red[(np.abs(red[:, :2]) < 0.8 * np.abs(red[:, :2]).max(axis=0)).all(axis=1)]
+    assert len(inner) > 200
+    for name, projection in projections.items():
+        pixels = np.asarray(Image.open(folder / "images" / name)).astype(int)
+        x, y, z = projection @ np.column_stack([inner[:, :3], np.ones(len(inner))]).T
+        seen = pixels[(y / z).astype(int), (x / z).astype(int)]
+        assert (seen[:, 0] - seen[:, 2] > 80).mean() > 0.98
+
+
+def test_the_three_layouts_say_the_same(source: ExportSource, tmp_path: Path) -> None:
+    folders = {kind: exported(source, kind, tmp_path / kind) for kind in ("llff", "nerfstudio", "colmap")}
+    _, colmap, _ = colmap_model(folders["colmap"])
+    whole = json.loads((folders["nerfstudio"] / "transforms.json").read_text())
+    assert (whole["w"], whole["h"], len(whole["frames"])) == (96, 64, 9)
+    for frame in whole["frames"]:
+        assert (folders["nerfstudio"] / frame["file_path"]).is_file()
+        matrix = np.array(frame["transform_matrix"])
+        place = colmap[Path(frame["file_path"]).name] * [1, -1, -1]
+        np.testing.assert_allclose(matrix[:3, 3], place, atol=1e-12)
+        assert (frame["cx"], frame["cy"]) == (48, 32)
+    poses = np.load(folders["llff"] / "poses_bounds.npy")
+    assert poses.shape == (9, 17)
+    for name, pose in zip(sorted(colmap), poses):
+        matrix = pose[:15].reshape(3, 5)
+        np.testing.assert_allclose(matrix[:, 3], colmap[name] * [1, -1, -1], atol=1e-12)
+        np.testing.assert_allclose(matrix[:, 4], [64, 96, whole["fl_x"]])
+        np.testing.assert_array_equal(matrix[:, 0], [0, -1, 0], "down, where y is up")
+
+
+def test_our_own_reader_finds_the_grid_in_llff(source: ExportSource, tmp_path: Path) -> None:
+    scene = read_llff(exported(source, "llff", tmp_path / "scene"))
+    assert scene is not None
+    offsets = {view.name: (view.offset.t, view.offset.s) for view in scene.views}
+    for row in range(3):
+        for column in range(3):
+            assert offsets[f"v{row:02d}_u{column:02d}"] == pytest.approx((row - 1, column - 1), abs=1e-6)
+    assert scene.range_px is not None
+    low, high = source.scene.disparity_range_px
+    assert scene.range_px[1] - scene.range_px[0] == pytest.approx(high - low, rel=1e-4)
+
+
+def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp_path: Path) -> None:
+    vertex = PlyData.read(str(exported(source, "splats", tmp_path / "a.ply")))["vertex"]
+    count = 96 * 64
+    assert len(vertex) > count, "behind the square"
+    colors = np.column_stack([vertex[f"f_dc_{i}"] for i in range(3)]) * 0.28209479177387814 + 0.5
+    shown = source.draw(RenderSettings(Optics(), ScreenSize(96, 64))).reshape(-1, 3) / 255
+    assert np.abs(colors[:count] - shown).max() < 1.6 / 255
+    opacity = 1 / (1 + np.exp(-np.asarray(vertex["opacity"])))
+    assert 0.9 < opacity.min() <= opacity.max() < 1
+    quaternion = np.column_stack([vertex[f"rot_{i}"] for i in range(4)])
+    assert np.array_equal(quaternion, np.tile([1, 0, 0, 0], (len(vertex), 1)))
+    cameras = cameras_of(source)
+    depth = np.asarray(vertex["z"])
+    assert np.exp(np.asarray(vertex["scale_0"])) == pytest.approx(0.6 * depth / cameras.focal_px, rel=1e-4)
+    assert depth.min() == pytest.approx(1, rel=1e-4)
+    square = (colors[:, 0] - colors[:, 2]) > 0.3
+    assert np.median(depth[count:]) > 1.1 * np.median(depth[:count][square[:count]]), "made up behind what is near"
+
+
+def test_what_stays_still_changes_neither_distances_nor_places(source: ExportSource) -> None:
+    straight = cameras_of(source)
+    for zero in (-0.7, 0.0, 0.4):
+        cameras = cameras_of(replace(source, scene=replace(source.scene, plan=source.plan(zero))))
+        assert cameras.at_infinity - straight.at_infinity == pytest.approx(
+            (source.plan().disparity_zero - zero) * source.plan().disparity_scale
+        )
+        assert cameras.depth_range == pytest.approx(straight.depth_range)
+        assert cameras.step == pytest.approx(straight.step)
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.5])
+def test_a_photo_that_is_flat_or_inside_out_has_no_cameras(source: ExportSource, scale: float) -> None:
+    plan = replace(source.plan(), disparity_scale=scale)
+    with pytest.raises(InputError, match="is flat, or turned inside out"):
+        cameras_of(replace(source, scene=replace(source.scene, plan=plan)))
+
+
+def test_what_several_views_had_made_up_in_one_place_is_taken_once() -> None:
+    cameras, seen = FieldCameras(GRID, SIZE, 80.0, (0.0, 6.0), -1.0), set()
+
+    def made_up(row: int, column: int, disparity: float) -> np.ndarray:
+        """What is new of a block of the centre view, 6 x 10, as another view shows it."""
+        t, s = GRID.offset(row, column)
+        top, left = 20 - round(disparity * t), 30 - round(disparity * s)
+        inpainted = np.zeros(SIZE, np.bool_)
+        inpainted[top : top + 6, left : left + 10] = True
+        view = ViewUpdate(row, column, np.zeros((*SIZE, 3), np.uint8), np.full(SIZE, disparity, np.float32), inpainted)
+        return _new(view, cameras, seen)
+
+    assert made_up(0, 0, 3.0).sum() == 60
+    assert made_up(2, 2, 3.0).sum() == made_up(0, 2, 3.0).sum() == 0
+    assert made_up(2, 0, 4.0).sum() == 60, "another surface"
+
+
+def test_points_are_the_centre_view_s_and_what_the_corner_views_had_made_up(source: ExportSource) -> None:
+    """Every place that was made up is taken once: seen from where the photo was taken, and as far away."""
+    found, places = 0, set()
+    for view in source.views():
+        if view.row == view.column == 1:
+            found += view.disparity.size
+        elif (view.row, view.column) in ((0, 0), (0, 2), (2, 0), (2, 2)):
+            t, s = GRID.offset(view.row, view.column)
+            for y, x in np.argwhere(view.inpainted):
+                d = view.disparity[y, x]
+                places.add((np.rint(x + d * s), np.rint(y + d * t), np.rint(d / np.float32(SAME_DISPARITY_PX))))
+    assert len(places) > 100
+    assert len(scene_points(source)[0]) == found + len(places)
+
+
+def test_point_cloud(source: ExportSource, tmp_path: Path) -> None:
+    cloud = PlyData.read(str(exported(source, "point-cloud", tmp_path / "a.ply")))["vertex"]
+    splats = PlyData.read(str(exported(source, "splats", tmp_path / "b.ply")))["vertex"]
+    assert [p.name for p in cloud.properties] == ["x", "y", "z", "red", "green", "blue"]
+    for axis, sign in (("x", 1), ("y", -1), ("z", -1)):
+        np.testing.assert_allclose(cloud[axis], sign * np.asarray(splats[axis]))
+    shown = source.draw(RenderSettings(Optics(), ScreenSize(96, 64))).reshape(-1, 3).astype(int)
+    colors = np.column_stack([cloud[name] for name in ("red", "green", "blue")]).astype(int)
+    assert np.abs(colors[: len(shown)] - shown).max() <= 1
+
+
+def test_maps(source: ExportSource, tmp_path: Path) -> None:
+    disparity = read_pfm(exported(source, "disparity", tmp_path / "a.pfm"))
+    out = exported(source, "depth", tmp_path / "a.exr")
+    assert out.name == "a_depth.exr"
+    depth = np.asarray(oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT))[..., 0]
+    cameras = cameras_of(source)
+    np.testing.assert_allclose(
+        depth, (cameras.range_px[1] - cameras.at_infinity) / (disparity - cameras.at_infinity), rtol=1e-5
+    )
+    assert (disparity.min(), disparity.max()) == pytest.approx(source.scene.disparity_range_px)
+    stored = np.asarray(Image.open(exported(source, "depth", tmp_path / "b.png"))).astype(float)
+    assert np.corrcoef(stored.ravel(), depth.ravel())[0, 1] > 0.9999
+
+
+@pytest.mark.parametrize(
+    ("kind", "picture", "depth"),
+    [
+        ("rgbd", np.s_[:, :96], np.s_[:, 96:]),
+        ("rgbd-left", np.s_[:, 96:], np.s_[:, :96]),
+        ("rgbd-below", np.s_[:64], np.s_[64:]),
+    ],
+)
+def test_a_picture_with_its_depth_beside_it(
+    source: ExportSource, tmp_path: Path, kind: str, picture: tuple[slice, ...], depth: tuple[slice, ...]
+) -> None:
+    pixels = np.asarray(Image.open(exported(source, kind, tmp_path / "a.png")))
+    assert np.abs(pixels[picture].astype(int) - source.draw(RenderSettings(Optics(), ScreenSize(96, 64)))).max() <= 1
+    assert (pixels[depth].min(), pixels[depth].max()) == (0, 255)
+    assert pixels[depth][32, 48, 0] == 255, "the square in the middle is near"
+    low, high = source.scene.disparity_range_px
+    expected = 255 * (source.centre_view().disparity - low) / (high - low)
+    assert np.abs(pixels[depth] - expected[..., None]).max() <= 0.51
+
+
+@pytest.mark.parametrize("span", [4.0, 0.25, 0.0])
+def test_depth_beside_a_picture_is_even_from_the_farthest_to_the_nearest(
+    source: ExportSource, tmp_path: Path, span: float
+) -> None:
+    disparity = np.tile(np.linspace(-1, span - 1, 96, dtype=np.float32), (64, 1))
+    centre = ViewUpdate(1, 1, np.zeros((64, 96, 3), np.uint8), disparity)
+    out = exported(replace(source, loaded=None, centre=centre), "rgbd", tmp_path / "a.png")
+    depth = np.asarray(Image.open(out))[:, 96:, 0]
+    expected = np.linspace(0, 255, 96) if span else np.zeros(96)
+    assert np.abs(depth - expected).max() <= 0.51
+
+
+def test_a_light_field_is_written_with_its_focal_length(source: ExportSource, tmp_path: Path) -> None:
+    scene = open_light_field(exported(source, "hci", tmp_path / "field"))
+    assert source.loaded is not None
+    assert scene.focal_px == pytest.approx(source.loaded.photo.focal_px)
+    assert scene.range_px is not None
+    assert scene.range_px == pytest.approx(source.scene.disparity_range_px, abs=0.2)
+
+
+def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
+    epi = np.asarray(Image.open(exported(source, "epi", tmp_path / "a.png", row=32))).astype(int)
+    assert epi.shape == (3, 96, 3)
+    for line, s in zip(epi, (-1.0, 0.0, 1.0)):
+        shown = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64)))[32].astype(int)
+        assert np.abs(line - shown).max() <= 1
+    for row in (0, 63):
+        assert exported(source, "epi", tmp_path / "b.png", row=row).is_file()
+    for row in (-1, 64):
+        with pytest.raises(InputError, match="rows 0 to 63"):
+            exported(source, "epi", tmp_path / "c.png", row=row)

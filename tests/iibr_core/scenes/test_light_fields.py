@@ -1,0 +1,202 @@
+"""Light fields from disk: shown as read, and with disparity found from their views where they bring none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.color import bytes_from_encoded
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.formats.images.oiio_writer import write_image_file
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.scenes.lens_limits import focus_limits
+from iibr_core.scenes.light_fields import FROM_VIEWS
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.opening_work import FINDING
+from iibr_core.scenes.scene import Progress, Scene, Source
+from iibr_core.types import GridShape, InputError
+from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
+from viewer.model.reducers.root import reduce
+from viewer.model.state.app_state import AppState
+from viewer.model.state.optics import SetAperture, SetFocus
+
+WALL_PX, SQUARE_PX = -0.5, 1.25
+
+
+def test_a_light_field_without_disparity_finds_its_own(tmp_path: Path) -> None:
+    """Shown as read, then with a coarse map, then with the final one, which knows how far both surfaces are."""
+    folder = write_two_planes(tmp_path / "field")
+    as_read, coarse, final = showings(results_of(SceneRequest(1, Source(str(folder))), lambda: False, lambda: CENTRE))
+    assert [ready.scene.has_view_disparity for ready, _ in (as_read, coarse, final)] == [False, True, True]
+    assert [{view.view.is_final for view in views} for _, views in (coarse, final)] == [{False}, {True}]
+    assert final[0].scene.depth_source == FROM_VIEWS
+    assert final[0].scene.disparity_range_px == pytest.approx((WALL_PX, SQUARE_PX), abs=0.15)
+    for view in (result.view for result in final[1]):
+        assert view.disparity is not None
+        assert view.disparity[48, 48] == pytest.approx(SQUARE_PX, abs=0.1)
+        assert view.disparity[8, 8] == pytest.approx(WALL_PX, abs=0.1)
+
+
+def test_without_a_window_it_is_shown_once_when_all_is_known(tmp_path: Path) -> None:
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))), takes_drafts=False)
+    ((ready, views),) = showings(results_of(request, lambda: False, lambda: CENTRE))
+    assert ready.scene.has_view_disparity
+    assert {view.view.is_final for view in views} == {True}
+
+
+def test_the_centre_views_disparity_may_be_given(tmp_path: Path) -> None:
+    folder, given = write_two_planes(tmp_path / "field"), tmp_path / "given.npy"
+    np.save(given, np.full((96, 96), 0.25, np.float32))
+    request = SceneRequest(1, Source(str(folder), DepthChoice(file=str(given), file_scale=2.0)), takes_drafts=False)
+    ((ready, views),) = showings(results_of(request, lambda: False, lambda: CENTRE))
+    assert (ready.scene.depth_source, ready.scene.disparity_range_px) == ("given.npy", (0.5, 0.5))
+    assert all(view.view.disparity is not None and (view.view.disparity == 0.5).all() for view in views)
+
+
+def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
+    """Too small to be matched: a note says so, and they stay."""
+    folder = tmp_path / "field"
+    (folder / "views").mkdir(parents=True)
+    for row, column in np.ndindex(2, 3):
+        write_image_file(folder / "views" / f"v{row}_u{column}.png", np.zeros((6, 40, 3), np.uint8), "uint8")
+    last, views = list(showings(results_of(SceneRequest(1, Source(str(folder))), lambda: False, lambda: CENTRE)))[-1]
+    assert not last.scene.has_view_disparity
+    assert any("too small" in note for note in last.scene.problems)
+    assert len(views) == 6
+
+
+@pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
+def test_one_bar_grows_from_reading_to_the_last_view(tmp_path: Path, filled_grid: GridShape | None) -> None:
+    """Through all showings, as the window's state has it; complete once, with the last view."""
+    source = Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid)
+    state, heard = reduce(AppState(), OpenPath(source)), list[Progress]()
+    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE, heard.append)
+    shown = [state.progress]
+    for result in results:
+        while heard:
+            state = reduce(state, ProgressMade(1, heard.pop(0)))
+            shown.append(state.progress)
+        if isinstance(result, SceneReady):
+            state = reduce(state, SceneOpened(1, result.scene))
+        else:
+            state = reduce(state, ProgressMade(1, result.progress, (result.view.row, result.view.column)))
+        shown.append(state.progress)
+    shares = [progress.share for progress in shown]
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert [progress.is_complete for progress in shown[-2:]] == [False, True]
+    assert not any(progress.is_complete for progress in shown[:-1])
+
+
+def test_focus_that_is_set_while_it_loads_stays(tmp_path: Path) -> None:
+    source = Source(str(write_two_planes(tmp_path / "field")))
+    state = reduce(AppState(), OpenPath(source))
+    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)
+    state = reduce(state, SceneOpened(1, first_scene(results)))
+    state = reduce(reduce(state, SetAperture(2.0)), SetFocus(3.5))
+    for result in results:
+        if isinstance(result, SceneReady):
+            state = reduce(state, SceneOpened(1, result.scene))
+            state = reduce(state, SetAperture(state.optics.aperture_diameter + 0.1))  # which checks all limits
+    assert state.optics.focus_disparity == 3.5
+    assert focus_limits(state.scene)[1] >= 3.5
+
+
+def first_scene(results: Iterator[SceneReady | ViewReady]) -> Scene:
+    """What is opened first."""
+    ready = next(results)
+    assert isinstance(ready, SceneReady)
+    return ready.scene
+
+
+def showings(results: Iterator[SceneReady | ViewReady]) -> Iterator[tuple[SceneReady, list[ViewReady]]]:
+    """Each scene with the views that follow it."""
+    ready: SceneReady | None = None
+    views: list[ViewReady] = []
+    for result in results:
+        if isinstance(result, ViewReady):
+            views.append(result)
+            continue
+        if ready is not None:
+            yield ready, views
+        ready, views = result, []
+    assert ready is not None
+    yield ready, views
+
+
+def write_two_planes(folder: Path) -> Path:
+    """5x5 views of a textured square before a textured wall, as numbered pictures."""
+    (folder / "views").mkdir(parents=True)
+    rough = np.random.default_rng(1).random((2, 201, 201)).astype(np.float32)
+    texture = (rough[:, 1:, 1:] + rough[:, :-1, 1:] + rough[:, 1:, :-1] + rough[:, :-1, :-1]) / 4
+    y, x = np.mgrid[:96, :96].astype(np.float32)
+    for row, column in np.ndindex(5, 5):
+        t, s = row - 2, column - 2
+        inside = (abs(y + SQUARE_PX * t - 48) < 24) & (abs(x + SQUARE_PX * s - 48) < 24)
+        parts = [bilinear(texture[k], y + d * t + 20, x + d * s + 20) for k, d in enumerate((WALL_PX, SQUARE_PX))]
+        pixels = bytes_from_encoded(np.where(inside, parts[1], parts[0]))
+        write_image_file(folder / "views" / f"v{row}_u{column}.png", np.repeat(pixels[..., None], 3, -1), "uint8")
+    return folder
+
+
+def bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Values (H, W) between the pixels."""
+    y0, x0 = y.astype(int), x.astype(int)
+    top = image[y0, x0] * (1 - x + x0) + image[y0, x0 + 1] * (x - x0)
+    bottom = image[y0 + 1, x0] * (1 - x + x0) + image[y0 + 1, x0 + 1] * (x - x0)
+    return top * (1 - y + y0) + bottom * (y - y0)
+
+
+def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
+    """Asked to stop once it has begun."""
+    said: list[str] = []
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
+    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda progress: said.append(progress.doing))
+    with pytest.raises(Cancelled):
+        list(results)
+
+
+def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
+    said: list[str] = []
+    results = results_of(request, lambda: False, lambda: CENTRE, lambda progress: said.append(progress.doing))
+    ((ready, views),) = showings(results)
+    assert (ready.scene.grid, ready.scene.given_grid, ready.scene.depth_source) == ((9, 9), (5, 5), FROM_VIEWS)
+    assert ready.scene.disparity_range_px == pytest.approx((WALL_PX / 2, SQUARE_PX / 2), abs=0.15)
+    assert (ready.centre.row, ready.centre.column) == (4, 4)
+    assert {(view.view.row, view.view.column) for view in views} == set(np.ndindex(9, 9))
+    assert {view.view.is_final for view in views} == {True}
+    assert {"reading", "finding disparity"} <= set(said)
+    between = next(view.view for view in views if (view.view.row, view.view.column) == (3, 5))
+    assert between.disparity is not None
+    assert between.disparity[48, 48] == pytest.approx(SQUARE_PX / 2, abs=0.05)
+
+
+def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: Path) -> None:
+    said: list[str] = []
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
+    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda now: said.append(now.doing))
+    with pytest.raises(Cancelled):
+        list(results)
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (Source("", filled_grid=GridShape(8, 8)), "give 9x9, 13x13, 17x17"),
+        (Source("", DepthChoice(file="centre.npy"), filled_grid=GridShape(9, 9)), "the disparity of one view"),
+        (Source("", DepthChoice(memory_bytes=1 << 28), filled_grid=GridShape(1025, 1025)), "1025 x 1025 views"),
+    ],
+)
+def test_views_between_that_cannot_be_made_are_told_in_a_line(tmp_path: Path, source: Source, message: str) -> None:
+    np.save(tmp_path / "centre.npy", np.zeros((96, 96), np.float32))
+    file = str(tmp_path / "centre.npy") if source.depth.file else None
+    depth = replace(source.depth, file=file)
+    source = replace(source, path=str(write_two_planes(tmp_path / "field")), depth=depth)
+    with pytest.raises(InputError, match=message):
+        list(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))

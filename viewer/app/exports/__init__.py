@@ -1,1 +1,0 @@
-"""What a scene can be exported as: one file a kind, one line each in the registry."""

@@ -1,0 +1,102 @@
+"""Scenes drawn without a window and its state: for exports, and for the workers of a batch."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any
+
+from numpy.typing import NDArray
+
+from iibr_core.exports.render_settings import RenderSettings, require_size
+from iibr_core.exports.source import ExportSource
+from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.runtime.tiling import never
+from iibr_core.scenes.gloss import answer
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.scene import Scene, Source
+from iibr_core.types import ReportProgress, ignore_progress
+from viewer.display.scene_view import SceneView
+from viewer.gpu.headless_context import create_headless
+
+_own = threading.local()
+"""Of a thread: its drawer, kept from photo to photo. GL contexts belong to threads."""
+
+
+def open_drawn(
+    source: Source,
+    depth_strength: float,
+    lens: LensChoice,
+    on_ready: Callable[[Scene], None],
+    report_progress: ReportProgress = ignore_progress,
+) -> ExportSource:
+    """See `OpenDrawn`; by the thread's own drawer, for as long as it opens nothing else."""
+    if not hasattr(_own, "drawer"):
+        _own.drawer = SceneDrawer()
+    drawer: SceneDrawer = _own.drawer
+    return drawer.open(source, depth_strength, lens, on_ready, report_progress)
+
+
+class SceneDrawer:
+    """Shows one scene at a time, off screen; what it needs of GL is made with the first. Use as a context manager."""
+
+    def __init__(self) -> None:
+        self._view: SceneView | None = None
+        self._held = ExitStack()
+
+    def __enter__(self) -> SceneDrawer:
+        """Nothing more to do."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Free everything."""
+        self._held.close()
+
+    def open(
+        self,
+        source: Source,
+        depth_strength: float,
+        lens: LensChoice,
+        on_ready: Callable[[Scene], None],
+        report_progress: ReportProgress = ignore_progress,
+    ) -> ExportSource:
+        """See `OpenDrawn`. Raises InputError also where there is no GL."""
+        view = self._view = self._view or self._make_view()
+        request = SceneRequest(0, source, depth_strength, takes_drafts=False)
+        results = results_of(request, never, lambda: CENTRE, lambda made: made.report_to(report_progress))
+        ready = next(results)
+        assert isinstance(ready, SceneReady)
+        on_ready(ready.scene)
+        view.open(ready)
+        for made in results:
+            assert isinstance(made, ViewReady)
+            view.add(made.view)
+            view.upload_all()
+            made.progress.report_to(report_progress)
+        optics = lens.optics_on(ready.scene)
+        return ExportSource(ready.scene, ready.loaded, optics, self.draw, ignore_progress, never, view.centre)
+
+    def draw(self, settings: RenderSettings) -> NDArray[Any]:
+        """A picture of what is open, see `iibr_core.exports.source.Draw`."""
+        assert self._view is not None
+        require_size(settings.size_px)
+        prepare_gloss(self._view, settings.optics.gloss)
+        return self._view.picture(settings)
+
+    def _make_view(self) -> SceneView:
+        gl = create_headless("auto")
+        self._held.callback(gl.release)
+        view = SceneView(gl)
+        self._held.callback(view.release)
+        return view
+
+
+def prepare_gloss(view: SceneView, gloss: Gloss | None) -> None:
+    """Have at hand what this gloss means for the scene. Raises InputError where its surroundings cannot be read."""
+    request = view.gloss_request(gloss)
+    if request is not None:
+        view.take_gloss(answer(request))
