@@ -10,7 +10,7 @@ COMPILE := $(BIN)/python -P -m viewer.precompile iibr_core/_kernels
 READY := $(VENV)/.ready
 READY_TESTS := $(VENV)/.ready-tests
 
-.PHONY: run test bench fuzz install wheel clean
+.PHONY: run test bench figures fuzz install wheel clean
 
 # What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
@@ -31,6 +31,12 @@ bench: install
 	@.ci/system-libraries test
 	@mkdir -p "$(OUT)"
 	$(BIN)/python -m benchmarks.speed --out "$(OUT)" $(if $(DATA),--data "$(DATA)")
+
+# Every table and picture of README and docs/ anew. DATA: as above. ONLY: words of pages or programs, by commas.
+# ARGS: --list says what each needs, and how long it takes; --check which pages are older than what they are about.
+figures: install
+	@.ci/system-libraries test
+	$(BIN)/python -m benchmarks.figures $(if $(DATA),--data "$(DATA)") $(if $(ONLY),--only "$(ONLY)") $(ARGS)
 
 fuzz: install
 	@.ci/system-libraries test

@@ -1,17 +1,15 @@
 """Processor time of making fields, in turns with a plain warp of the same views, in one process.
 
-    python -m benchmarks.against_warp [--data DATA] [--only NAME,...] [--repeats 3] [--warp FILE.py]
+    python -m benchmarks.against_warp [--data DATA] [--only NAME,...] [--repeats 3]
 
 Scenes of DATA are made with 9 x 9 views at their own disparity; the demo photo comes along, with the parallax that the
-plan gives it. --warp: a file with `render(photo, disparity, s, t)` to compare with, otherwise
-`iibr_core.evaluation.reference_warp`. Ratios are medians over rounds: other programs disturb them little.
+plan gives it. The warp is `iibr_core.evaluation.reference_warp`. Ratios are medians over rounds: other programs disturb
+them little.
 """
 
 from __future__ import annotations
 
-import importlib
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -23,20 +21,16 @@ from benchmarks.harness.timing import cost_of, in_turns, make_field, median_cost
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.generation.plan import plan_literal
-from iibr_core.types import FloatImage, Quality, ViewOffset
-
-Warp = Callable[[FloatImage, FloatImage, ViewOffset], object]
+from iibr_core.types import Quality
 
 
 def main() -> None:
     parser = parser_of(__doc__, "data", "only", "repeats")
     parser.add_argument("--qualities", default="fast,balanced")
-    parser.add_argument("--warp", type=Path)
     options = parser.parse_args()
-    warp = warp_of_file(options.warp) if options.warp else reference_warp
     qualities = options.qualities.split(",")
     wanted = (scene for scene in scenes(options.data) if is_wanted(scene.name, options.only))
-    rows = (compare(scene, qualities, warp, options.repeats) for scene in wanted)
+    rows = (compare(scene, qualities, options.repeats) for scene in wanted)
     emit(
         chain([head("scene", "the plan's", "warp, s", *(f"{quality}, times the warp" for quality in qualities))], rows)
     )
@@ -51,29 +45,21 @@ def scenes(data: Path | None) -> Iterator[BenchScene]:
         yield replace(scene, disparity=refine(scene.photo, scene.disparity), field=offsets_of(FIELD))
 
 
-def compare(scene: BenchScene, qualities: list[Quality], warp: Warp, repeats: int) -> str:
+def compare(scene: BenchScene, qualities: list[Quality], repeats: int) -> str:
     """A line of the table."""
 
     def warp_all() -> None:
         for at in scene.field:
-            warp(scene.photo, scene.disparity, at)
+            reference_warp(scene.photo, scene.disparity, at)
 
     for quality in qualities:  # compiles
         make_field(scene, quality)
-    warp(scene.photo, scene.disparity, scene.field[0])
+    reference_warp(scene.photo, scene.disparity, scene.field[0])
     ways = {"warp": warp_all, **{quality: partial(make_field, scene, quality) for quality in qualities}}
     costs = in_turns({name: partial(cost_of, way) for name, way in ways.items()}, repeats)
     ratios = (f"{median_ratio(costs[quality], costs['warp']):.2f}" for quality in qualities)
     planned = plan_literal(*scene.given, scene.grid).quality
     return row(scene.name, planned, f"{median_cost(costs['warp']).cpu_s:.2f}", *ratios)
-
-
-def warp_of_file(path: Path) -> Warp:
-    """The warp that a file's `render(photo, disparity, s, t)` does."""
-    # By its name: what it keeps compiled looks for that.
-    sys.path.insert(0, str(path.parent))
-    module = importlib.import_module(path.stem)
-    return lambda photo, disparity, at: module.render(photo, disparity, at.s, at.t)
 
 
 if __name__ == "__main__":

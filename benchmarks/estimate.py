@@ -13,19 +13,16 @@ import shutil
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import psutil
 
 from benchmarks.harness.report import emit, head, holds, parser_of, row, start, title
 from benchmarks.harness.scenes import DEMO
-from benchmarks.harness.timing import Cost, added_bytes, median_cost
-from benchmarks.window import is_settled, settle
+from benchmarks.harness.timing import Cost, added_bytes, in_own_process, median_cost
+from benchmarks.harness.window import is_settled, open_window, settle
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
@@ -34,9 +31,6 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.tiling import never
 from iibr_core.scenes.scene import Source
 from iibr_core.types import ImageSize, InputError
-from tests.xvfb import private_display
-from viewer.app.main_loop import App, initial_state
-from viewer.model.actions import OpenPath
 from viewer.model.state.model_download import UseModel
 
 THREADS, SIDE = 2, 518
@@ -44,7 +38,6 @@ LOAD_S, ESTIMATE_S, ADDED_MB, TURN_MS = 1.5, 1.2, 700, 50
 """Wanted: no more than that."""
 BACKBONE = {"image_size": SIDE, "hidden_size": 384, "num_attention_heads": 6, "out_indices": [3, 6, 9, 12]}
 """Of Depth Anything V2 Small; all else is what the library takes unless told."""
-Result = TypeVar("Result")
 
 
 def main() -> None:
@@ -83,12 +76,6 @@ def report(photo: Path, model: Path, repeats: int) -> Iterator[str]:
     yield row("turns of the loop meanwhile", f"<= {TURN_MS} ms of processor time", said, holds(slow == 0))
 
 
-def in_own_process(work: Callable[..., Result], *args: object) -> Result:
-    """What work(*args) gives, in a process that ends with it."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as process:
-        return process.submit(work, *args).result()
-
-
 def save_model(file: Path) -> None:
     """The architecture as an ONNX file; the same random weights each time."""
     import torch
@@ -121,19 +108,15 @@ def turns_while_estimating(photo: Path, model: Path) -> list[float]:
     depth. Raises InputError where it gives none.
     """
     turns: list[float] = []
-    with private_display():
-        app = App(initial_state(OpenPath(Source(str(photo)))))
-        try:
-            settle(app)
-            app.do(UseModel(str(model)))
-            while not (app.state.scene and app.state.scene.depth_model and is_settled(app)):
-                before = time.thread_time()
-                app.step()
-                turns.append((time.thread_time() - before) * 1e3)
-                if app.state.models.given_up:
-                    raise InputError(app.state.notices[-1].text)
-        finally:
-            app.close()
+    with open_window(Source(str(photo))) as app:
+        settle(app)
+        app.do(UseModel(str(model)))
+        while not (app.state.scene and app.state.scene.depth_model and is_settled(app)):
+            before = time.thread_time()
+            app.step()
+            turns.append((time.thread_time() - before) * 1e3)
+            if app.state.models.given_up:
+                raise InputError(app.state.notices[-1].text)
     return turns
 
 

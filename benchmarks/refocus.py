@@ -1,21 +1,16 @@
 """Time of a refocused picture, in alternation with the plainest shift-and-sum shader on the same views.
 
-    python -m benchmarks.refocus --data FOLDER [--radius 2] [--size 768x512] [--repeats 3] [--yardstick SCRIPT]
+    python -m benchmarks.refocus --data FOLDER [--radius 2] [--size 768x512] [--repeats 3]
 
-FOLDER is a light field of any layout; it may hold the centre view's disparity as *.npy. --yardstick: a script of its
-own that takes --data, --radius and --size and prints "min <milliseconds> ms"; it is run once a round.
+FOLDER is a light field of any layout; it may hold the centre view's disparity as *.npy.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -110,18 +105,10 @@ def milliseconds(ctx: moderngl.Context, draw: Callable[[float], None]) -> list[f
     return [1e3 * cost_of(partial(picture, k)).wall_s for k in range(FRAMES + 2)][2:]
 
 
-def yardstick_ms(script: Path, args: argparse.Namespace) -> float:
-    """Least time the yardstick script reports."""
-    command = [sys.executable, str(script), "--radius", str(args.radius), "--size", args.size, "--data", str(args.data)]
-    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return float(re.findall(r"min ([\d.]+) ms", output)[0])
-
-
 def main() -> None:
     parser = parser_of(__doc__, "repeats", data={"required": True, "help": "a light field of any layout"})
     parser.add_argument("--radius", type=float, default=2.0, help="of the aperture, in view steps")
     parser.add_argument("--size", default="768x512")
-    parser.add_argument("--yardstick", type=Path)
     emit(report(parser.parse_args()))
 
 
@@ -145,8 +132,6 @@ def report(args: argparse.Namespace) -> Iterator[str]:
         times.setdefault("plain shader", []).extend(milliseconds(gl.ctx, plain))
         for renderer.prefilter, name in ((True, "picture, smoothing on"), (False, "picture, smoothing off")):
             times.setdefault(name, []).extend(milliseconds(gl.ctx, ours))
-        if args.yardstick:
-            times.setdefault("yardstick script", []).append(yardstick_ms(args.yardstick, args))
     yield f"{gl.renderer}, {args.size}, aperture radius {args.radius:g} views, focus at {focus:.1f} px per view step\n"
     yield head("what", "least, ms", "median, ms", "times the plain one")
     for name, each in times.items():

@@ -10,29 +10,27 @@ programs make frames wait, and only the second tells what this one costs.
 
 from __future__ import annotations
 
-import argparse
 import random
-import subprocess
-import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import psutil
 
+from benchmarks.harness.report import emit, head, parser_of, row, start
+from benchmarks.harness.scenes import write_photo
+from benchmarks.harness.timing import in_own_process
+from benchmarks.harness.window import open_window
 from iibr_core.exports.options import ExportOptions
-from iibr_core.formats.images.photo import write_image
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.xvfb import private_display
-from viewer.app.main_loop import App, initial_state
+from viewer.app.main_loop import App
 from viewer.model.actions import Action, DismissNotices, DoTask, EndGesture, OpenPath, Redo, ShowPrompt, Undo
 from viewer.model.free_camera import LeaveCamera, MoveCamera
 from viewer.model.state.depth_editing import Paint
@@ -48,246 +46,215 @@ SIZES = (600, 900), (700, 600), (480, 720), (640, 960), (512, 512), (560, 840)
 GRIDS = 5, 7, 9
 FRAMES_A_STEP = 3
 SLOW_FRAME_S = 0.25
-RESTS_AFTER, REST_S = 10, 600.0
+RESTS_AFTER, OPEN_S = 10, 60.0
 COUNTED_AFTER = 10, 100, 250, 500, 1000, 2000
 MIB = 2**20
-
-
-def make_photos(folder: Path) -> None:
-    """Photos with a near shape before a wall, and their maps beside them."""
-    for i, (height, width) in enumerate(SIZES):
-        rng = np.random.default_rng(i)
-        coarse = rng.integers(40, 220, (-(-height // 6), -(-width // 6), 3))
-        disparity = np.full((height, width), -1.0, np.float32)
-        disparity[height // 4 : 3 * height // 4, width // 3 : 2 * width // 3] = 2.0
-        write_image(folder / f"photo{i}.png", coarse.repeat(6, 0).repeat(6, 1)[:height, :width].astype(np.uint8))
-        np.save(folder / f"photo{i}_disparity.npy", disparity)
+EXPORTS = (
+    ("gif", ".gif", ExportOptions(size=ScreenSize(120, 80), frames=6)),
+    ("rgbd", ".png", ExportOptions()),
+    ("anaglyph", ".png", ExportOptions(size=ScreenSize(240, 160))),
+)
 
 
 class User:
-    """Does one thing a step. frames: seconds (wall, processor) of those while nothing was opened."""
+    """Shows frames of a window. frames: seconds (wall, processor) of those while nothing was opened, and what was done.
+    out: folder to save to.
+    """
 
     def __init__(self, app: App, out: Path, seed: int = 0) -> None:
-        self.app, self.out = app, out
+        self.app, self.out, self.random = app, out, random.Random(seed)
         self.frames: list[tuple[float, float, str]] = []
-        self._random = random.Random(seed)
         self._doing = ""
 
     def step(self) -> None:
-        """Do something."""
-        often = self.drag, self.focus, self.brush, self.undo
-        seldom = (
-            self.zoom, self.overlay, self.inspect, self.compare, self.gloss, self.turn_camera, self.save, self.export,
-            self.switch, self.change_grid,
-        )  # fmt: skip
-        thing: Callable[[], None] = self._random.choice((*often, *often, *seldom))
-        self._doing = thing.__name__
-        thing()
+        """Do something, often what is often done."""
+        self._doing = self.random.choice(2 * OFTEN + SELDOM)
+        if self._doing in ASKED:
+            self.do(*ASKED[self._doing](self))
+        else:
+            DONE[self._doing](self)
 
-    def drag(self) -> None:
-        """Move the viewpoint, frame by frame."""
-        for _ in range(FRAMES_A_STEP):
-            self.do(MoveEye(ViewOffset(self._random.uniform(-2, 2), self._random.uniform(-2, 2))))
-
-    def focus(self) -> None:
-        """Click somewhere with some aperture."""
-        self.do(FocusOn((0.0, 0.0), self._random.uniform(-2, 2)), SetAperture(self._random.uniform(0, 4)), EndGesture())
-
-    def brush(self) -> None:
-        """A stroke."""
-        x, y = (self._random.uniform(0.1, 0.8) for _ in "xy")
-        for k in range(FRAMES_A_STEP):
-            self.do(Paint((x + 0.03 * k, y)))
-        self.do(EndGesture())
-
-    def undo(self) -> None:
-        """Take some edits back, or do the last again."""
-        self.do(*self._random.choice(([Undo()], 3 * [Undo()], [Redo()])), EndGesture())
-
-    def zoom(self) -> None:
-        """Look closer, or at the whole."""
-        at = self._random.uniform(0.2, 0.8), self._random.uniform(0.2, 0.8)
-        self.do(SetZoom(self._random.choice((None, Zoom(self._random.uniform(1, 3), at)))))
-
-    def overlay(self) -> None:
-        """Lay something over the picture, or take it away."""
-        self.do(SetOverlay(self._random.choice((None, *OVERLAYS))))
-
-    def inspect(self) -> None:
-        """Show or hide EPIs and the sheet of views."""
-        state = self.app.state.inspection
-        self.do(self._random.choice((ShowEpis(not state.shows_epis), ShowGrid(not state.shows_grid))))
-
-    def compare(self) -> None:
-        """With the photo, the best quality, a state that was kept; or no longer."""
-        self.do(KeepState(), Compare(self._random.choice((None, "photo", "quality", "kept", "difference"))))
-
-    def gloss(self) -> None:
-        """Make what is near glossy, or nothing."""
-        self.do(SetGloss(self._random.choice((None, Gloss(roughness=self._random.uniform(0.1, 0.6))))))
-
-    def turn_camera(self) -> None:
-        """Leave the plane of views, and come back some frames later."""
-        self.do(MoveCamera(right=self._random.uniform(-0.3, 0.3), forward=self._random.uniform(0, 0.3)))
-        self.do(LeaveCamera())
-
-    def save(self) -> None:
-        """Save a picture and wait for it."""
-        self.do(DoTask(SaveTask(str(self.out / "picture.png"), ScreenSize(270, 180), may_replace=True)))
-        self.until(lambda: not self.app.state.jobs and not self.app.state.tasks)
-        self.do(DismissNotices())
-
-    def export(self) -> None:
-        """Export something small; what is asked for too early is refused."""
-        kind, ending, options = self._random.choice(
-            (
-                ("gif", ".gif", ExportOptions(size=ScreenSize(120, 80), frames=6)),
-                ("rgbd", ".png", ExportOptions()),
-                ("anaglyph", ".png", ExportOptions(size=ScreenSize(240, 160))),
-            )
-        )
-        self.do(DoTask(ExportTask(kind, str(self.out / f"{kind}{ending}"), options, may_replace=True)))
-        self.do(ShowPrompt(None))
-
-    def switch(self) -> None:
-        """Another photo of the folder."""
-        source = self.app.state.source
-        name = Path(source.path).stem if source else "photo0"
-        last = name == f"photo{len(SIZES) - 1}"
-        self.do(ResetOptics(), StepPhoto(1 - len(SIZES) if last else 1))
-        self.until(self.is_open)
-
-    def go_back(self) -> None:
-        """The first photo as it was opened, nothing else looked at."""
-        source = self.app.state.source
-        assert source is not None
-        first = replace(source, path=str(Path(source.path).with_name("photo0.png")), grid=None)
-        self.do(SetOverlay(None), Compare(None), ShowEpis(False), ShowGrid(False), SetZoom(None))
-        self.do(ResetOptics(), SetGloss(None), OpenPath(first))
-        self.until(self.is_open)
-
-    def change_grid(self) -> None:
-        """More views, or fewer."""
-        source = self.app.state.source
-        if source is not None:
-            side = self._random.choice(GRIDS)
-            self.do(OpenPath(replace(source, grid=GridShape(side, side))))
-            self.until(self.is_open)
-
-    def is_open(self) -> bool:
-        """Whether what was asked for is open."""
-        state = self.app.state
-        return state.scene is not None and state.scene.source is state.source
-
-    def is_resting(self) -> bool:
-        """Whether nothing is going on any more."""
-        state = self.app.state
-        is_busy = bool(state.jobs or state.tasks)
-        return self.is_open() and state.progress.is_complete and self.app.wait_s > 0 and not is_busy
+    def between(self, low: float, high: float) -> float:
+        """A random number."""
+        return self.random.uniform(low, high)
 
     def do(self, *actions: Action) -> None:
         """Ask for this, and show a frame."""
         self.app.do(*actions)
         self.frame()
 
-    def until(self, condition: Callable[[], bool], most_s: float = 60.0) -> None:
+    def until(self, condition: Callable[[], bool], most_s: float = OPEN_S) -> None:
         """Show frames until it is so, for so long at most."""
         end = time.perf_counter() + most_s
         while not condition() and time.perf_counter() < end:
             self.frame()
 
+    def open(self, *actions: Action) -> None:
+        """Ask for another scene and wait for it."""
+        self.do(*actions)
+        self.until(self.is_open)
+
+    def is_open(self) -> bool:
+        """Whether what was asked for is open."""
+        state = self.app.state
+        return state.scene is not None and state.scene.source is state.source
+
+    def rest(self) -> None:
+        """Show frames until nothing is going on any more."""
+        app, is_open = self.app, self.is_open
+        while not (is_open() and app.state.progress.is_complete and app.wait_s > 0 and not app.state.jobs):
+            self.frame()
+
     def frame(self) -> None:
         """A turn of the loop, as long as it takes without the sleep it begins with."""
         waits = self.app.wait_s > 0
-        start, used, was_open = time.perf_counter(), time.thread_time(), self.is_open()
+        began, used, was_open = time.perf_counter(), time.thread_time(), self.is_open()
         self.app.step()
         if was_open and self.is_open() and not waits and self._doing not in ("switch", "change_grid"):
-            self.frames.append((time.perf_counter() - start, time.thread_time() - used, self._doing))
+            self.frames.append((time.perf_counter() - began, time.thread_time() - used, self._doing))
+
+
+def drag(user: User) -> None:
+    for _ in range(FRAMES_A_STEP):
+        user.do(MoveEye(ViewOffset(user.between(-2, 2), user.between(-2, 2))))
+
+
+def brush(user: User) -> None:
+    x, y = user.between(0.1, 0.8), user.between(0.1, 0.8)
+    for k in range(FRAMES_A_STEP):
+        user.do(Paint((x + 0.03 * k, y)))
+    user.do(EndGesture())
+
+
+def turn_camera(user: User) -> None:
+    user.do(MoveCamera(right=user.between(-0.3, 0.3), forward=user.between(0, 0.3)))
+    user.do(LeaveCamera())
+
+
+def save(user: User) -> None:
+    user.do(DoTask(SaveTask(str(user.out / "picture.png"), ScreenSize(270, 180), may_replace=True)))
+    user.until(lambda: not user.app.state.jobs and not user.app.state.tasks)
+    user.do(DismissNotices())
+
+
+def export(user: User) -> None:
+    """What is asked for too early is refused."""
+    kind, ending, options = user.random.choice(EXPORTS)
+    user.do(DoTask(ExportTask(kind, str(user.out / f"{kind}{ending}"), options, may_replace=True)))
+    user.do(ShowPrompt(None))
+
+
+def switch(user: User) -> None:
+    source = user.app.state.source
+    is_last = source is not None and Path(source.path).stem == f"photo{len(SIZES) - 1}"
+    user.open(ResetOptics(), StepPhoto(1 - len(SIZES) if is_last else 1))
+
+
+def change_grid(user: User) -> None:
+    source, side = user.app.state.source, user.random.choice(GRIDS)
+    if source is not None:
+        user.open(OpenPath(replace(source, grid=GridShape(side, side))))
+
+
+ASKED: dict[str, Callable[[User], Sequence[Action]]] = {
+    "focus": lambda u: (FocusOn((0.0, 0.0), u.between(-2, 2)), SetAperture(u.between(0, 4)), EndGesture()),
+    "undo": lambda u: (*u.random.choice(([Undo()], 3 * [Undo()], [Redo()])), EndGesture()),
+    "zoom": lambda u: [
+        SetZoom(u.random.choice((None, Zoom(u.between(1, 3), (u.between(0.2, 0.8), u.between(0.2, 0.8))))))
+    ],
+    "overlay": lambda u: [SetOverlay(u.random.choice((None, *OVERLAYS)))],
+    "epis": lambda u: [ShowEpis(not u.app.state.inspection.shows_epis)],
+    "all views": lambda u: [ShowGrid(not u.app.state.inspection.shows_grid)],
+    "compare": lambda u: (KeepState(), Compare(u.random.choice((None, "photo", "quality", "kept", "difference")))),
+    "gloss": lambda u: [SetGloss(u.random.choice((None, Gloss(roughness=u.between(0.1, 0.6)))))],
+}
+"""What is one frame."""
+DONE = {f.__name__: f for f in (drag, brush, turn_camera, save, export, switch, change_grid)}
+OFTEN = ("drag", "focus", "brush", "undo")
+SELDOM = tuple(sorted({*ASKED, *DONE} - {*OFTEN}))
+
+
+def go_back(user: User) -> None:
+    """The first photo as it was opened, nothing else looked at."""
+    source = user.app.state.source
+    assert source is not None
+    first = replace(source, path=str(Path(source.path).with_name("photo0.png")), grid=None)
+    user.do(SetOverlay(None), Compare(None), ShowEpis(False), ShowGrid(False), SetZoom(None))
+    user.open(ResetOptics(), SetGloss(None), OpenPath(first))
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "seed")
     parser.add_argument("--steps", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--fresh", nargs=3, metavar=("PHOTO", "ROWS", "COLUMNS"), help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
+    options = parser.parse_args()
     limit_arenas()  # as the program does
-    if arguments.fresh:
-        path, *views = arguments.fresh
-        print(memory_of_fresh_window(path, GridShape(*map(int, views))))
-        return
-    with tempfile.TemporaryDirectory() as name, private_display():
-        folder, out = Path(name) / "photos", Path(name)
+    emit(report(options.steps, options.seed))
+
+
+def report(steps: int, seed: int) -> Iterator[str]:
+    threads_before = threading.active_count()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "photos"
         folder.mkdir()
-        make_photos(folder)
-        threads_before = threading.active_count()
-        app = App(initial_state(OpenPath(Source(str(folder)))))
-        user = User(app, out, arguments.seed)
-        try:
-            user.until(lambda: user.is_open() and app.state.folder is not None)
-            user.do(ShowFilmstrip(True))
+        for i, size in enumerate(SIZES):
+            write_photo(folder / f"photo{i}.png", size, i)
+        with open_window(Source(str(folder))) as app:
+            user = User(app, Path(name), seed)
+            open_first(user)
             user.frames.clear()
-            take_steps(user, arguments.steps)
-        finally:
-            app.close()
-        left = threading.active_count() - threads_before
-    print_frames(user.frames)
-    print(f"threads of Python left when the window is closed: {left}")
+            yield from take_steps(user, steps)
+    yield from about_frames(user.frames)
+    yield f"Threads of Python left when the window is closed: {threading.active_count() - threads_before}."
+
+
+def open_first(user: User) -> None:
+    user.until(lambda: user.is_open() and user.app.state.folder is not None)
+    user.do(ShowFilmstrip(True))
 
 
 def memory_of_fresh_window(path: str, grid: GridShape) -> float:
     """MiB of this process once its window rests with a photo and all its views."""
-    with private_display() as _, tempfile.TemporaryDirectory() as out:
-        app = App(initial_state(OpenPath(Source(path, grid=grid))))
-        user = User(app, Path(out))
-        try:
-            user.until(lambda: user.is_open() and app.state.folder is not None)
-            user.do(ShowFilmstrip(True))
-            user.until(user.is_resting, REST_S)
-            return float(psutil.Process().memory_info().rss) / MIB
-        finally:
-            app.close()
+    limit_arenas()
+    with open_window(Source(path, grid=grid)) as app:
+        user = User(app, Path())
+        open_first(user)
+        user.rest()
+        return float(psutil.Process().memory_info().rss) / MIB
 
 
-def fresh_memory(user: User) -> float:
-    """The same in another process, with what this window shows."""
-    scene = user.app.state.scene
-    assert scene is not None
-    command = [sys.executable, "-m", "benchmarks.use", "--fresh", scene.source.path, *map(str, scene.grid)]
-    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-
-
-def take_steps(user: User, steps: int) -> None:
-    """Say what the process takes after some of them, and at the end."""
+def take_steps(user: User, steps: int) -> Iterator[str]:
+    """What the process takes after some of them, and at the end."""
     process = psutil.Process()
-    print("| after | memory, MiB | fresh, MiB | times | open files | threads |\n| --- | --- | --- | --- | --- | --- |")
 
-    def tell(when: str) -> None:
-        rss, fresh = process.memory_info().rss / MIB, fresh_memory(user)
-        cells = when, f"{rss:.0f}", f"{fresh:.0f}", f"{rss / fresh:.2f}", process.num_fds(), process.num_threads()
-        print(f"| {' | '.join(map(str, cells))} |", flush=True)
+    def line(when: str) -> str:
+        scene = user.app.state.scene
+        assert scene is not None
+        rss = process.memory_info().rss / MIB
+        fresh = in_own_process(memory_of_fresh_window, scene.source.path, scene.grid)
+        return row(when, f"{rss:.0f}", f"{fresh:.0f}", f"{rss / fresh:.2f}", process.num_fds(), process.num_threads())
 
+    yield head("after", "memory, MiB", "fresh, MiB", "times", "open files", "threads")
     for number in range(1, steps + 1):
         user.step()
         if number in COUNTED_AFTER or number == steps:
-            tell(f"{number} actions")
+            yield line(f"{number} actions")
         if number in (RESTS_AFTER, steps):
-            user.until(user.is_resting, REST_S)
-            tell(f"{number} actions, at rest")
-            user.go_back()
-            user.until(user.is_resting, REST_S)
-            tell(f"{number} actions, back at the first photo")
+            user.rest()
+            yield line(f"{number} actions, at rest")
+            go_back(user)
+            user.rest()
+            yield line(f"{number} actions, back at the first photo")
 
 
-def print_frames(frames: list[tuple[float, float, str]]) -> None:
+def about_frames(frames: list[tuple[float, float, str]]) -> Iterator[str]:
     """How long they took, and what the longest one did."""
+    yield "\n" + head("frames", "median, ms", "longest, ms", f"over {1e3 * SLOW_FRAME_S:.0f} ms")
     for what, index in (("wall time", 0), ("processor time", 1)):
         took = sorted(frame[index] for frame in frames)
         slow = sum(seconds > SLOW_FRAME_S for seconds in took)
-        median, longest = took[len(took) // 2] * 1e3, took[-1] * 1e3
-        print(f"frames, {what}: median {median:.0f} ms, longest {longest:.0f} ms, {slow} over 250")
-    print(f"the longest by processor time was while it did: {max(frames, key=lambda frame: frame[1])[2]}")
+        yield row(what, f"{took[len(took) // 2] * 1e3:.0f}", f"{took[-1] * 1e3:.0f}", slow)
+    yield f"\nThe longest by processor time was while it did: {max(frames, key=lambda frame: frame[1])[2]}."
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.use", main)

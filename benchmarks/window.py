@@ -19,11 +19,10 @@ import psutil
 
 from benchmarks.harness.report import emit, head, holds, parser_of, row, start
 from benchmarks.harness.scenes import DEMO
+from benchmarks.harness.window import open_window, settle
 from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
-from tests.xvfb import private_display
-from viewer.app.main_loop import App, initial_state
-from viewer.model.actions import OpenPath
+from viewer.app.main_loop import App
 from viewer.model.state.optics import SetAperture
 
 MOVES = 150
@@ -50,13 +49,9 @@ def main() -> None:
     parser.add_argument("--apertures", default="0,4")
     parser.add_argument("--idle", type=float, default=5.0, help="seconds")
     options = parser.parse_args()
-    with private_display():
-        began = time.perf_counter()
-        app = App(initial_state(OpenPath(Source(str(DEMO)))))
-        try:
-            emit(report(app, began, [float(aperture) for aperture in options.apertures.split(",")], options.idle))
-        finally:
-            app.close()
+    began = time.perf_counter()
+    with open_window(Source(str(DEMO))) as app:
+        emit(report(app, began, [float(aperture) for aperture in options.apertures.split(",")], options.idle))
 
 
 def report(app: App, began: float, apertures: list[float], idle_s: float) -> Iterator[str]:
@@ -80,19 +75,6 @@ def report(app: App, began: float, apertures: list[float], idle_s: float) -> Ite
     after, frames = process.cpu_times(), app.frames_shown - frames
     used = (after.user + after.system - before.user - before.system) / idle_s
     yield row(f"idle for {idle_s:g} s", "no frames", f"{frames} frames, {used:.2%} of a core", holds(frames == 0))
-
-
-def settle(app: App) -> None:
-    """Turn the loop until it is settled."""
-    while not is_settled(app):
-        app.step()
-
-
-def is_settled(app: App) -> bool:
-    """Whether every view is on the screen and nothing is left to do."""
-    state = app.state
-    is_made = state.progress.is_complete and state.shown_generation == state.generation
-    return is_made and app.wait_s > 0 and app.scene_view.shows_all_views()
 
 
 def drag(app: App) -> Drag:

@@ -12,7 +12,6 @@ import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
 
 COLUMNS = 2
 PANEL_INCHES = 3.9, 3.0
@@ -20,7 +19,6 @@ LEGEND_INCHES = 3.4
 LINE_INCHES = 0.21
 LOWEST_DB = -3.0
 FRONT_COLOR, OTHER_COLOR = "#c2410c", "#64748b"
-PNG_DPI = 110
 CELLS_PER_E, CELLS_PER_DB = 10, 5
 """Points within such a cell, of time and of gain, share one label: else labels hide each other."""
 
@@ -44,8 +42,8 @@ def on_the_front(points: Mapping[str, tuple[float, float]]) -> set[str]:
     return {name for name, (cost, gain) in points.items() if math.isfinite(cost * gain) and not is_beaten(name)}
 
 
-def plot_panels(panels: Sequence[Panel], formats: Sequence[str]) -> list[bytes]:
-    """The panels as files of these formats ("svg", "png"), with a legend of the numbers beside them."""
+def plot_panels(panels: Sequence[Panel], kind: str) -> bytes:
+    """The panels as a file of this kind ("svg", "png"), with a legend of the numbers beside them."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -61,13 +59,11 @@ def plot_panels(panels: Sequence[Panel], formats: Sequence[str]) -> list[bytes]:
             _draw_panel(axis, panel, names)
         for axis in axes[len(panels) :]:
             axis.axis("off")
-        _write_legend(legend, names)
-        return [_render(figure, kind) for kind in formats]
-
-
-def _write_legend(legend: SubFigure, names: Sequence[str]) -> None:
-    words = "\n".join(f"{k}  {name}" for k, name in enumerate(names, 1))
-    legend.text(0.02, 0.98, words, va="top", linespacing=1.4)
+        words = "\n".join(f"{k}  {name}" for k, name in enumerate(names, 1))
+        legend.text(0.02, 0.98, words, va="top", linespacing=1.4)
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind, metadata={"Date": None} if kind == "svg" else None)
+        return buffer.getvalue()
 
 
 def _draw_panel(axis: Axes, panel: Panel, names: Sequence[str]) -> None:
@@ -97,9 +93,3 @@ def _draw_panel(axis: Axes, panel: Panel, names: Sequence[str]) -> None:
     axis.set_xlabel(f"time / {panel.reference}")
     axis.set_ylabel(f"PSNR against {panel.reference}, dB")
     axis.grid(alpha=0.25, which="both")
-
-
-def _render(figure: Figure, kind: str) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata={"Date": None} if kind == "svg" else None)
-    return buffer.getvalue()

@@ -7,6 +7,8 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from iibr_core.types import InputError
 WITH_CHANGES = " (with changes)"
 """After a commit's name: the files were not what that commit has."""
 DOCS = Path(__file__).parents[2] / "docs"
+NO_PAGES = (":/", ":(top,exclude)*.md", ":(top,exclude)docs/*.png", ":(top,exclude)docs/*.svg")
 COMMON: dict[str, dict[str, Any]] = {
     "data": {"type": Path, "metavar": "DIR", "help": "a scene as `iibr evaluate` takes it, or a folder of them"},
     "out": {"type": Path, "help": "file for the report, which is printed, too"},
@@ -62,21 +65,33 @@ def emit(lines: Iterable[str], out: Path | None = None) -> None:
 
 def title(words: str, module: str, more: str = "") -> str:
     """What a report begins with: heading, command, commit, machine."""
-    return f"# {words}\n\n{made_by(module)}, on {CORES} cores.{more and ' ' + more}\n"
+    return f"# {words}\n\n{made_by(['python', '-m', module, *sys.argv[1:]])}.{more and ' ' + more}\n"
 
 
-def made_by(module: str) -> str:
-    """The run in words: `python -m module ...` with its options, and the commit where it is known; no full stop."""
-    command = shlex.join(["python", "-m", module, *sys.argv[1:]])
+def made_by(command: Sequence[str]) -> str:
+    """A command, the commit where it is known, the machine; no full stop. Folders of scenes are called DATA."""
+    words = [
+        Path(command[0]).name,
+        *("DATA" if before == "--data" else word for before, word in pairwise(command)),
+    ]
     commit = current_commit()
-    return f"Made by `{command}`" + (f" at commit {commit}" if commit else "")
+    return f"Made by `{shlex.join(words)}`{commit and ' at commit ' + commit}, on {CORES} cores"
 
 
+@cache
 def current_commit() -> str:
-    """The commit checked out, short; "" outside a checkout. Changes that are not committed are said."""
-    command = ["git", "describe", "--always", "--exclude=*", f"--dirty={WITH_CHANGES}"]
+    """The commit checked out, short; "" outside a checkout. Changes that are not committed are said, but for those of
+    pages and pictures: they are what is being made.
+    """
+    name = git("rev-parse", "--short", "HEAD")
+    changes = git("status", "--porcelain", "--untracked-files=no", "--", *NO_PAGES)
+    return name and name + (WITH_CHANGES if changes else "")
+
+
+def git(*words: str) -> str:
+    """What git says, "" where it fails."""
     try:
-        run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
+        run = subprocess.run(["git", *words], cwd=DOCS, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         return ""
     return run.stdout.strip()

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import psutil
@@ -28,6 +29,7 @@ from iibr_core.generation.plan import plan_literal
 from iibr_core.types import FloatImage, Quality, ReportProgress, StoredColors, ignore_progress
 
 COMMAND_LINE = (sys.executable, "-P", "-m", "viewer")
+Result = TypeVar("Result")
 PEAK_RESET, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
 
 
@@ -100,6 +102,12 @@ def field_costs(
         make_field(scene, quality)
     ways = {name: partial(cost_of, partial(make_field, *each)) for name, each in scenes.items()}
     return {name: median_cost(found) for name, found in in_turns(ways, repeats, report_progress).items()}
+
+
+def in_own_process(work: Callable[..., Result], *args: object) -> Result:
+    """What work(*args) gives, in a process that ends with it."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as process:
+        return process.submit(work, *args).result()
 
 
 def peak_bytes(work: Callable[..., object], *args: object) -> float:

@@ -1,8 +1,7 @@
-"""What the bench measured as Markdown and as a plot: speed.md, speed.svg, speed.png."""
+"""What the bench measured as Markdown and as a plot: speed.md, speed.svg."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +14,13 @@ from benchmarks.harness.timing import Cost
 from iibr_core.evaluation.tables import number
 from iibr_core.formats.outputs import atomic_write
 
-MIB = 2**20
 FRONT_MARK = "●"
 
 
 @dataclass(frozen=True)
 class Measured:
     """One way of doing the same. ratio: of processor time, to the reference's. psnr_db, flip: means over the judged.
-    samples: points of the lens that a picture is made of. peak_bytes: beyond what was there before.
+    samples: points of the lens that a picture is made of.
     """
 
     name: str
@@ -31,7 +29,6 @@ class Measured:
     psnr_db: float
     flip: float
     samples: int = 0
-    peak_bytes: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -91,18 +88,24 @@ class Bench:
     targets: tuple[SpeedTarget, ...]
     machine: str = ""
 
+    @property
+    def kinds(self) -> list[tuple[str, list[Figures]]]:
+        """Scenes with their own maps, and with soft ones; each with a title."""
+        names = {False: "maps as they are", True: "soft maps"}
+        found = ((name, [s for s in self.scenes if s.is_soft == is_soft]) for is_soft, name in names.items())
+        return [(f"Mean over scenes, {name}", scenes) for name, scenes in found if scenes]
+
 
 def write_bench(folder: Path, bench: Bench) -> list[Path]:
-    """Write speed.md, speed.svg and speed.png into an existing folder, each whole or not at all; return their paths.
+    """Write speed.md and speed.svg into an existing folder, each whole or not at all; return their paths.
 
     Raises InputError where that cannot be done.
     """
-    pictures = plot_panels(panels(bench), ("svg", "png"))
-    paths = [folder / "speed.md", folder / "speed.svg", folder / "speed.png"]
-    for path, content in zip(paths, (markdown_of(bench).encode(), *pictures)):
-        with atomic_write(path) as temporary:
+    made = {"speed.md": markdown_of(bench).encode(), "speed.svg": plot_panels(panels(bench), "svg")}
+    for name, content in made.items():
+        with atomic_write(folder / name) as temporary:
             temporary.write_bytes(content)
-    return paths
+    return [folder / name for name in made]
 
 
 def means(scenes: Sequence[Figures]) -> dict[str, tuple[float, float, float]]:
@@ -116,19 +119,18 @@ def means(scenes: Sequence[Figures]) -> dict[str, tuple[float, float, float]]:
     return found
 
 
-HEAD = (
-    "Time is of the whole field, processor time against that of *fast* in the same round (median of rounds). Memory is"
-    f" what a run takes beyond what was there: rays, views in flight and those kept. {FRONT_MARK}: on the Pareto front,"
-    " where nothing else is as cheap and better, or as good and cheaper. Colours are looked up by cubic interpolation"
-    " and kept in 32-bit floats until a view is stored: neither has a switch."
-)
+HEAD = f"""Time is of the whole field, processor time against that of *fast* in the same round (median of rounds).
+{FRONT_MARK}: on the Pareto front, where nothing else is as cheap and better, or as good and cheaper.
+Colours are looked up by cubic interpolation and kept in 32-bit floats until a view is stored: neither has a switch.
+
+![Time against PSNR of every variant](speed.svg)
+"""
 
 
 def markdown_of(bench: Bench) -> str:
     """All tables. The first, the means over the scenes, is what to show elsewhere."""
-    parts = [title("Speed against error", "benchmarks.speed", bench.machine), f"{HEAD}\n"]
-    parts.append("![Time against PSNR of every variant](speed.svg)\n")
-    parts += (f"## {what}\n\n{means_table(scenes)}\n" for what, scenes in _kinds(bench.scenes))
+    parts = [title("Speed against error", "benchmarks.speed", bench.machine), HEAD]
+    parts += (f"## {what}\n\n{means_table(scenes)}\n" for what, scenes in bench.kinds)
     parts += (f"## {each.what}\n\n{each.about}\n\n{table(each)}\n" for each in (*bench.scenes, *bench.drawings))
     rows = ((target.what, target.target, target.measured, holds(target.is_met)) for target in bench.targets)
     parts.append(f"## Targets\n\n{markdown(('figure', 'target', 'measured', 'holds'), rows)}\n")
@@ -148,34 +150,26 @@ def means_table(scenes: Sequence[Figures]) -> str:
 
 def table(figures: Figures) -> str:
     """Every way."""
-    front, first, is_field = figures.front, figures.measured[0].name, bool(figures.planned)
-    head = ("variant", "front", f"time / {first}", "ms", "peak MiB" if is_field else "samples", "PSNR dB", "FLIP")
+    head = ("variant", "front", f"time / {figures.measured[0].name}", "ms", "PSNR dB", "FLIP", "samples")
     rows = (
         (
-            *(m.name, FRONT_MARK * (m.name in front), f"{m.ratio:.2f}", f"{1e3 * m.cost.cpu_s:.0f}"),
-            *(number(m.peak_bytes / MIB, 0) if is_field else m.samples, number(m.psnr_db, 2), number(m.flip, 4)),
+            *(m.name, FRONT_MARK * (m.name in figures.front), f"{m.ratio:.2f}", f"{1e3 * m.cost.cpu_s:.0f}"),
+            *(number(m.psnr_db, 2), number(m.flip, 4), m.samples),
         )
         for m in figures.measured
     )
-    return markdown(head, rows)
-
-
-def _kinds(scenes: Iterable[Figures]) -> list[tuple[str, list[Figures]]]:
-    """Scenes with their own maps, and with soft ones; each with a title."""
-    own = [scene for scene in scenes if not scene.is_soft]
-    soft = [scene for scene in scenes if scene.is_soft]
-    kinds = (("Mean over scenes, maps as they are", own), ("Mean over scenes, soft maps", soft))
-    return [kind for kind in kinds if kind[1]]
+    shown = slice(-1 if figures.planned else None)  # fields have no samples
+    return markdown(head[shown], (row[shown] for row in rows))
 
 
 def panels(bench: Bench) -> list[Panel]:
     """Means over scenes, those scenes that have more variants, and drawing."""
     found = [
         Panel(what, {name: (ratio, gain) for name, (ratio, gain, _) in means(scenes).items()})
-        for what, scenes in _kinds(bench.scenes)
+        for what, scenes in bench.kinds
     ]
     shared = {name for panel in found for name in panel.points}
-    more = [scene for scene in bench.scenes if not scene.is_soft and not scene.gains.keys() <= shared]
+    more: Iterable[Figures] = (one for one in bench.scenes if not one.is_soft and not one.gains.keys() <= shared)
     for each in (*more, *bench.drawings):
         found.append(Panel(each.what.replace(", ", ",\n", 1), each.gains, each.measured[0].name))
     return found

@@ -58,4 +58,4 @@ def test_bad_input_ends_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_report_says_what_made_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["x.py", "--data", "a b"])
-    assert title("Words", "benchmarks.one").startswith("# Words\n\nMade by `python -m benchmarks.one --data 'a b'`")
+    assert title("Words", "benchmarks.one").startswith("# Words\n\nMade by `python -m benchmarks.one --data DATA`")

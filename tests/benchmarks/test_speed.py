@@ -322,12 +322,12 @@ def test_means_are_geometric_for_time(figures: tuple[Figures, ...]) -> None:
 
 
 def test_plots_are_pictures(figures: tuple[Figures, ...], tmp_path: Path) -> None:
-    svg, png = plot_panels(panels(bench_of(figures)), ("svg", "png"))
+    svg, png = (plot_panels(panels(bench_of(figures)), kind) for kind in ("svg", "png"))
     assert svg.startswith(b"<?xml")
     assert b"<svg" in svg
     picture = Image.open(io.BytesIO(png))
     assert picture.size[0] > 500
     assert len(np.unique(np.asarray(picture.convert("L")))) > 20
     paths = write_bench(tmp_path, bench_of(figures))
-    assert [path.name for path in paths] == ["speed.md", "speed.svg", "speed.png"]
+    assert [path.name for path in paths] == ["speed.md", "speed.svg"]
     assert sorted(tmp_path.iterdir()) == sorted(paths)

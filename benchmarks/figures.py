@@ -1,0 +1,195 @@
+"""Writes every table and picture of README and docs/ anew, at one commit: `make figures [DATA=DIR] [ONLY=WORDS]`.
+
+    python -m benchmarks.figures [--data DATA] [--only WORDS] [--list] [--check]
+
+FIGURES says which program makes what, what it needs and about how long it takes on two cores; what this machine lacks
+is said, and left as it is. A page is made whole, or between its marks, `<!-- NAME -->` and `<!-- /NAME -->`, and what
+people wrote around them stays. README's tables are copied from the pages. --list: says what there is. --check: says in
+a line each which pages are older than what shapes their figures; makes nothing.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from benchmarks.harness.pages import put_between
+from benchmarks.harness.readme import write_readme
+from benchmarks.harness.report import DOCS, git, is_wanted, made_by, markdown, parser_of, start
+from iibr_core.formats.outputs import atomic_write
+
+ROOT = DOCS.parent
+SHAPING = ("iibr_core", "viewer", "shaders", "assets", "benchmarks")
+"""Folders that decide figures."""
+COMMIT = re.compile(r"\bat commit ([0-9a-f]{7,40})\b")
+STAMP = re.compile(r"Made by `[^`]+`(?: at commit \w+(?: \(with changes\))?)?(?:, on \d+ cores)?")
+TIME_LIMIT_S = 7200.0
+"""One that hangs must not take hours of figures with it."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """places: pages and pictures below docs/, PAGE#MARK for a part. command: its words; DATA is the folder of scenes,
+    OUT one that it writes the places to; without OUT it prints them. minutes: on two cores. needs: of NEEDS.
+    """
+
+    places: tuple[str, ...]
+    command: str
+    minutes: float
+    needs: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> list[str]:
+        """As a person would type it."""
+        words = shlex.split(self.command)
+        return words if words[0] == "iibr" else ["python", *(["-m"] if words[0].startswith("bench") else []), *words]
+
+
+NEEDS = {
+    "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
+    "Linux": "Linux, which tells the most memory that a process filled",
+    "X": "Linux with Xvfb and xdotool",
+    "torch": "torch: pip install '.[train]'",
+}
+FIGURES = (
+    Figure(
+        ("evaluation/report.md",), "iibr evaluate DATA tests/data/thin_lens --views 24 --out OUT --force", 8, ("DATA",)
+    ),
+    Figure(("speed.md", "speed.svg"), "benchmarks.speed --data DATA --repeats 2 --out OUT", 15, ("DATA",)),
+    Figure(("depth.md",), "benchmarks.depth --data DATA", 4, ("DATA",)),
+    Figure(("stages.md",), "benchmarks.stages --data DATA", 20, ("DATA",)),
+    Figure(("tables/ablations.md",), "benchmarks.tables.ablations --data DATA --out OUT/ablations.md", 8, ("DATA",)),
+    Figure(
+        ("tables/trained.md",),
+        "benchmarks.tables.ablations --data DATA --weights out/trained --out OUT/trained.md",
+        28,
+        ("DATA", "torch"),
+    ),
+    Figure(("free_views.md#poses",), "benchmarks.free_views --scenes 8 --size 384x288 --seed 7", 2),
+    Figure(("figures.md#against-warp",), "benchmarks.against_warp --data DATA --repeats 2", 2, ("DATA",)),
+    Figure(("figures.md#first-picture",), "benchmarks.full_size", 3, ("Linux",)),
+    Figure(("figures.md#window",), "benchmarks.window", 1, ("X",)),
+    Figure(("figures.md#estimate",), "benchmarks.estimate", 2, ("X", "torch")),
+    Figure(("figures.md#cancelled",), "benchmarks.cancel --times 10", 2),
+    Figure(("figures.md#field-disparity",), "benchmarks.multi_view_depth --data DATA", 2, ("DATA",)),
+    Figure(("figures.md#refocus",), "benchmarks.refocus --data DATA/blender_shop_9x9", 1, ("DATA",)),
+    Figure(("figures.md#time-left",), "benchmarks.time_left", 4),
+    Figure(("figures.md#plan",), "benchmarks.prediction --data DATA --photos DATA", 6, ("DATA", "Linux")),
+    Figure(("memory.md#predicted",), "benchmarks.memory predicted", 3, ("Linux",)),
+    Figure(("memory.md#bounds",), "benchmarks.memory bounds 12 48", 10, ("Linux",)),
+    Figure(("memory.md#use",), "benchmarks.use --steps 250", 6, ("X",)),
+    Figure(("memory.md#day",), "benchmarks.memory day", 2, ("Linux",)),
+    Figure(("edges_fork.png", "edges_handlebar.png"), "docs/make_edges.py OUT", 0.5),
+    Figure(("screenshot.png", "inspection.png"), "docs/make_screenshots.py OUT", 0.5),
+)
+
+
+def main() -> None:
+    parser = parser_of(__doc__, "data", "only")
+    parser.add_argument("--list", action="store_true")
+    parser.add_argument("--check", action="store_true")
+    options = parser.parse_args()
+    wanted = [one for one in FIGURES if is_wanted(" ".join((*one.places, one.command)), options.only)]
+    if options.list:
+        rows = ((", ".join(one.places), f"`{one.command}`", ", ".join(one.needs), one.minutes) for one in wanted)
+        print(markdown(("docs/", "command", "needs", "minutes"), rows))
+    elif options.check:
+        faults = list(stale_pages())
+        print("\n".join(faults) or "every page is as new as what shapes its figures")
+        sys.exit(bool(faults))
+    else:
+        sys.exit(make_all(wanted, options.data and options.data.resolve()))
+
+
+def make_all(wanted: list[Figure], data: Path | None) -> bool:
+    """Make them one after the other and say how; whether one failed."""
+    failed = False
+    for figure in wanted:
+        name, lacking = ", ".join(figure.places), [NEEDS[need] for need in figure.needs if not has(need, data)]
+        if lacking:
+            print(f"{name}: left as it is; needs {', and '.join(lacking)}", flush=True)
+            continue
+        print(f"{name}: {figure.command} ...", flush=True)
+        begun = time.monotonic()
+        fault = make(figure, data)
+        failed |= bool(fault)
+        minutes = (time.monotonic() - begun) / 60
+        print(f"{name}: {fault or f'made in {minutes:.1f} minutes'}", flush=True)
+    for fault in write_readme(ROOT):
+        print(f"README.md: {fault}")
+    return failed
+
+
+def has(need: str, data: Path | None) -> bool:
+    """Whether it is here."""
+    return {
+        "DATA": data is not None,
+        "Linux": sys.platform == "linux",
+        "X": shutil.which("Xvfb") is not None and shutil.which("xdotool") is not None,
+        "torch": find_spec("torch") is not None,
+    }[need]
+
+
+def make(figure: Figure, data: Path | None) -> str:
+    """Run the program and write what it makes; why that failed, "" where it did not."""
+    with tempfile.TemporaryDirectory() as out:
+        folders = {"DATA": str(data), "OUT": out, "python": sys.executable, "iibr": f"{sys.executable}\0-m\0viewer"}
+        filled = (re.sub(r"^(DATA|OUT|python$|iibr$)", lambda m: folders[m[0]], word) for word in figure.words)
+        words = "\0".join(filled).split("\0")
+        try:
+            run = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=TIME_LIMIT_S, check=False)
+        except subprocess.TimeoutExpired:
+            return f"failed: did not end within {TIME_LIMIT_S:g} s"
+        if run.returncode:
+            return f"failed: ended with {run.returncode}"
+        for place in figure.places:
+            made = Path(out, Path(place).name)
+            if "OUT" not in figure.command:
+                write_page(place, figure, run.stdout)
+            elif made.suffix == ".md":
+                write_page(place, figure, made.read_text("utf-8"))
+            else:
+                with atomic_write(DOCS / place) as unfinished:
+                    shutil.copyfile(made, unfinished)
+    return ""
+
+
+def write_page(place: str, figure: Figure, text: str) -> None:
+    """Write a page, or its part; it says the command, once."""
+    name, _, mark = place.partition("#")
+    said = made_by(figure.words)
+    stamped, count = STAMP.subn(said, text.strip(), count=1)
+    text = stamped if count else f"{said}.\n\n{stamped}"
+    if mark:
+        text = put_between((DOCS / name).read_text("utf-8"), mark, text)
+    with atomic_write(DOCS / name) as unfinished:
+        unfinished.write_text(text.rstrip("\n") + "\n", "utf-8")
+
+
+def pages() -> Iterator[str]:
+    """The pages that FIGURES makes, each once."""
+    yield from dict.fromkeys(place.partition("#")[0] for one in FIGURES for place in one.places if ".md" in place)
+
+
+def stale_pages() -> Iterator[str]:
+    """A line for each page that names no commit, or one since which something that shapes figures changed."""
+    for page in pages():
+        for commit in dict.fromkeys(COMMIT.findall((DOCS / page).read_text("utf-8"))) or [""]:
+            later = git("rev-list", "--count", f"{commit}..HEAD", "--", *(f":/{folder}" for folder in SHAPING))
+            if later != "0" or not commit:
+                age = f"{later or 'unknown many'} commits behind" if commit else "says no commit"
+                yield f"docs/{page}: {commit and commit + ', '}{age}"
+    yield from (f"README.md: {fault}" for fault in write_readme(ROOT, only_check=True))
+
+
+if __name__ == "__main__":
+    start("benchmarks.figures", main)

@@ -1,0 +1,104 @@
+"""README's tables of figures: copied out of the pages of docs/, so that each figure stands in both alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+
+from benchmarks.harness.pages import cell, put_between, table
+from benchmarks.harness.report import markdown
+from iibr_core.formats.outputs import atomic_write
+from iibr_core.types import InputError
+
+CENTRE = "centre to all others"
+PARTS = "full", "visible", "hole"
+SOFT = "hci_antinous"
+SCENES = {
+    "HCI antinous, 9x9": "hci_antinous",
+    "Middlebury teddy": "mb2003_teddy_quarter",
+    "Middlebury moebius": "mb2005_moebius_third",
+    "Middlebury motorcycle": "mb2014_motorcycle_quarter",
+}
+
+
+def switches(docs: Path) -> str:
+    """Speed against error, the means over scenes."""
+    names, *rows = table(docs / "speed.md", "Mean over scenes, maps as they are", "front")
+    return markdown(names, rows)
+
+
+def views(docs: Path) -> str:
+    """From the centre view and the map of the scene."""
+    report = docs / "evaluation" / "report.md"
+
+    def words(scene: str, method: str) -> str:
+        full, seen, holes = (cell(report, f"{scene}: {CENTRE}", method, f"{part} dB") for part in PARTS)
+        return f"{full} dB ({seen}, {holes})"
+
+    rows = ((name, words(scene, "balanced"), words(scene, "reference warp")) for name, scene in SCENES.items())
+    return markdown((f"{CENTRE}: full frame (visible, holes)", "iibr", "resampling warp with background fill"), rows)
+
+
+def soft_maps(docs: Path) -> str:
+    """What maps that are not exact cost."""
+    names, *rows = table(docs / "depth.md", "Refinement", SOFT)
+    kept = [k for k, name in enumerate(names) if k == 0 or name.startswith(SOFT)]
+    return markdown([names[k] for k in kept], ([cells[k] for k in kept] for cells in rows))
+
+
+def figures(docs: Path) -> str:
+    """One line each."""
+    free, speed, memory = docs / "free_views.md", docs / "speed.md", docs / "memory.md"
+    field = partial(cell, docs / "figures.md", "field-disparity")
+    stop = partial(cell, docs / "figures.md", "cancelled", "fast")
+    lens = partial(cell, docs / "evaluation" / "report.md", row="balanced", column="path-traced lens")
+    warm = partial(cell, speed, "Targets", column="measured")
+    kept = [float(line[-1]) for line in table(memory, "predicted", "ratio")[1:]]
+    ours, warp = (cell(free, "poses", f"all | {way}", "frame dB") for way in ("ours", "resampled"))
+    rows = {
+        "[free cameras](docs/free_views.md), eight poses of eight scenes": f"{ours} dB; a resampling warp {warp} dB",
+        "a flat photo": "one view: nothing is made",
+        "81 views of 512x512, warm, *fast*": warm(row="9x9 of 512x512, hci_antinous, fast"),
+        "the same, *balanced*": warm(row="9x9 of 512x512, hci_antinous, balanced"),
+        "a cancelled job at 4 MP": f"ends after {stop('after, ms')} ms (median), {stop('longest')} ms at the longest",
+        "[memory](docs/memory.md) predicted, over what twelve commands took": f"{min(kept):.2f} to {max(kept):.2f}",
+        "two fields refocused, against a path-traced thin lens": " and ".join(
+            f"{lens(heading=f'{scene}: {CENTRE}')} dB" for scene in ("shelf", "fence")
+        ),
+        "HCI antinous without a map: disparity from its views": (
+            f"{field(SOFT, 'bad pixels')} % of pixels off by more than 0.07 px; {field(SOFT, 'whole')} s of processor"
+            " time"
+        ),
+    }
+    for scene in (SOFT, "blender_shop_9x9"):
+        drawn, blend = field(scene, "views held back"), field(scene, "plain blend")
+        rows[f"{scene}, every second view held back"] = f"drawn {drawn} dB, plain blend {blend} dB"
+    return markdown(("", ""), rows.items())
+
+
+TABLES: Mapping[str, Callable[[Path], str]] = {
+    "switches": switches,
+    "views": views,
+    "figures": figures,
+    "soft-maps": soft_maps,
+}
+"""By README's mark."""
+
+
+def write_readme(root: Path, only_check: bool = False) -> Iterator[str]:
+    """Copy the tables; say which could not be, or with only_check, which are not what the pages say."""
+    path = root / "README.md"
+    text = path.read_text("utf-8")
+    for mark, make in TABLES.items():
+        try:
+            made = put_between(text, mark, make(root / "docs"))
+        except InputError as error:
+            yield f"table {mark} stays: {error}"
+            continue
+        if only_check and made != text:
+            yield f"table {mark} is not what its page says"
+        text = made
+    if not only_check:
+        with atomic_write(path) as unfinished:
+            unfinished.write_text(text, "utf-8")

@@ -1,0 +1,36 @@
+"""The real window on a private X server, as programs look at it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from viewer.model.state.scene import Source
+
+from tests.xvfb import private_display
+from viewer.app.main_loop import App, initial_state
+from viewer.model.actions import OpenPath
+
+
+@contextmanager
+def open_window(source: Source) -> Iterator[App]:
+    """A window that has been asked for this."""
+    with private_display():
+        app = App(initial_state(OpenPath(source)))
+        try:
+            yield app
+        finally:
+            app.close()
+
+
+def settle(app: App) -> None:
+    """Turn the loop until it is settled."""
+    while not is_settled(app):
+        app.step()
+
+
+def is_settled(app: App) -> bool:
+    """Whether every view is on the screen and nothing is left to do."""
+    state = app.state
+    is_made = state.progress.is_complete and state.shown_generation == state.generation
+    return is_made and app.wait_s > 0 and app.scene_view.shows_all_views()
