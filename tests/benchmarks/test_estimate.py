@@ -30,6 +30,7 @@ def test_loading_and_running_are_told_apart(photo: Path) -> None:
     assert np.isnan(added) or added >= 0
 
 
+@pytest.mark.usefixtures("no_egl_context")
 def test_turns_are_counted_until_the_depth_is_the_models(photo: Path) -> None:
     turns = turns_while_estimating(photo, weighing(photo.with_name("model.onnx"), (1, 0, 0)))
     assert len(turns) > 2
@@ -37,6 +38,7 @@ def test_turns_are_counted_until_the_depth_is_the_models(photo: Path) -> None:
     assert list((photo.parent / "cache").glob("*.npz")), "the model was asked"
 
 
+@pytest.mark.usefixtures("no_egl_context")
 def test_a_model_that_fails_ends_it(photo: Path) -> None:
     broken = photo.with_name("broken.onnx")
     broken.write_text("no model")
