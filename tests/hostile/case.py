@@ -8,11 +8,15 @@ import shutil
 import stat
 import subprocess
 import sysconfig
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from tests.hostile.forks import run_in_fork
+import pytest
+
+from tests.hostile.forks import Command, Turns, run_in_fork
 
 IIBR = str(Path(sysconfig.get_path("scripts")) / "iibr")
 DEADLINE_S = 120.0
@@ -21,6 +25,7 @@ DEADLINE_S = 120.0
 WITHOUT_PRIVILEGES = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
 """Before a command: permissions bind root as they bind everybody."""
 
+FULL_DISK = "--fsize="
 PLAINLY = 'exec "$@"'
 
 
@@ -50,8 +55,19 @@ class Case:
 
     @property
     def runs_apart(self) -> bool:
-        """Whether what surrounds the command matters, so that it needs a process of its own."""
-        return bool(self.environment or self.limits or self.is_bound or self.is_mute) or self.shell != PLAINLY
+        """Whether it needs a process of its own: what surrounds it counts while Python starts."""
+        limits = [limit for limit in self.limits if not limit.startswith(FULL_DISK)]
+        return bool(self.environment or limits or self.is_mute) or self.shell != PLAINLY
+
+    @property
+    def takes_turns(self) -> bool:
+        """Whether a process that runs others will do: it is refused, so that nothing of it may stay."""
+        return not (self.runs_apart or self.limits or self.is_bound) and self.code != 0
+
+    @property
+    def changes_nothing(self) -> bool:
+        """Whether the folder is the same before and after, so that others may use it."""
+        return self.takes_turns and self.prepare is nothing and not self.makes
 
 
 @dataclass(frozen=True)
@@ -64,25 +80,86 @@ class Ended:
     changed: tuple[str, ...]
 
 
-def run_case(case: Case, template: Path, folder: Path) -> Ended:
-    """Copy the template to the folder, run the command there, and compare."""
-    work, home = folder / "work", folder / "home"
-    shutil.copytree(template, work, symlinks=True)
-    home.mkdir()
+def run_case(case: Case, template: Path, folder: Path, turns: Turns | None = None) -> Ended:
+    """Copy the template to the folder, run the command there, and compare. turns: who runs what may be refused."""
+    work = _copied(template, folder)
     case.prepare(work)
     before = snapshot(work)
+    end = _ended(case, work, folder, turns, before)
+    _unlock(folder)
+    shutil.rmtree(folder)
+    return end
+
+
+class CaseRunner:
+    """Runs cases one after the other, those that change nothing in one folder. A context manager; folder: an empty one.
+
+    template: what each finds in its folder.
+    """
+
+    def __init__(self, template: Path, folder: Path) -> None:
+        self._template, self._folder = template, folder
+        self._turns = Turns()
+        self._shared: tuple[Path, dict[str, str]] | None = None
+
+    def __enter__(self) -> CaseRunner:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._turns.__exit__()
+
+    def run(self, case: Case) -> Ended:
+        """How it ends."""
+        if not case.changes_nothing:
+            return run_case(case, self._template, Path(tempfile.mkdtemp(dir=self._folder)), self._turns)
+        if self._shared is None:
+            folder = Path(tempfile.mkdtemp(dir=self._folder))
+            self._shared = folder, snapshot(_copied(self._template, folder))
+        folder, before = self._shared
+        end = _ended(case, folder / "work", folder, self._turns, before)
+        if end.changed:
+            self._shared = None
+        return end
+
+
+def _copied(template: Path, folder: Path) -> Path:
+    (folder / "home").mkdir()
+    return Path(shutil.copytree(template, folder / "work", symlinks=True))
+
+
+def _ended(case: Case, work: Path, folder: Path, turns: Turns | None, before: dict[str, str]) -> Ended:
+    home = folder / "home"
     environment = {"PATH": os.environ["PATH"], "HOME": str(home), "LANG": "C.UTF-8", **_inherited(), **case.environment}
     arguments = tuple(word.replace("{folder}", str(work)) for word in case.arguments)
     given = {name: value.replace("{folder}", str(work)) for name, value in environment.items() if value is not None}
     if case.runs_apart:
         code = _run_apart(case, arguments, work, given, folder)
     else:
-        code = run_in_fork(arguments, work, given, folder, DEADLINE_S)
+        sizes = [int(limit.removeprefix(FULL_DISK)) for limit in case.limits]
+        is_bound = case.is_bound and os.geteuid() == 0
+        command = Command(arguments, work, given, folder, min(sizes, default=None), is_bound)
+        code = turns.run(command, DEADLINE_S) if turns and case.takes_turns else run_in_fork(command, DEADLINE_S)
     output, errors = ((folder / name).read_bytes().decode("utf-8", "backslashreplace") for name in ("output", "errors"))
     changed = tuple(name for name in _differences(before, snapshot(work)) if not _is_made(name, case.makes))
-    _unlock(folder)
-    shutil.rmtree(folder)
     return Ended(code, output, errors, changed)
+
+
+def by_name(cases: tuple[Case, ...]) -> list[Any]:
+    """Parameters of a test."""
+    return [pytest.param(case, id=case.name) for case in cases]
+
+
+def require_good_end(case: Case, end: Ended) -> None:
+    """As expected: one line where it fails, nothing changed but what may be."""
+    told = f"{' '.join(case.arguments)}\nexit {end.code}\n{end.errors}{end.output}"
+    assert "Traceback" not in end.errors + end.output, told
+    assert end.code == case.code, told
+    assert end.changed == (), told
+    if case.code != 0 and not case.is_mute:
+        lines = end.errors.splitlines()
+        assert len(lines) == 1, told
+        assert lines[0].startswith("iibr: "), told
+        assert case.says in lines[0], told
 
 
 def snapshot(folder: Path) -> dict[str, str]:

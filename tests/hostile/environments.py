@@ -139,4 +139,5 @@ _limits = [
     Case("view with nonsense for a display", ("view", "photo.png"), environment={"DISPLAY": "nonsense"}),
 ]
 
-ENVIRONMENT_CASES = (*_homes, *_locales, *_streams, *_folders, *_threads, *_limits)
+PLACE_CASES = (*_homes, *_locales, *_folders)
+LIMIT_CASES = (*_streams, *_threads, *_limits)

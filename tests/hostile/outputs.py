@@ -17,6 +17,9 @@ WRITING: dict[str, tuple[str, ...]] = {
 }
 """What writes, all but where to."""
 
+NO_BYTECODE = {"PYTHONDONTWRITEBYTECODE": "1"}
+"""Or Python, which does not see that they are cut off, keeps bytes of modules that are no good to anybody."""
+
 SUFFIX = {"screenshot": ".png", "export": ".png", "generate": "", "evaluate": "", "train": ".safetensors"}
 
 
@@ -209,11 +212,11 @@ _full = [
         f"{command} onto a disk with room for {room} bytes",
         (*WRITING[command], f"new{SUFFIX[command]}"),
         limits=(f"--fsize={room}",),
-        # Or Python, which does not see that they are cut off, keeps bytes of modules that are no good to anybody.
-        environment={"PYTHONDONTWRITEBYTECODE": "1"},
+        environment=environment,
     )
     for command in ("screenshot", "generate", "export")
-    for room in (200, 500)
+    # Once in a process of its own.
+    for room, environment in ((200, NO_BYTECODE), (500, {}))
 ]
 
 _EXPORTS = {
@@ -237,7 +240,6 @@ _exports = [
             f"export {kind} onto a disk with room for 200 bytes",
             _exporting(kind, name),
             limits=("--fsize=200",),
-            environment={"PYTHONDONTWRITEBYTECODE": "1"},
             says=name.partition(".")[0],
         ),
         Case(

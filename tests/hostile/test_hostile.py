@@ -1,63 +1,24 @@
-"""Runs the table of hostile cases, several side by side: each is a fresh process, as a user starts it."""
+"""The harness of the hostile cases itself."""
 
 from __future__ import annotations
 
 import os
-import tempfile
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from tests.hostile.batches import BATCH_CASES
-from tests.hostile.case import Case, Ended, run_case
-from tests.hostile.environments import ENVIRONMENT_CASES
+from tests.hostile.case import DEADLINE_S, Case, CaseRunner, run_case
+from tests.hostile.environments import LIMIT_CASES, PLACE_CASES
+from tests.hostile.forks import KILLED, Command, Turns
 from tests.hostile.inputs import INPUT_CASES
 from tests.hostile.options import OPTION_CASES
 from tests.hostile.outputs import OUTPUT_CASES
 from tests.hostile.sandbox import make_template
 
-CASES = (*INPUT_CASES, *OUTPUT_CASES, *OPTION_CASES, *BATCH_CASES, *ENVIRONMENT_CASES)
+CASES = (*INPUT_CASES, *OUTPUT_CASES, *OPTION_CASES, *BATCH_CASES, *PLACE_CASES, *LIMIT_CASES)
 LEAST_CASES = 300
-
-
-RunCase = Callable[[Case], Ended]
-
-
-@pytest.fixture(scope="session")
-def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunCase]:
-    """Tells how a case ended. All that are asked for are started at once, where no other worker shares the tests."""
-    folder = tmp_path_factory.mktemp("hostile")
-    template = folder / "template"
-    make_template(template)
-
-    def in_own_folder(case: Case) -> Ended:
-        return run_case(case, template, Path(tempfile.mkdtemp(dir=folder)))
-
-    items = [] if "PYTEST_XDIST_WORKER" in os.environ else request.session.items
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        cases = [item.callspec.params["case"] for item in items if _asks_for_case(item)]
-        started = {case.name: pool.submit(in_own_folder, case) for case in cases}
-        yield lambda case: started[case.name].result() if case.name in started else in_own_folder(case)
-
-
-def _asks_for_case(item: pytest.Item) -> bool:
-    return isinstance(item, pytest.Function) and item.originalname == "test_case"
-
-
-@pytest.mark.parametrize("case", [pytest.param(case, id=case.name) for case in CASES])
-def test_case(case: Case, run: RunCase) -> None:
-    end = run(case)
-    told = f"{' '.join(case.arguments)}\nexit {end.code}\n{end.errors}{end.output}"
-    assert "Traceback" not in end.errors + end.output, told
-    assert end.code == case.code, told
-    assert end.changed == (), told
-    if case.code != 0 and not case.is_mute:
-        lines = end.errors.splitlines()
-        assert len(lines) == 1, told
-        assert lines[0].startswith("iibr: "), told
-        assert case.says in lines[0], told
+SHOT = ("screenshot", "photo.png", "--disparity", "map.pfm", "--grid", "1", "-o", "new.png")
+REFUSED = Case("", ("plan", "missing.png"))
 
 
 def test_there_are_many_cases_and_no_two_of_a_name() -> None:
@@ -65,8 +26,24 @@ def test_there_are_many_cases_and_no_two_of_a_name() -> None:
 
 
 def test_a_case_that_breaks_its_folder_is_found_out(tmp_path: Path) -> None:
-    """The harness itself: what a command makes, changes or removes is seen."""
+    """What a command makes, changes or removes is seen."""
     make_template(tmp_path / "template")
-    made = Case("", ("screenshot", "photo.png", "--disparity", "map.pfm", "--grid", "1", "-o", "new.png"), code=0)
-    end = run_case(made, tmp_path / "template", tmp_path)
+    end = run_case(Case("", SHOT, code=0), tmp_path / "template", tmp_path)
     assert (end.code, end.changed) == (0, ("new.png",)), end
+
+
+def test_what_a_case_does_to_a_shared_folder_is_found_out_and_no_other_sees_it(runner: CaseRunner) -> None:
+    """As where a command that must be refused is not."""
+    before = runner.run(REFUSED)
+    end = runner.run(Case("", SHOT))
+    assert (end.code, end.changed) == (0, ("new.png",)), end
+    assert runner.run(REFUSED) == before
+
+
+def test_a_command_that_ends_its_process_costs_no_other_its_own(tmp_path: Path) -> None:
+    """As a crash does: the next one gets a new process."""
+    command = Command(("plan", "missing.png"), tmp_path, {"PATH": os.environ["PATH"], "HOME": str(tmp_path)}, tmp_path)
+    with Turns() as turns:
+        assert turns.run(replace(command, told=tmp_path / "missing"), DEADLINE_S) == KILLED
+        assert turns.run(command, DEADLINE_S) == 2
+    assert "missing.png" in (tmp_path / "errors").read_text()
