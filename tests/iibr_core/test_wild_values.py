@@ -1,11 +1,14 @@
-"""NaN, infinity, denormal and huge numbers at the inputs of every public function of the core: finite values or one
-clear error. A public function that no table here names fails a test, so that a new one gets its case.
+"""NaN, infinity and huge numbers, one pixel and none at the inputs of every public function of the core: finite values
+or one clear error. More values where IIBR_TEST_ALL_VALUES is set, as `make fuzz` does. A public function that no table
+here names fails a test, so that a new one gets its case.
 """
 
 import dataclasses
 import importlib
 import math
+import os
 import pkgutil
+import sys
 import warnings
 from collections.abc import Iterator
 from functools import cache
@@ -57,8 +60,11 @@ from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize,
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
-WILD = (math.nan, math.inf, -math.inf, 3e38, -3e38, 1e30, 1e-42, -1e-300, 0.0)
-SIZE = ImageSize(12, 14)
+WILD = (math.nan, math.inf, 3e38)
+MORE_WILD = (-math.inf, -3e38, 1e30, 1e-42, -1e-300, 0.0)
+if os.environ.get("IIBR_TEST_ALL_VALUES"):  # `make fuzz` sets it
+    WILD += MORE_WILD
+SIZE = USUAL_SIZE = ImageSize(12, 14)
 GRID = GridShape(3, 3)
 OFFSETS = [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)]
 
@@ -72,6 +78,8 @@ def camera(**changes):
 def image(value):
     """Colours with a wild value in one channel of one pixel, and in a block."""
     pixels = smooth_texture(*SIZE)
+    if SIZE != USUAL_SIZE:
+        return np.full_like(pixels, value)
     pixels[3, 4, 0] = pixels[7:9, 5:8] = np.float32(value)
     return pixels
 
@@ -83,6 +91,8 @@ def pair(value):
 
 def depths(value):
     """A map of two surfaces with wild values at one place and in a row."""
+    if SIZE != USUAL_SIZE:
+        return np.full(SIZE, value, np.float32)
     values = np.where(np.arange(SIZE[1]) < 6, 0.5, 2.0).astype(np.float32) * np.ones((SIZE[0], 1), np.float32)
     values[3, 4] = values[9] = np.float32(value)
     return values
@@ -100,8 +110,8 @@ def soft_cells():
 
 def mixed_between_surfaces():
     """Two surfaces, and a column between them that is of neither."""
-    column = np.repeat(np.float32([0.0, 0.9, 2.0]), [6, 1, SIZE[1] - 7])
-    return np.tile(column, (SIZE[0], 1))
+    columns = np.repeat(np.float32([0.0, 0.9, 2.0]), [6, 1, USUAL_SIZE[1] - 7])
+    return np.tile(columns[: SIZE[1]], (SIZE[0], 1))
 
 
 def aligned(value):
@@ -111,9 +121,11 @@ def aligned(value):
     return disparity
 
 
-@cache
 def scene():
-    return square_before_wall(*SIZE)
+    return scene_of(SIZE)
+
+
+scene_of = cache(lambda size: square_before_wall(*size))
 
 
 def rays(value=0.5):
@@ -199,7 +211,7 @@ def tile_views(value):
 
 def shares(value):
     weights = np.full((5, *SIZE), 0.1, np.float32)
-    weights[2, 3, 4] = np.clip(np.float32(value), 0, 0.6)  # to NaN nothing is done
+    weights[2, 3:4, 4:5] = np.clip(np.float32(value), 0, 0.6)  # to NaN nothing is done
     return weights
 
 
@@ -456,6 +468,22 @@ FINITE = {
 }
 """What comes back is finite, or InputError or another ValueError says why not."""
 
+NEVER_EMPTY = {
+    "depth.multi_view.estimate.estimate_coarse",
+    "depth.pictorial_cues.estimate_from_cues",
+    "depth.search.resize_estimate",
+    "generation.free_views.FreeViews",
+    "generation.free_views.inverse_depth_of",
+    "generation.free_views.reach_of",
+    "generation.outer_views.margins_beyond_frame",
+    "generation.plan.plan_for_viewing",
+    "generation.relief.measure_relief",
+    "generation.relief.rounding_step",
+    "inpainting.beyond_frame.extend_beyond_frame",
+    "rendering.free_view.target_from_photo",
+}
+"""Of photos, maps and views that were read: every reader refuses those without pixels."""
+
 ELEMENTWISE = {
     "color.encoded_from_stored": lambda x: color.encoded_from_stored(x.astype(np.float16)),
     "color.linear_from_srgb": color.linear_from_srgb,
@@ -669,6 +697,23 @@ def plain(result):
 @pytest.mark.parametrize("value", WILD, ids=str)
 @pytest.mark.parametrize("name", sorted(FINITE))
 def test_finite_or_a_clear_error(name, value, tmp_path):
+    require_finite_or_clear(name, value, tmp_path)
+
+
+@pytest.mark.parametrize("name", sorted(FINITE))
+def test_one_pixel_gives_finite_values_or_a_clear_error(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "SIZE", ImageSize(1, 1))
+    for value in (0.5, math.nan):
+        require_finite_or_clear(name, value, tmp_path)
+
+
+@pytest.mark.parametrize("name", sorted({*FINITE} - NEVER_EMPTY))
+def test_no_pixels_give_finite_values_or_a_clear_error(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "SIZE", ImageSize(0, 0))
+    require_finite_or_clear(name, 0.5, tmp_path)
+
+
+def require_finite_or_clear(name, value, tmp_path):
     complaint, result = None, None
     try:
         with warnings.catch_warnings():
