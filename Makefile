@@ -23,7 +23,7 @@ test: install
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 # DATA: a folder of scenes as `iibr evaluate` takes them; without it, a drawn scene. OUT: for the report.
 OUT ?= out/bench
@@ -40,6 +40,7 @@ figures: install
 
 fuzz: install
 	@.ci/system-libraries test
+	IIBR_TEST_ALL_VALUES=1 $(BIN)/pytest tests/iibr_core/test_wild_values.py
 	$(BIN)/python -m benchmarks.fuzz
 
 install: $(READY_TESTS)
