@@ -116,9 +116,16 @@ def _interrupt_again(lost: Any) -> None:
 
     # The system's own signal: it ends whatever the main thread waits for by then. On Windows it would end the process.
     is_posix = os.name == "posix"
-    again = Timer(INTERRUPT_AGAIN_S, *((os.kill, (os.getpid(), SIGINT)) if is_posix else (raise_signal, (SIGINT,))))
-    again.daemon = True
-    again.start()
+    send = (os.kill, (os.getpid(), SIGINT)) if is_posix else (raise_signal, (SIGINT,))
+    is_started = False
+    while not is_started:
+        again = Timer(INTERRUPT_AGAIN_S, *send)
+        again.daemon = True
+        try:
+            again.start()
+            is_started = True
+        except KeyboardInterrupt:  # on a busy machine it strikes before the timer is known to run, and would be lost
+            pass
 
 
 def _tell(message: str, code: int) -> int:

@@ -83,8 +83,20 @@ main()
 """
 
 
-def test_an_interruption_in_a_callback_from_c_is_not_lost() -> None:
-    assert the_error(run(start=(sys.executable, "-P", "-c", SWALLOWED)), 130) == "iibr: interrupted"
+BUSY = """
+import threading, time
+def start(timer, starts=[], begin=threading.Timer.start):
+    begin(timer)
+    starts.append(timer)
+    time.sleep(0.05 if len(starts) < 3 else 0)
+threading.Timer.start = start
+"""
+"""Before the thread that starts a timer goes on, the timer has ended."""
+
+
+@pytest.mark.parametrize("before", ["", BUSY], ids=["", "busy"])
+def test_an_interruption_in_a_callback_from_c_is_not_lost(before: str) -> None:
+    assert the_error(run(start=(sys.executable, "-P", "-c", before + SWALLOWED)), 130) == "iibr: interrupted"
 
 
 def test_what_is_ignored_stays_ignored() -> None:
