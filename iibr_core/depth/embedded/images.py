@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.types import FloatImage, InputError
 
 MAX_MAP_PIXELS = 64_000_000
@@ -22,8 +23,6 @@ PNG_END = b"IEND\xaeB`\x82"
 PNG_START, JPEG_START = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 GREY_TOLERANCE = 10
 """By how many of 255 steps the channels of a grey picture may differ: it may have been a JPEG."""
-READ_ROWS = 64
-"""Looked at together: as RGB and as floats a large map takes many times its own memory."""
 
 # What Pillow raises for damaged PNGs and JPEGs.
 DECODE_ERRORS = (
@@ -87,8 +86,8 @@ def _grey(picture: Image.Image) -> FloatImage | None:
     if picture.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
         return None
     result = np.empty((picture.height, picture.width), np.float32)
-    for top in range(0, picture.height, READ_ROWS):
-        rows = result[top : top + READ_ROWS]
+    for top in range(0, picture.height, ROWS_AT_ONCE):
+        rows = result[top : top + ROWS_AT_ONCE]
         colors = np.asarray(picture.crop((0, top, picture.width, top + len(rows))).convert("RGB"))
         if (np.ptp(colors, axis=2) > GREY_TOLERANCE).any():
             return None

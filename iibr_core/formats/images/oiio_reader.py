@@ -13,6 +13,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, refuse_bomb, require_file
 from iibr_core.formats.images.oiio_names import oiio_name
 from iibr_core.types import ImageSize, InputError, image_size
@@ -21,8 +22,6 @@ from iibr_core.types import ImageSize, InputError, image_size
 HARMLESS_MESSAGE = "extraneous bytes"
 NO_READER = "could not find a format reader"
 """OpenImageIO's words for a file of a kind that it does not know."""
-ROWS_AT_ONCE = 64
-"""Of a file without tiles: a multiple of what most strips hold."""
 MOST_PNG_SIDE = 1_000_000
 """As libpng has it."""
 FLOATING_TYPES = ("half", "float", "double")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import bytes_from_encoded, convert, linear_from_srgb, srgb_from_linear
+from iibr_core.color import ROWS_AT_ONCE, bytes_from_encoded, convert, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file, shown_name
 from iibr_core.formats.images.avif import is_avif
 from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
@@ -30,7 +30,6 @@ DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
 FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)  # "35 mm equivalent" compares diagonals (CIPA DCG-001)
 MM_PER_RESOLUTION_UNIT = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # Exif 2.3, FocalPlaneResolutionUnit
-ENCODED_ROWS = 64
 
 
 def read_photo(
@@ -148,8 +147,8 @@ def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
 
 def _encode_in_place(linear: FloatImage) -> FloatImage:
     """The same array, sRGB-encoded; a few rows at a time, as that takes some times their memory."""
-    for first in range(0, len(linear), ENCODED_ROWS):
-        rows = linear[first : first + ENCODED_ROWS]
+    for first in range(0, len(linear), ROWS_AT_ONCE):
+        rows = linear[first : first + ROWS_AT_ONCE]
         rows[:] = srgb_from_linear(rows)
     return linear
 

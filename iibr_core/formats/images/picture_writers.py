@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
+from iibr_core.color import ROWS_AT_ONCE, bytes_from_encoded, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.images.icc_profile import icc_profile
 from iibr_core.formats.images.metadata import PictureMetadata, exif_for, xmp_for
@@ -27,7 +27,6 @@ from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, pict
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import SRGB, ColorSpace, InputError, image_size
 
-ROWS_AT_ONCE = 64
 PNG_START_BYTES = 8
 PNG_KEPT = frozenset({b"IHDR", b"tEXt", b"zTXt", b"iTXt", b"IDAT", b"IEND"})
 FINE_COLOR_QUALITY = 90

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
@@ -27,7 +28,6 @@ DEPTH_SPAN_WIDTHS = 0.01
 FLAT_DEPTH_SHARE = 1e-4
 MOSTLY_UNKNOWN = 0.9
 """A map of which more is unknown is filled before it is resampled."""
-SCALED_ROWS = 64
 
 
 def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: FloatImage | None = None) -> Disparity:
@@ -107,8 +107,8 @@ def _without_absurd(
     known = values if values.dtype == np.float32 else np.empty(values.shape, np.float32)
     count = 0
     # Some rows at a time, in place: as doubles a large map would take twice its own memory more.
-    for first in range(0, len(values), SCALED_ROWS):
-        rows = slice(first, first + SCALED_ROWS)
+    for first in range(0, len(values), ROWS_AT_ONCE):
+        rows = slice(first, first + ROWS_AT_ONCE)
         scaled = values[rows].astype(np.float64) * factor
         absurd = np.abs(scaled) > limit_px
         count += int((absurd & np.isfinite(scaled)).sum())

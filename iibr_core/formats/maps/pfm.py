@@ -8,6 +8,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import FloatImage, ImageSize, InputError
@@ -15,7 +16,6 @@ from iibr_core.types import FloatImage, ImageSize, InputError
 # The header ends with exactly one white-space character (or CR LF); the next byte is data.
 HEADER = re.compile(rb"P([fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.0-9eE]{1,32})(?:\r\n|\s)")
 HEADER_BYTES = 256
-READ_ROWS = 64
 
 
 def read_pfm(path: Path) -> FloatImage:
@@ -33,8 +33,8 @@ def read_pfm(path: Path) -> FloatImage:
         file.seek(start)
         result = np.empty(size, np.float32)
         # From the last row up, some at a time: turned over as a whole, a large map would be there twice.
-        for bottom in range(size.height, 0, -READ_ROWS):
-            rows = result[max(bottom - READ_ROWS, 0) : bottom]
+        for bottom in range(size.height, 0, -ROWS_AT_ONCE):
+            rows = result[max(bottom - ROWS_AT_ONCE, 0) : bottom]
             values = np.fromfile(file, dtype, rows.size)
             if values.size < rows.size:
                 raise InputError(f"{path}: became shorter while it was read; try again")

@@ -8,13 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
 from iibr_core.formats.images.oiio_reader import PictureRows, Raster
 from iibr_core.formats.maps.npy import read_array, read_array_header
 from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size
 from iibr_core.types import FloatImage, ImageSize, InputError
-
-READ_ROWS = 64
 
 
 class MapHeader(NamedTuple):
@@ -38,8 +37,8 @@ def read_map(path: Path) -> FloatImage:
         return _read_npy(path)
     picture = PictureRows(path)
     result = np.empty(picture.size, np.float32)
-    for first in range(0, len(result), READ_ROWS):
-        rows = result[first : first + READ_ROWS]
+    for first in range(0, len(result), ROWS_AT_ONCE):
+        rows = result[first : first + ROWS_AT_ONCE]
         rows[:] = _values(path, picture.read(first, first + len(rows)))
     return result
 

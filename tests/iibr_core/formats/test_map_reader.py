@@ -39,7 +39,7 @@ def test_headers_tell_sizes(tmp_path):
 def test_scaling_does_not_depend_on_how_many_rows_are_scaled_at_once(tmp_path, monkeypatch, rows):
     values = np.where(STORED == 2, 1e6, STORED).astype(np.float32)
     write_pfm(tmp_path / "a.pfm", values)
-    monkeypatch.setattr(disparity_file, "SCALED_ROWS", rows)
+    monkeypatch.setattr(disparity_file, "ROWS_AT_ONCE", rows)
     read = read_disparity(tmp_path / "a.pfm", ImageSize(150, 40), 0.3)
     known = values != 1e6
     assert np.array_equal(read.values[known], (values[known].astype(np.float64) * 0.3).astype(np.float32))
