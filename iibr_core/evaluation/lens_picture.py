@@ -19,8 +19,6 @@ from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.types import FloatImage, InputError
 
 PICTURE, ABOUT = "lens.png", "lens.json"
-MOST_BYTES = 1 << 20
-"""Of what is said about it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +48,7 @@ def read_lens_picture(scene: MultiView, max_pixels: int) -> LensPicture | None:
 
 def _numbers(path: Path) -> tuple[float, float]:
     try:
-        told = json.loads(read_text(path, MOST_BYTES))
+        told = json.loads(read_text(path))
         focus, radius = float(told["focus_disparity"]), float(told["radius_views"])
     except (ValueError, OverflowError, KeyError, TypeError, RecursionError) as error:
         if isinstance(error, InputError):

@@ -22,6 +22,8 @@ MOST_INFLATION = 500
 """Decoded bytes for each byte of a file: pictures reach some tens, zlib at most 1032 where all is of one colour."""
 HARMLESS_BYTES = 256 * 2**20
 """Whatever the file's size, so much may be decoded from it."""
+MOST_TEXT_BYTES = 1 << 20
+"""Of settings and lists: no such file is larger."""
 
 NOTHING_THERE = (errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ENAMETOOLONG)
 MOST_REASON_CHARACTERS = 200
@@ -157,7 +159,7 @@ def open_binary(path: Path) -> Iterator[BinaryIO]:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); is it still there?") from error
 
 
-def read_text(path: Path, most_bytes: int) -> str:
+def read_text(path: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
     """What a text file holds; a byte order mark goes, what is no UTF-8 becomes the sign for that.
 
     Raises InputError as `open_binary` does, and for a file of more bytes.

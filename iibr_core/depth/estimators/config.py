@@ -12,7 +12,6 @@ from iibr_core.formats.files import is_file, is_folder, printable, read_text
 from iibr_core.types import ImageSize, InputError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
-MAX_CONFIG_BYTES = 2**20
 MAX_SIDE = 4096
 PICKLED = ("*.bin", "*.pt", "*.pth", "*.ckpt")
 
@@ -96,7 +95,7 @@ def _json_object(folder: Path, name: str) -> dict[str, Any]:
     if not is_file(path):
         raise InputError(f"{folder}: holds no {name}; get the whole model folder")
     try:
-        told = json.loads(read_text(path, MAX_CONFIG_BYTES))
+        told = json.loads(read_text(path))
         if not isinstance(told, dict):
             raise ValueError("no object")
     except (ValueError, RecursionError) as error:

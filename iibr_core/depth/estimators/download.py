@@ -34,7 +34,6 @@ VERIFIED = "iibr-verified.json"
 """Beside downloaded files: the digest of each, by its name, as the hub states them."""
 DIGEST = re.compile("sha256:[0-9a-f]{64}|blob:[0-9a-f]{40}")
 """Of large files SHA-256; of small ones what git calls a blob: SHA-1 with the length before it."""
-MOST_LIST_BYTES = 1 << 20
 
 Digests = Mapping[str, str]
 
@@ -87,7 +86,7 @@ def require_unchanged(folder: Path) -> None:
     if not is_file(path):
         return
     try:
-        stated = json.loads(read_text(path, MOST_LIST_BYTES))
+        stated = json.loads(read_text(path))
         if not isinstance(stated, dict) or not all(map(_is_digest, stated.values())):
             raise ValueError("no digests")
         changed = _unlike(folder, stated)

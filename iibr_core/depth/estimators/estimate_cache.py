@@ -31,7 +31,6 @@ FORMAT = "1"
 
 TIMES = "seconds.json"
 """Beside the estimates: how long models took."""
-MAX_TIMES_BYTES = 1 << 20
 
 KINDS: dict[str, type[RelativeInverseDepth | MetricDepth | DisparityMap]] = {
     "relative": RelativeInverseDepth,
@@ -106,7 +105,7 @@ def seconds_of(title: str) -> float | None:
 
 def _times() -> dict[str, Any]:
     try:
-        told = json.loads(read_text(cache_folder() / TIMES, MAX_TIMES_BYTES))
+        told = json.loads(read_text(cache_folder() / TIMES))
     except (OSError, ValueError, RecursionError):
         return {}
     return told if isinstance(told, dict) else {}

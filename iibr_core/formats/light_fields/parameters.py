@@ -8,11 +8,10 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from iibr_core.formats.files import is_file, open_binary, reason_of
+from iibr_core.formats.files import is_file, read_text, reason_of
 from iibr_core.types import GridShape, ImageSize, InputError
 
 FILE_NAME = "parameters.cfg"
-MOST_BYTES = 1 << 20
 SENSOR_SIZE_MM = 36.0
 
 
@@ -24,14 +23,11 @@ def read_parameters(folder: Path) -> dict[str, float]:
     path = folder / FILE_NAME
     if not is_file(path) or path.stat().st_size == 0:
         return {}
-    with open_binary(path) as file:
-        data = file.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise InputError(f"{path}: more than {MOST_BYTES:,} bytes are no parameters; correct or remove it")
+    text = read_text(path)
     parser = configparser.ConfigParser(interpolation=None, strict=False)
     try:
-        parser.read_string(data.decode("utf-8-sig"))
-    except (configparser.Error, UnicodeDecodeError) as error:
+        parser.read_string(text)
+    except configparser.Error as error:
         raise InputError(f"{path}: cannot be read as parameters ({reason_of(error)}); correct or remove it") from error
     numbers: dict[str, float] = {}
     for section in parser.sections():

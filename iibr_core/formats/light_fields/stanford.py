@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iibr_core.formats.files import is_file, is_folder, open_binary, shown_name
+from iibr_core.formats.files import is_file, is_folder, read_text, shown_name
 from iibr_core.formats.images.picture_source import PictureSource, source_size
 from iibr_core.formats.light_fields.folder_writer import FolderWriter
 from iibr_core.formats.light_fields.scene import KnownView, MultiView, on_grid, pictures_in
@@ -25,7 +25,7 @@ RENDERED_NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_(\d{{1,3}})_({NUMBER})_({NUMBE
 MOST_STRAY = 0.5
 """A camera farther off its place in the grid than this, in view steps: the positions mean something else."""
 TOLD_STRAY = 0.005
-CONFIG, MOST_CONFIG_BYTES = "config.cfg", 1 << 16
+CONFIG = "config.cfg"
 FOCUS_DISTANCE = "focus-distance"
 """Of light-field-renderer's config: where to begin, the least and the greatest, in metres."""
 USUAL_DIRECTIONS = (-1, 1)
@@ -139,8 +139,7 @@ def _range_px(folder: Path, focal_px: float, step_m: float) -> tuple[float, floa
     path = folder / CONFIG
     if not is_file(path) or step_m == 0:
         return None
-    with open_binary(path) as file:
-        lines = file.read(MOST_CONFIG_BYTES).decode("utf-8-sig", "replace").splitlines()
+    lines = read_text(path).splitlines()
     said = next((words[1:] for line in lines if (words := line.split()) and words[0] == FOCUS_DISTANCE), None)
     if said is None:
         return None
