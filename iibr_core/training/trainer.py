@@ -15,35 +15,17 @@ from dataclasses import asdict, dataclass, field, replace
 from math import cos, isfinite, pi
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iibr_core.formats.files import is_file
-from iibr_core.formats.outputs import atomic_write
-from iibr_core.formats.weights import load_weights, read_tensors, require_shapes, save_weights, write_tensors
+from iibr_core.formats.weights import read_tensors, require_shapes, save_weights, write_tensors
 from iibr_core.training.losses import EpiShape, LossWeights, to_perceptual, total_loss
-from iibr_core.training.run_files import checkpoint_path, log_path, require_run_files
+from iibr_core.training.run_files import LogRow, checkpoint_path, log_path, require_run_files, training_log
 from iibr_core.types import InputError, ReportProgress, ignore_progress
 
-__all__ = [
-    "Batch",
-    "TrainConfig",
-    "TrainingDiverged",
-    "TrainingRun",
-    "checkpoint_path",
-    "choose_device",
-    "learning_rate",
-    "load_weights",
-    "log_path",
-    "save_weights",
-    "train",
-]
-
 CHECKPOINT = "iibr-checkpoint"
-LOG_COLUMNS = ("step", "total", "color", "entropy", "epi", "gradient_norm", "learning_rate", "seconds")
 ADAM_STATE = ("step", "exp_avg", "exp_avg_sq")
 
 
@@ -132,7 +114,7 @@ def train(
     run = TrainingRun(model, config, checkpoint_path(out))
     if resume:
         run.restore()
-    with _log(log_path(out), run.step) as write_row:
+    with training_log(log_path(out), run.step) as write_row:
         try:
             while run.step < config.steps:
                 # The batch is made outside: Ctrl-C may stop that at once, but not an update half done.
@@ -172,19 +154,6 @@ def learning_rate(config: TrainConfig, step: int) -> float:
     return config.learning_rate * 0.5 * (1 + cos(pi * min((step - 1) / config.steps, 1.0)))
 
 
-class _Row(NamedTuple):
-    """One row of the log, see LOG_COLUMNS."""
-
-    step: int
-    total: float
-    color: float
-    entropy: float
-    epi: float
-    gradient_norm: float
-    learning_rate: float
-    seconds: float
-
-
 class TrainingRun:
     """The state that training changes: the model, Adam's moments, steps and seconds done; and its checkpoint.
 
@@ -200,7 +169,7 @@ class TrainingRun:
         self.seconds_before = 0.0
         self.started = perf_counter()
 
-    def take_step(self, batch: Batch) -> _Row:
+    def take_step(self, batch: Batch) -> LogRow:
         """One update. Raises TrainingDiverged before it touches the model if the losses or gradients are not finite."""
         step = self.step + 1
         rate = learning_rate(self.config, step)
@@ -217,7 +186,7 @@ class TrainingRun:
         norm = nn.utils.get_total_norm(gradients).to(losses.total)
         # All at once: every look at a number on a GPU waits for it.
         values = torch.stack([*losses, norm]).tolist()
-        for name, value in zip(LOG_COLUMNS[1:], values):
+        for name, value in zip(LogRow._fields[1:], values):
             if not isfinite(value):
                 raise self._divergence(name, step)
         for group in self.optimizer.param_groups:
@@ -225,7 +194,7 @@ class TrainingRun:
         self.optimizer.step()
         self.step = step
         total, color, entropy, epi, gradient_norm = values
-        return _Row(step, total, color, entropy, epi, gradient_norm, rate, self._seconds())
+        return LogRow(step, total, color, entropy, epi, gradient_norm, rate, self._seconds())
 
     def save(self) -> None:
         """Write the checkpoint, unless it is there already or nothing has been trained.
@@ -303,39 +272,6 @@ def _require_same_course(path: Path, before: Mapping[str, object], now: TrainCon
         if name not in free and before.get(name) != value:
             was = before.get(name)
             raise InputError(f"{path}: was trained with {name} {was}, not {value}; give {was} or start anew")
-
-
-@contextmanager
-def _log(path: Path, done: int) -> Iterator[Callable[[_Row], None]]:
-    """Yield what writes a row. Rows up to step `done` of the log that is there stay, what came after them goes.
-
-    A log without any row is removed again. Raises InputError where it cannot be written.
-    """
-    rows = path.read_text(errors="replace").splitlines() if done and is_file(path) else []
-    kept = [row for row in rows if row.count(",") == len(LOG_COLUMNS) - 1 and _step_of(row) <= done]
-    with atomic_write(path) as temporary:
-        temporary.write_text("".join(line + "\n" for line in [",".join(LOG_COLUMNS), *kept]))
-    is_empty = not kept
-
-    def write_row(row: _Row) -> None:
-        nonlocal is_empty
-        try:
-            with path.open("a") as file:
-                file.write(",".join(f"{value:.9g}" for value in row) + "\n")
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror}); make room, or choose another") from error
-        is_empty = False
-
-    try:
-        yield write_row
-    finally:
-        if is_empty:
-            path.unlink(missing_ok=True)
-
-
-def _step_of(row: str) -> float:
-    step = row.split(",")[0]
-    return int(step) if step.isdecimal() else float("inf")
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import typer
 
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.extras import require_extra
+from iibr_core.training.run_files import checkpoint_path, require_run_files
 from viewer.cli.options import Force
 from viewer.cli.terminal import show_progress
 
@@ -38,8 +39,6 @@ def train(
     Example: iibr train --steps 2500 --learning-rate 3e-3 --out weights.safetensors
     """
     require_extra("train", "torch")
-    from iibr_core.training.run_files import require_run_files
-
     require_run_files(out, may_replace=force or resume)
     raise typer.Exit(train_weights(steps, out, seed, learning_rate, device, resume, checkpoint_every, force))
 
@@ -98,7 +97,7 @@ def train_weights(
                 report_progress=show,
             )
     except KeyboardInterrupt:
-        if not is_file(trainer.checkpoint_path(out)):
+        if not is_file(checkpoint_path(out)):
             return _report_end("interrupted before the first step was done", EXIT_INTERRUPTED)
         again = command if resume else f"{command} --resume"
         return _report_end(f"interrupted; what was learned is saved, go on with: {again}", EXIT_INTERRUPTED)

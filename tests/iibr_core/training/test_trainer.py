@@ -12,16 +12,14 @@ from torch import nn
 
 from iibr_core.formats.weights import load_weights, read_tensors, read_weights, save_weights, write_tensors
 from iibr_core.training.losses import LossWeights, color_loss, entropy_loss, epi_loss, epis_of_rays
+from iibr_core.training.run_files import LogRow, checkpoint_path, log_path
 from iibr_core.training.trainer import (
     CHECKPOINT,
-    LOG_COLUMNS,
     Batch,
     TrainConfig,
     TrainingDiverged,
-    checkpoint_path,
     choose_device,
     learning_rate,
-    log_path,
     train,
 )
 from iibr_core.types import InputError
@@ -68,7 +66,7 @@ def same(one, other):
 def log_rows(out):
     with log_path(out).open(newline="") as file:
         reader = csv.DictReader(file)
-        assert tuple(reader.fieldnames) == LOG_COLUMNS
+        assert tuple(reader.fieldnames) == LogRow._fields
         return list(reader)
 
 
@@ -141,7 +139,7 @@ def test_the_first_step_against_adam_by_hand(out):
     norm = sum((parameter.grad**2).sum() for parameter in twin.parameters()) ** 0.5
     row = log_rows(out)[0]
     expected = (total, color, entropy, epi, norm)
-    for name, value in zip(LOG_COLUMNS[1:6], expected):
+    for name, value in zip(LogRow._fields[1:6], expected):
         assert float(row[name]) == pytest.approx(value.item(), rel=1e-5), name
     for trained, start in zip(model.parameters(), twin.parameters()):
         by_hand = start - config.learning_rate * start.grad / (start.grad.abs() + 1e-8)
