@@ -14,15 +14,15 @@ import numpy as np
 
 from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.embedded.images import picture_file
+from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth, values_of
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
-from iibr_core.formats.images.oiio_reader import read_orientation, upright
+from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
-from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE, read_disparity
+from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.disparity_holes import say_filled
@@ -43,7 +43,6 @@ USUAL_GRID = GridShape(9, 9)
 """What estimates without a scale are made to suit where the grid is not yet known."""
 GUESS_SHARE = 0.6
 """Of the usual parallax, for guessed depth: what is wrong moves less."""
-
 NOT_USED: dict[DepthKind, str] = {
     "file": "The map beside the photo was not used",
     "embedded": "The photo's own depth was not used",
@@ -99,8 +98,7 @@ def open_with_depth(
         if kind == "model" and not asks_model:
             continue
         try:
-            found = find()
-            if found is not None:
+            if (found := find()) is not None:
                 found = replace(found, origin=replace(found.origin, failures=failures))
                 return _finish(found, choice, grid, should_stop)
         except InputError as error:
@@ -144,8 +142,7 @@ def sketch_depth(path: Path, photo: Photo, choice: DepthChoice, should_stop: Sho
     ways = (search.sidecar, search.embedded_map) if choice.start == "auto" else (search.embedded_map,)
     for find in ways if choice.start in ("auto", "embedded") else ():
         with suppress(InputError):  # it is told when all is read
-            found = find()
-            if found is not None:
+            if (found := find()) is not None:
                 return _finish(found, choice, None, should_stop)
     return _finish(search.rough(), choice, None, should_stop)
 
@@ -157,9 +154,7 @@ def read_shown_photo(path: Path, max_pixels: int, kind: DepthKind) -> Photo:
     """
     photo = read_photo(path, max_pixels)
     embedded = read_embedded(path) if kind == "embedded" else None
-    if embedded is None or embedded.all_in_focus is None:
-        return photo
-    return _all_in_focus_photo(photo, embedded.all_in_focus, read_orientation(path), max_pixels)
+    return photo if embedded is None else photo_in_focus(path, photo, embedded, max_pixels)
 
 
 def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | None:
@@ -203,10 +198,6 @@ class _DepthSearch:
         for kind in kinds[start:-1]:
             yield kind, ways[kind]
 
-    def go_on(self) -> None:
-        """Asked before work that takes long."""
-        raise_if_stopped(self.should_stop)
-
     def of_file(self, path: Path) -> _FoundDepth:
         disparity = read_disparity(path, self.photo.size, self.choice.file_scale, self.photo.pixels)
         disparity = replace(disparity, notes=disparity.notes + self._unused_maps(path))
@@ -231,12 +222,10 @@ class _DepthSearch:
         embedded = read_embedded(self.path)
         if embedded is None:
             return None
-        orientation = read_orientation(self.path)
-        photo = self.photo
-        if embedded.all_in_focus is not None:
-            photo = _all_in_focus_photo(photo, embedded.all_in_focus, orientation, self.max_pixels)
+        photo = photo_in_focus(self.path, self.photo, embedded, self.max_pixels)
         origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
-        return _FoundDepth(photo, origin, _rotate(embedded.estimate, photo.size, orientation))
+        estimate = rotate_estimate(embedded.estimate, photo.size, read_orientation(self.path))
+        return _FoundDepth(photo, origin, estimate)
 
     def of_pair(self) -> _FoundDepth | None:
         from iibr_core.depth.stereo_pair import estimate_from_pair
@@ -255,15 +244,17 @@ class _DepthSearch:
             return None
         from iibr_core.depth.estimators.estimate import estimate_with
 
-        self.go_on()
+        raise_if_stopped(self.should_stop)
         estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)
         return _FoundDepth(self.photo, DepthOrigin("model", f"estimated by {model.title}"), estimate)
 
     def rough(self) -> _FoundDepth:
-        self.go_on()
+        raise_if_stopped(self.should_stop)
         self.report_progress(0, 0, "guessing depth")
-        origin = DepthOrigin("rough", "rough, guessed without a model", advice=BETTER_WAYS)
-        return _FoundDepth(self.photo, origin, estimate_from_cues(self.photo, self.should_stop))
+        estimate = estimate_from_cues(self.photo, self.should_stop)
+        return _FoundDepth(
+            self.photo, DepthOrigin("rough", "rough, guessed without a model", (), BETTER_WAYS), estimate
+        )
 
 
 def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
@@ -294,31 +285,6 @@ def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:
     return PhotoWithDepth(photo, replace(flat, notes=flat.notes + failures), origin)
 
 
-def _all_in_focus_photo(photo: Photo, data: bytes, orientation: int, max_pixels: int) -> Photo:
-    """The all-in-focus picture as the photo, turned like it; the photo itself where that is damaged or another one."""
-    try:
-        with picture_file(data, "the all-in-focus picture") as path:
-            sharp = read_photo(path, max_pixels, keeps_primaries=True)
-            pixels = upright(sharp.pixels, orientation) if read_orientation(path) == 1 else sharp.pixels
-    except InputError as error:
-        return replace(photo, notes=(*photo.notes, f"The blurred picture is shown: {error}"))
-    if not _is_alike(pixels.shape[:2], photo.size):
-        return replace(photo, notes=(*photo.notes, "The blurred picture is shown: the sharp one has another shape."))
-    focal_px = photo.focal_px * pixels.shape[1] / photo.size.width
-    note = "The sharp picture that the file holds is shown, not the blurred one."
-    return replace(photo, pixels=pixels, focal_px=focal_px, notes=(*photo.notes, note), color_space=sharp.color_space)
-
-
-def _rotate(estimate: Estimate, size: ImageSize, orientation: int) -> Estimate:
-    """The estimate, turned upright as the photo was. Some writers turn the map already; others' maps fit no way."""
-    values = values_of(estimate)
-    for candidate in (upright(values, orientation), values):
-        if _is_alike(candidate.shape, size):
-            return _with_values(estimate, candidate)
-    shape, photo_shape = (f"{width}x{height}" for height, width in (values.shape, size))
-    raise InputError(f"its {shape} pixels have another shape than the photo, {photo_shape}")
-
-
 def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
     """The estimate for a picture of another (height, width), surface by surface; lengths in pixels are scaled along."""
     if values_of(estimate).shape == size:
@@ -332,18 +298,3 @@ def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
         case DisparityMap(px_per_view):
             ratio = np.float32(size.width / px_per_view.shape[1])
             return DisparityMap(resample_surfaces(px_per_view, size) * ratio)
-
-
-def _with_values(estimate: Estimate, values: FloatImage) -> Estimate:
-    match estimate:
-        case RelativeInverseDepth():
-            return RelativeInverseDepth(values)
-        case MetricDepth():
-            return replace(estimate, metres=values)
-        case DisparityMap():
-            return DisparityMap(values)
-
-
-def _is_alike(shape: tuple[int, ...], size: ImageSize) -> bool:
-    """Whether two (height, width) have nearly the same aspect ratio."""
-    return abs(shape[1] * size.height / (shape[0] * size.width) - 1) <= MAX_ASPECT_DIFFERENCE
