@@ -81,7 +81,7 @@ def _measure(whole_guide, colors, whole_distance, rows, columns, x0, y0, x1, y1,
     """
     # Cut out here: what a slice is to Numba depends on whether it is as wide as the photo.
     guide = np.ascontiguousarray(whole_guide[rows.start : rows.stop + 2, columns.start : columns.stop + 2])
-    distance = whole_distance[rows, columns]
+    distance, flat = whole_distance[rows, columns], guide.reshape(-1, guide.shape[2])
     height, width = distance.shape
     # Pixels have one index, in rows with the border, which no way is short enough to enter.
     pitch, size = width + 2, (height + 2) * (width + 2)
@@ -118,8 +118,7 @@ def _measure(whole_guide, colors, whole_distance, rows, columns, x0, y0, x1, y1,
             if here + straight >= 1.0:
                 continue
             if own < 0.0:
-                y, x = at // pitch, at % pitch
-                own = unlikeness(guide[y, x, 0], guide[y, x, 1], guide[y, x, 2], colors)
+                own = unlikeness(flat[at, 0], flat[at, 1], flat[at, 2], colors)
             for k in range(8):
                 other, there = at + around[k], here + (straight if k < 4 else diagonal)
                 if not there < away[other]:
@@ -127,8 +126,7 @@ def _measure(whole_guide, colors, whole_distance, rows, columns, x0, y0, x1, y1,
                 # A step, and the climb to a less alike colour; to come back to an alike one is free.
                 if climb[other] != 0.0:
                     if climb[other] < 0.0:
-                        y, x = other // pitch, other % pitch
-                        climb[other] = unlikeness(guide[y, x, 0], guide[y, x, 1], guide[y, x, 2], colors)
+                        climb[other] = unlikeness(flat[other, 0], flat[other, 1], flat[other, 2], colors)
                     there += max(climb[other] - own, np.float32(0.0)) / np.float32(CONTOUR_CONTRAST)
                     if not there < away[other]:
                         continue

@@ -14,12 +14,8 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.training.distributions import log_uniform
+from iibr_core.training.scenes.primitives import BALL, BOX, PLANE, PRIMITIVE, WIRE
 from iibr_core.training.scenes.raycast import (
-    BALL,
-    BOX,
-    PLANE,
-    PRIMITIVE,
-    WIRE,
     RaycastScene,
     cast,
     disparity_at,
@@ -36,8 +32,9 @@ OBJECTS = (3, 60)
 DEPTH_RATIO = (1.25, 5.0)
 """Greatest against least depth of a scene."""
 FOCAL_WIDTHS = (0.8, 2.0)
-WITHOUT_END = 1e9
 THINNEST = 1e-9
+WITHOUT_END = np.array([1e9, 1e9, THINNEST])
+"""Half extents of a plane."""
 
 Primitive = NDArray[np.void]
 Vector = NDArray[np.float64]
@@ -187,8 +184,7 @@ def _fit_into_depths(
 
 
 def _last_plane(bounds: _SceneBounds) -> Primitive:
-    half = np.array([WITHOUT_END, WITHOUT_END, THINNEST])
-    return _paint(bounds, PLANE, np.array([0.0, 0.0, bounds.greatest_z]), np.eye(3), half)
+    return _paint(bounds, PLANE, np.array([0.0, 0.0, bounds.greatest_z]), np.eye(3), WITHOUT_END)
 
 
 def _backdrop_planes(bounds: _SceneBounds) -> list[Primitive]:
@@ -212,13 +208,7 @@ def _crossing_plane(bounds: _SceneBounds) -> Primitive:
     third = np.array([slope[0] * bounds.focal_px, slope[1] * bounds.focal_px, middle])
     third /= np.linalg.norm(third)
     centre = np.array([0.0, 0.0, bounds.focal_px / middle])
-    plane = _paint(
-        bounds,
-        PLANE,
-        centre,
-        _axes_about(third, rng.uniform(0, 2 * pi)),
-        np.array([WITHOUT_END, WITHOUT_END, THINNEST]),
-    )
+    plane = _paint(bounds, PLANE, centre, _axes_about(third, rng.uniform(0, 2 * pi)), WITHOUT_END)
     plane["nearest_z"] = bounds.least_z
     return plane
 

@@ -17,34 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from iibr_core.runtime.jit import kernel, srgb_scalar
 from iibr_core.runtime.tiling import THREADS
-from iibr_core.training.scenes.textures import inside_pattern, is_cut, noise, pattern, rough_noise
+from iibr_core.training.scenes.primitives import PLANE, albedo_at, distance_along, normal_at
+from iibr_core.training.scenes.textures import is_cut
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
-
-PLANE, BOX, BALL, WIRE = range(4)
-"""A rectangle, a box, an ellipsoid, the side of a cylinder along its third axis."""
-
-PRIMITIVE = np.dtype(
-    [
-        ("shape", "i8"),
-        ("centre", "f8", 3),
-        ("axes", "f8", (3, 3)),  # rows: the primitive's own axes in the world, orthonormal
-        ("half", "f8", 3),  # half extents along them
-        ("nearest_z", "f8"),
-        ("cut", "i8"),  # of planes: textures.WHOLE, ...
-        ("cut_period", "f8"),
-        ("cut_width", "f8"),
-        ("pattern", "i8"),
-        ("period", "f8"),
-        ("roughness", "f8"),  # share of rough noise against the pattern
-        ("wavelength", "f8"),  # of the coarsest rough noise
-        ("gain", "f8"),  # strength of each octave of rough noise against the coarser
-        ("tint", "f8"),  # share of the third colour
-        ("phase", "f8", 3),
-        ("palette", "f8", (3, 3)),  # three colours in linear light, 0 .. 1
-        ("seed", "i8"),
-    ],
-    align=True,
-)
 
 CHUNK_PIXELS = 4096
 FARTHEST = 1e7
@@ -190,75 +165,6 @@ def _bounds(scene: RaycastScene, camera: NDArray[np.float64]) -> NDArray[np.floa
 
 
 @kernel
-def _distance(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):
-    """How far along a ray it meets a primitive, both in the primitive's own frame; infinite where it does not."""
-    if shape == PLANE:
-        # The plane z = 0 of its own frame, within its rectangle.
-        z = -oz / ez if ez != 0.0 else inf
-        return z if abs(ox + z * ex) <= hx and abs(oy + z * ey) <= hy else inf
-    if shape == BOX:
-        # Slab test: inside between the last of the near faces and the first of the far ones. Along a face the quotients
-        # are infinite, which compares as it should.
-        ax, bx = (-hx - ox) / ex, (hx - ox) / ex
-        ay, by = (-hy - oy) / ey, (hy - oy) / ey
-        az, bz = (-hz - oz) / ez, (hz - oz) / ez
-        enter = max(min(ax, bx), min(ay, by), min(az, bz))
-        leave = min(max(ax, bx), max(ay, by), max(az, bz))
-        return enter if enter <= leave else inf
-    if shape == BALL:
-        # Scaled to the unit ball: a t^2 + 2 b t + c = 0.
-        ox, oy, oz, ex, ey, ez = ox / hx, oy / hy, oz / hz, ex / hx, ey / hy, ez / hz
-        a, b, c = ex * ex + ey * ey + ez * ez, ox * ex + oy * ey + oz * ez, ox * ox + oy * oy + oz * oz - 1
-    else:
-        # The cylinder about the third axis: the same without z.
-        a, b, c = ex * ex + ey * ey, ox * ex + oy * ey, ox * ox + oy * oy - hx * hx
-    # Missed, or moving away from its middle.
-    inside = b * b - a * c
-    if not inside > 0.0 or b >= 0.0:
-        return inf
-    # The nearer root, in the form that does not cancel digits.
-    z = c / (sqrt(inside) - b)
-    return z if shape == BALL or abs(oz + z * ez) <= hz else inf
-
-
-@kernel
-def _normal(shape, x, y, z, hx, hy, hz):
-    """The unit normal at a point of a primitive, in its own frame."""
-    if shape == PLANE:
-        return 0.0, 0.0, 1.0
-    if shape == BOX:
-        # The face that the point lies on: its largest coordinate, relative to the box.
-        ax, ay, az = abs(x) / hx, abs(y) / hy, abs(z) / hz
-        if ax >= ay and ax >= az:
-            return 1.0 if x > 0 else -1.0, 0.0, 0.0
-        return (0.0, 1.0 if y > 0 else -1.0, 0.0) if ay >= az else (0.0, 0.0, 1.0 if z > 0 else -1.0)
-    # Along the gradient of (x / hx)^2 + (y / hy)^2 + (z / hz)^2; that of a cylinder has no z.
-    nx, ny, nz = x / (hx * hx), y / (hy * hy), z / (hz * hz) if shape == BALL else 0.0
-    length = max(sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
-    return nx / length, ny / length, nz / length
-
-
-@kernel
-def _albedo(p, x, y, z, pixel):
-    """Colour of a primitive at a point of its own frame, linear light; see textures for `pixel`."""
-    x, y, z = inside_pattern(x) + p.phase[0], inside_pattern(y) + p.phase[1], inside_pattern(z) + p.phase[2]
-    # Mix of pattern and rough noise between two colours of the palette; coarse noise tints it with the third.
-    rough = rough_noise(x, y, z, p.wavelength, p.gain, pixel, p.seed)
-    share = pattern(p.pattern, x, y, z, p.period, pixel, p.seed + 11)
-    share += (rough - share) * p.roughness
-    coarse = 1.7 * p.wavelength
-    tint = p.tint * noise(x / coarse, y / coarse, z / coarse, p.seed + 12)
-    r = p.palette[0, 0] + (p.palette[1, 0] - p.palette[0, 0]) * share
-    g = p.palette[0, 1] + (p.palette[1, 1] - p.palette[0, 1]) * share
-    b = p.palette[0, 2] + (p.palette[1, 2] - p.palette[0, 2]) * share
-    return (
-        r + (p.palette[2, 0] - r) * tint,
-        g + (p.palette[2, 1] - g) * tint,
-        b + (p.palette[2, 2] - b) * tint,
-    )
-
-
-@kernel
 def _find_met(bounds, x, y, margin, met):
     """Broad phase: the primitives but the backdrop whose bounds a pixel's rays may meet, in order; returns how many."""
     count = 0
@@ -299,7 +205,7 @@ def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, ca
                 ey = axes[k, 1, 0] * wx + axes[k, 1, 1] * wy + axes[k, 1, 2]
                 ez = axes[k, 2, 0] * wx + axes[k, 2, 1] * wy + axes[k, 2, 2]
                 hx, hy, hz = p.half[0], p.half[1], p.half[2]
-                z = _distance(p.shape, origins[k, 0], origins[k, 1], origins[k, 2], ex, ey, ez, hx, hy, hz)
+                z = distance_along(p.shape, origins[k, 0], origins[k, 1], origins[k, 2], ex, ey, ez, hx, hy, hz)
                 # In the range of depths, nearer than all before, and not through a hole cut into it.
                 if least_z <= z < depth:
                     u, v = origins[k, 0] + z * ex, origins[k, 1] + z * ey
@@ -310,15 +216,13 @@ def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, ca
                 disparity[n] = focal / depth - infinity
             if weights[sample] == 0.0:
                 continue
-
             # Shading: the point in its primitive's frame, the normal there, turned back into the world.
             p = primitives[hit]
-            hx, hy, hz = p.half[0], p.half[1], p.half[2]
             ex = axes[hit, 0, 0] * wx + axes[hit, 0, 1] * wy + axes[hit, 0, 2]
             ey = axes[hit, 1, 0] * wx + axes[hit, 1, 1] * wy + axes[hit, 1, 2]
             ez = axes[hit, 2, 0] * wx + axes[hit, 2, 1] * wy + axes[hit, 2, 2]
             u, v, w = origins[hit, 0] + depth * ex, origins[hit, 1] + depth * ey, origins[hit, 2] + depth * ez
-            a, b, c = _normal(p.shape, u, v, w, hx, hy, hz)
+            a, b, c = normal_at(p.shape, u, v, w, p.half[0], p.half[1], p.half[2])
             nx = axes[hit, 0, 0] * a + axes[hit, 1, 0] * b + axes[hit, 2, 0] * c
             ny = axes[hit, 0, 1] * a + axes[hit, 1, 1] * b + axes[hit, 2, 1] * c
             nz = axes[hit, 0, 2] * a + axes[hit, 1, 2] * b + axes[hit, 2, 2] * c
@@ -328,7 +232,7 @@ def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, ca
             towards = nx * px + ny * py + nz * depth
             cosine = abs(towards) / sqrt(px * px + py * py + depth * depth)
             pixel = depth / focal * min(max(STEEPEST / max(cosine, 1e-6), 1.0), 20.0)
-            r, g, b = _albedo(p, u, v, w, pixel)
+            r, g, b = albedo_at(p, u, v, w, pixel)
 
             # Planes have the same light on both sides, or a view from the other side would change their colour.
             facing = -1.0 if p.shape == PLANE and towards > 0 else 1.0

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.training.scenes.primitives import BALL, BOX, PLANE, PRIMITIVE, WIRE
 from iibr_core.training.scenes.random_scene import (
     RaycastScene,
     cast,
@@ -14,7 +15,6 @@ from iibr_core.training.scenes.random_scene import (
     render,
     sample_places,
 )
-from iibr_core.training.scenes.raycast import BALL, BOX, PLANE, PRIMITIVE, WIRE
 from iibr_core.types import ImageSize, ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)
