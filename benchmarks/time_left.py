@@ -27,7 +27,7 @@ from benchmarks.harness.report import emit, head, holds, is_wanted, parser_of, r
 from benchmarks.harness.scenes import DEMO, write_photos
 from benchmarks.harness.timing import COMMAND_LINE
 from iibr_core.runtime.time_left import TimeLeft
-from viewer.background import opening_work
+from iibr_core.scenes import opening_work
 from viewer.cli import terminal
 
 ENOUGH = 0.1

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
-from viewer.model.state.scene import Source
 
 from iibr_core.runtime.resources import resource_folder
+from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import DismissNotices, SetHover
