@@ -7,8 +7,9 @@ is closer. Light fields are (V, U, H, W, ...), v down, u right; their disparity 
 
 from __future__ import annotations
 
-from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
     from iibr_core.interface.fields import FORMATS, LightField, View
@@ -17,30 +18,13 @@ if TYPE_CHECKING:
     from iibr_core.runtime.tiling import Cancelled
     from iibr_core.types import InputError
 
-_PLACES = {
-    "FORMATS": "interface.fields",
-    "LightField": "interface.fields",
-    "View": "interface.fields",
-    "Comparison": "interface.judging",
-    "compare": "interface.judging",
-    "evaluate": "interface.judging",
-    "Scene": "interface.scenes",
-    "estimate_depth": "interface.scenes",
-    "from_arrays": "interface.scenes",
-    "open": "interface.scenes",
-    "Cancelled": "runtime.tiling",
-    "InputError": "types",
-}
 __all__ = [
     "FORMATS", "Cancelled", "Comparison", "InputError", "LightField", "Scene", "View", "compare", "estimate_depth",
     "evaluate", "from_arrays", "open",
 ]  # fmt: skip
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return resolve_name(f"{__name__}.{_PLACES[name]}:{name}")
+__getattr__ = offered_by(__file__)
 
 
 def __dir__() -> list[str]:

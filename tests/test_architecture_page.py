@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -32,3 +34,25 @@ def test_files_and_records_are_there(files: str, records: str) -> None:
     assert all(sources)
     for record in re.findall(r"`(\w+)`", records):
         assert re.search(rf"^class {record}\b", core, re.MULTILINE), record
+
+
+MOST_CORE_MODULES = 19
+"""That the viewer and the command line import. A room offers names in its `__init__.py`: take them from there."""
+
+
+def test_the_viewer_reaches_the_core_by_its_rooms() -> None:
+    imported = set()
+    for path in (ROOT / "viewer").rglob("*.py"):
+        imported |= set(re.findall(r"^\s*(?:from|import) (iibr_core[\w.]*)", path.read_text("utf-8"), re.MULTILINE))
+    assert len(imported) <= MOST_CORE_MODULES, sorted(imported)
+
+
+@pytest.mark.parametrize(
+    "init", [path for path in (ROOT / "iibr_core").rglob("__init__.py")], ids=lambda p: p.parent.name
+)
+def test_a_room_has_every_name_that_it_offers(init: Path) -> None:
+    blocks = [node for node in ast.parse(init.read_text("utf-8")).body if isinstance(node, ast.If)]
+    room = import_module(".".join(init.parent.relative_to(ROOT).parts))
+    offered = {name.name for block in blocks for node in block.body for name in getattr(node, "names", ())}
+    assert all(hasattr(room, name) for name in offered)
+    assert not any((init.parent / f"{name}.py").exists() for name in offered), "a file hides a name"

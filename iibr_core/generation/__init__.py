@@ -1,1 +1,39 @@
-"""All views of a light field, and what making them takes."""
+"""All views of a light field, and what making them takes.
+
+What the viewer asks for has its name here, and is imported once it is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from iibr_core.runtime.offers import offered_by
+
+if TYPE_CHECKING:
+    from iibr_core.generation.dense_field import densify, require_steps
+    from iibr_core.generation.free_views import (
+        FreeViews,
+        depths_of,
+        fitted_cameras,
+        inverse_depth_of,
+        reach_of,
+        steered,
+    )
+    from iibr_core.generation.given_views import DenseFieldWork, read_given_views
+    from iibr_core.generation.light_field import generate, ray_set, transformer_for
+    from iibr_core.generation.memory_model import (
+        PHOTO_BYTES,
+        READING_BYTES,
+        budget_of,
+        require_field,
+        require_free_views,
+        require_matching,
+        require_picture,
+        require_process,
+        whole_bytes,
+    )
+    from iibr_core.generation.plan import ScenePlan, plan_literal
+    from iibr_core.generation.relief import measure_relief
+    from iibr_core.generation.stored_views import encode_for_storage, stored_colors
+
+__getattr__ = offered_by(__file__)

@@ -1,1 +1,17 @@
-"""Content for what the photo never saw."""
+"""Content for what the photo never saw.
+
+What the viewer asks for has its name here, and is imported once it is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from iibr_core.runtime.offers import offered_by
+
+if TYPE_CHECKING:
+    from iibr_core.inpainting.background import fill_background
+    from iibr_core.inpainting.protocol import Inpainter
+    from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, load_inpainter, require_inpainter
+
+__getattr__ = offered_by(__file__)

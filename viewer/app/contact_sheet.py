@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.scenes.lens_limits import aperture_limit
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.scenes import ScreenSize, aperture_limit
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
 from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetFocus

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes import LoadedPhoto
 from viewer.background.depth_estimate import DepthEstimates, Estimated, EstimateRequest, EstimateResult
 from viewer.background.jobs import Failed
 from viewer.display.scene_view import SceneView

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from iibr_core.scenes.gloss import GlossFound, GlossRequest
+from iibr_core.scenes import GlossFound, GlossRequest
 from viewer.background.gloss import GlossWorker
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify

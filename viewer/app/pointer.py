@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from iibr_core.scenes.lens_limits import focus_limits
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes import Scene, focus_limits
 from iibr_core.types import ViewOffset
 from viewer.model.actions import Action, EndGesture, ReturnHome, SetHover
 from viewer.model.inspection_request import view_at

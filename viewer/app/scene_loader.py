@@ -6,9 +6,19 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from iibr_core.scenes.loaded_photo import LoadedPhoto, prepare_brush, without_history
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, WantedPhoto, sketch_of
-from iibr_core.scenes.scene import DepthSettings, Source, source_beside
+from iibr_core.scenes import (
+    DepthSettings,
+    LoadedPhoto,
+    SceneReady,
+    SceneRequest,
+    Source,
+    ViewReady,
+    WantedPhoto,
+    prepare_brush,
+    sketch_of,
+    source_beside,
+    without_history,
+)
 from iibr_core.types import InputError, ViewOffset
 from viewer.app.depth_finder import DepthFinder
 from viewer.background.depth_estimate import same_places

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.full_picture import FullPicture, encode_light, is_full, needs_smaller
-from iibr_core.runtime.tiling import Cancelled
-from iibr_core.scenes.loaded_photo import LoadedPhoto
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.exports import FullPicture, encode_light, is_full, needs_smaller
+from iibr_core.runtime import Cancelled
+from iibr_core.scenes import LoadedPhoto, ScreenSize
 from iibr_core.types import SRGB, FloatImage
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.display.scene_view import SceneView, window_of
@@ -29,7 +28,7 @@ from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.large_views import LargePhoto
+    from iibr_core.rendering import LargePhoto
 
 
 @dataclass(frozen=True, eq=False)

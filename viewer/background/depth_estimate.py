@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from iibr_core.scenes.loaded_photo import LoadedPhoto, deepen
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes import LoadedPhoto, Source, deepen
 from iibr_core.types import FloatImage
 from viewer.background.jobs import Failed, Job, JobThread
 from viewer.model.actions import SamePlaces

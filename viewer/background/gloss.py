@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 
-from iibr_core.rendering.gloss.settings import Gloss
-from iibr_core.runtime.tiling import Cancelled
-from iibr_core.scenes.gloss import GlossFound, GlossRequest, answer
+from iibr_core.rendering.gloss import Gloss
+from iibr_core.runtime import Cancelled
+from iibr_core.scenes import GlossFound, GlossRequest, answer
 from viewer.background.jobs import Failed, Job, JobThread
 
 GlossResult = GlossFound | Failed[Gloss]

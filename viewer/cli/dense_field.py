@@ -12,8 +12,8 @@ from viewer.cli.terminal import MAKING, print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from iibr_core.formats.light_fields.registry import WriterFactory
-    from iibr_core.scenes.scene import Source
+    from iibr_core.formats import WriterFactory
+    from iibr_core.scenes import Source
 
 NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
 """Options that say nothing about views between those of a light field."""
@@ -23,12 +23,9 @@ def write_dense_field(
     source: Source, grid: GridShape, out: Path, new_writer: WriterFactory, with_disparity: bool
 ) -> None:
     """To a place that the writer admits. Raises InputError, also where the views find no places on the grid."""
-    from iibr_core.formats.light_fields.registry import open_light_field
-    from iibr_core.formats.light_fields.views import grid_of
-    from iibr_core.generation.dense_field import densify, require_steps
-    from iibr_core.generation.given_views import DenseFieldWork, read_given_views
-    from iibr_core.generation.memory_model import budget_of
-    from iibr_core.inpainting.registry import load_inpainter
+    from iibr_core.formats import grid_of, open_light_field
+    from iibr_core.generation import DenseFieldWork, budget_of, densify, read_given_views, require_steps
+    from iibr_core.inpainting import load_inpainter
 
     field = open_light_field(Path(source.path))
     require_steps(grid_of(field), grid, source.path)

@@ -23,12 +23,9 @@ def depth(
     Example: iibr depth field -o field_disparity.pfm
     """
     require_memory(memory, keeps_views=True)
-    from iibr_core.depth.multi_view.estimate import FINDING, estimate_coarse, estimate_disparity
-    from iibr_core.formats.light_fields.registry import open_light_field
-    from iibr_core.formats.light_fields.views import grid_of, read_views
-    from iibr_core.formats.maps.writer import write_map
-    from iibr_core.formats.outputs import require_file_place
-    from iibr_core.generation.memory_model import budget_of, require_field, require_matching
+    from iibr_core.depth import FINDING, estimate_coarse, estimate_disparity
+    from iibr_core.formats import grid_of, open_light_field, read_views, require_file_place, write_map
+    from iibr_core.generation import budget_of, require_field, require_matching
 
     require_file_place(out, inputs_of_command(context), force)
     scene = open_light_field(field)

@@ -10,23 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.files import is_file
-from iibr_core.runtime.extras import require_extra
+from iibr_core.depth import DepthChoice
+from iibr_core.formats import is_file
+from iibr_core.runtime import require_extra
 from iibr_core.types import InputError, Quality, ReportProgress
-from viewer.cli.options import (
-    DepthModel,
-    Force,
-    MaxPixels,
-    Refine,
-    inputs_of_command,
-    quality_from_text,
-    require_model,
-)
+from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, inputs_of_command, quality_from_text, require_model
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
-    from iibr_core.evaluation.trials import DisparityFrom
+    from iibr_core.evaluation import DisparityFrom
 
 
 def evaluate(
@@ -79,18 +71,15 @@ def evaluate(
     require_extra("evaluate", "scipy", "skimage", "jinja2", "flip_evaluator")
     if lpips is not None:
         require_extra("train", "torch")
-    from iibr_core.evaluation.report_folder import require_report_folder
+    from iibr_core.evaluation import require_report_folder
 
     named = (os.path.expanduser(name) for name in (disparity, depth_model) if name is not None)
     found = tuple(Path(name) for name in named if os.path.lexists(name))  # else: words, and names of models
     require_report_folder(out, inputs_of_command(context) + found, force)
 
-    from iibr_core.evaluation.datasets import find_scenes
-    from iibr_core.evaluation.protocol import QUALITIES, Options
-    from iibr_core.evaluation.protocol import evaluate as evaluate_scene
-    from iibr_core.evaluation.report import write_report
-    from iibr_core.evaluation.tables import summary_line
-    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+    from iibr_core.evaluation import QUALITIES, Options, find_scenes, summary_line, write_report
+    from iibr_core.evaluation import evaluate as evaluate_scene
+    from iibr_core.formats import DEFAULT_MAX_PIXELS
 
     chosen: tuple[Quality, ...] = tuple(dict.fromkeys(quality)) if quality else QUALITIES
     choice = DepthChoice(model=depth_model, refine=refine)
@@ -116,7 +105,7 @@ def _part_of(show: ReportProgress, before: int, total: int) -> ReportProgress:
 
 def _disparity_source(text: str) -> DisparityFrom | Path:
     """Where disparity comes from. Raises InputError for what is neither a word nor a file."""
-    from iibr_core.evaluation.trials import DisparityFrom
+    from iibr_core.evaluation import DisparityFrom
 
     words: tuple[DisparityFrom, ...] = get_args(DisparityFrom)
     for word in words:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.formats.light_fields.registry import is_light_field, writer_for
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.formats import is_light_field, writer_for
+from iibr_core.rendering.gloss import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field import NOT_FOR_DENSE_FIELDS, write_dense_field
 from viewer.cli.free_views import require_heeded_with_poses, require_poses_for, require_views_folder, write_free_views
@@ -32,8 +32,8 @@ from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from iibr_core.formats.light_fields.registry import WriterFactory
-    from iibr_core.scenes.scene import Source
+    from iibr_core.formats import WriterFactory
+    from iibr_core.scenes import Source
 
 
 @with_option_records
@@ -113,10 +113,8 @@ def _write_light_field(
     require_model(source.depth)
 
     from iibr_core.color import photo_in_srgb
-    from iibr_core.generation.light_field import generate as generated
-    from iibr_core.scenes.gloss import add_gloss
-    from iibr_core.scenes.loaded_photo import inpainting_aids, load_photo, make_plan
-    from iibr_core.scenes.opening import scene_of_photo
+    from iibr_core.generation import generate as generated
+    from iibr_core.scenes import add_gloss, inpainting_aids, load_photo, make_plan, scene_of_photo
 
     with show_progress("reading") as show:
         loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)

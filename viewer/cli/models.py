@@ -24,8 +24,7 @@ def list_models(context: typer.Context) -> None:
     """
     if context.invoked_subcommand is not None:
         return
-    from iibr_core.depth.estimators.catalog import KNOWN_MODELS, state_of
-    from iibr_core.depth.estimators.words import words_about
+    from iibr_core.depth.estimators import KNOWN_MODELS, state_of, words_about
 
     names = max(len(model.name) for model in KNOWN_MODELS)
     for model in KNOWN_MODELS:
@@ -45,8 +44,7 @@ def get(
 
     Example: iibr models get depth-anything-v2-small
     """
-    from iibr_core.depth.estimators.catalog import fetch, known_model, model_here, state_of
-    from iibr_core.depth.estimators.words import words_about
+    from iibr_core.depth.estimators import fetch, known_model, model_here, state_of, words_about
 
     model = known_model(name)
     found = model_here(model)

@@ -14,7 +14,7 @@ def plan(photo: PhotoPath, scene: SceneOptions, focus_disparity: FocusDisparity 
     Example: iibr plan photo.png --disparity photo.pfm
     """
     require_memory(scene.memory, keeps_views=True)
-    from iibr_core.scenes.loaded_photo import load_photo, make_plan
+    from iibr_core.scenes import load_photo, make_plan
 
     source = scene.source(photo, grid, focus_disparity)
     loaded = load_photo(source)

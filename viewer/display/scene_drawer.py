@@ -10,15 +10,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.exports.render_settings import RenderSettings, require_size
-from iibr_core.exports.source import ExportSource
-from iibr_core.rendering.gloss.settings import Gloss
-from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.tiling import never
-from iibr_core.scenes.gloss import answer
-from iibr_core.scenes.lens_limits import LensChoice
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.exports import ExportSource, RenderSettings, require_size
+from iibr_core.rendering import CENTRE
+from iibr_core.rendering.gloss import Gloss
+from iibr_core.runtime import never
+from iibr_core.scenes import LensChoice, Scene, SceneReady, SceneRequest, Source, ViewReady, answer, results_of
 from iibr_core.types import ReportProgress, ignore_progress
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import create_headless

@@ -14,14 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.render_settings import RenderSettings, TargetWindow
-from iibr_core.rendering.gloss.settings import Gloss
-from iibr_core.rendering.optics import CENTRE, Optics
-from iibr_core.scenes.gloss import GlossFound, GlossRequest
-from iibr_core.scenes.loaded_photo import LoadedPhoto
-from iibr_core.scenes.opening import SceneReady
-from iibr_core.scenes.scene import Scene
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.exports import RenderSettings, TargetWindow
+from iibr_core.rendering import CENTRE, Optics
+from iibr_core.rendering.gloss import Gloss
+from iibr_core.scenes import GlossFound, GlossRequest, LoadedPhoto, Scene, SceneReady, ScreenSize
 from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.scenes.gloss import GlossFound
-from iibr_core.scenes.loaded_photo import LoadedPhoto
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes import GlossFound, LoadedPhoto, Scene
 from iibr_core.types import ViewUpdate
 from viewer.gpu.light_field_texture import LightFieldTexture
 

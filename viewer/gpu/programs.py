@@ -15,7 +15,7 @@ from typing import Any
 import moderngl
 
 from iibr_core.color import primaries_matrix
-from iibr_core.runtime.resources import resource_folder
+from iibr_core.runtime import resource_folder
 from iibr_core.types import ColorSpace
 
 _INCLUDE = re.compile(r'\s*#include\s+"([^"]+)"')

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.scenes import ScreenSize
 from viewer.model.zoom import MOST_ZOOM, Zoom
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0

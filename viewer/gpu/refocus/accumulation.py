@@ -10,9 +10,8 @@ from dataclasses import field as dataclass_field
 
 import moderngl
 
-from iibr_core.exports.render_settings import WHOLE, PictureCell
-from iibr_core.scenes.lens_limits import clamp_to_grid
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.exports import WHOLE, PictureCell
+from iibr_core.scenes import ScreenSize, clamp_to_grid
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache

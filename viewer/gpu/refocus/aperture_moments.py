@@ -11,8 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.aperture_shape import opening, openness
-from iibr_core.rendering.optics import ApertureShape
+from iibr_core.rendering import ApertureShape, opening, openness
 
 LEAST_SCALE = 0.4
 """An opening still smaller would leave next to no sample."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.render_settings import WHOLE_PICTURE, TargetWindow
-from iibr_core.rendering.optics import HIGHLIGHT_GAIN, Optics
+from iibr_core.exports import WHOLE_PICTURE, TargetWindow
+from iibr_core.rendering import HIGHLIGHT_GAIN, Optics
 from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel

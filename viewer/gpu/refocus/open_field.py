@@ -11,7 +11,7 @@ from viewer.gpu.gloss_textures import GlossTextures
 from viewer.gpu.light_field_texture import LightFieldTexture
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.gloss.shading import GlossMaps
+    from iibr_core.rendering.gloss import GlossMaps
 
 
 class OpenField:

@@ -10,7 +10,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from iibr_core.exports.render_settings import WHOLE_PICTURE, PictureCell
+from iibr_core.exports import WHOLE_PICTURE, PictureCell
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries

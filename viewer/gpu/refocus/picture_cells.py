@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from iibr_core.exports.render_settings import WHOLE, PictureCell
+from iibr_core.exports import WHOLE, PictureCell
 from iibr_core.types import GridShape
 from viewer.gpu.refocus.lens import Lens
 

@@ -15,9 +15,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.render_settings import WHOLE_PICTURE, RenderSettings, TargetWindow
-from iibr_core.rendering.optics import Optics
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.exports import WHOLE_PICTURE, RenderSettings, TargetWindow
+from iibr_core.rendering import Optics
+from iibr_core.scenes import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
@@ -41,7 +41,7 @@ from viewer.gpu.refocus.screen_image import ScreenImage
 from viewer.model.state.app_state import DrawReport
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.gloss.shading import GlossMaps
+    from iibr_core.rendering.gloss import GlossMaps
 
 PREPARED_SIZE = ScreenSize(16, 16)
 JUDGED_EVERY = 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.scenes import ScreenSize
 
 PART_PX = 2048
 """A part is no larger than this: its targets take about 70 bytes a pixel."""

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.aperture_shape import openness
-from iibr_core.rendering.optics import ApertureShape
-from iibr_core.scenes.lens_limits import clamp_to_grid
+from iibr_core.rendering import ApertureShape, openness
+from iibr_core.scenes import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.aperture_moments import scale_of
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from iibr_core.rendering.optics import Optics
-from iibr_core.scenes.scene import Scene
+from iibr_core.rendering import Optics
+from iibr_core.scenes import Scene
 from viewer.model.layout import Rect
 from viewer.model.state.app_state import TiltHandles
 

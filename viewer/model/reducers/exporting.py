@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.exports.kinds import EXPORTS
+from iibr_core.exports import EXPORTS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.saving import path_beside

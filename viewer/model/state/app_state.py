@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
-from iibr_core.rendering.optics import Optics
-from iibr_core.scenes.scene import AS_FOUND, DepthSettings, FilledField, Progress, Scene, Source
-from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.depth.editing import UNEDITED, DepthEdits, Stroke
+from iibr_core.rendering import Optics
+from iibr_core.scenes import AS_FOUND, DepthSettings, FilledField, Progress, Scene, ScreenSize, Source
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.layout import WHOLE, Rect
 from viewer.model.state.depth_editing import Brush

@@ -8,12 +8,20 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from iibr_core.exports.kinds import EXPORTS, ExportKind
-from iibr_core.exports.options import ANIMATIONS, AnimationKind, ExportOptions
-from iibr_core.exports.settings import MOST_FRAMES, RATE_LIMITS, ExportSettings, settle, size_of_width
-from iibr_core.formats.quilts import DEVICES
-from iibr_core.scenes.lens_limits import clamp
-from iibr_core.scenes.scene import Scene
+from iibr_core.exports import (
+    ANIMATIONS,
+    EXPORTS,
+    MOST_FRAMES,
+    RATE_LIMITS,
+    AnimationKind,
+    ExportKind,
+    ExportOptions,
+    ExportSettings,
+    settle,
+    size_of_width,
+)
+from iibr_core.formats import DEVICES
+from iibr_core.scenes import Scene, clamp
 from viewer.model.actions import Action, DoTask, ShowPrompt
 from viewer.model.layout import Layout
 from viewer.model.reducers.exporting import export_path_beside

@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 from imgui_bundle import imgui
 
-from iibr_core.rendering.gloss.settings import (
+from iibr_core.rendering.gloss import (
     LIGHT_RADIUS_LIMITS_DEG,
     MOST_TOLERANCE,
     STROKE_RADIUS_LIMITS,

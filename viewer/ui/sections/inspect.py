@@ -6,7 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes import Scene
 from viewer.model.actions import Action, DoTask, SetUnits
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout

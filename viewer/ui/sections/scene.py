@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes import Scene, Source
 from iibr_core.types import GridShape
 from viewer.model.actions import Action, DoTask
 from viewer.model.dense_field import chosen_grid, denser_grids, with_views_between

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from iibr_core.exports.loops import LOOPS
-from iibr_core.scenes.lens_limits import dolly_limit
-from iibr_core.scenes.scene import Scene
+from iibr_core.exports import LOOPS
+from iibr_core.scenes import Scene, dolly_limit
 from viewer.model.actions import Action, PauseMotion, ReturnHome, SetLoop, SetSpeed
 from viewer.model.commands import LOOP_WORDS
 from viewer.model.layout import Layout
