@@ -17,14 +17,13 @@ if TYPE_CHECKING:
     from iibr_core.interface.scenes import Scene, estimate_depth, from_arrays, open
     from iibr_core.runtime.tiling import Cancelled
     from iibr_core.types import InputError
+else:
+    __getattr__ = offered_by(__file__)
 
 __all__ = [
     "FORMATS", "Cancelled", "Comparison", "InputError", "LightField", "Scene", "View", "compare", "estimate_depth",
     "evaluate", "from_arrays", "open",
 ]  # fmt: skip
-
-
-__getattr__ = offered_by(__file__)
 
 
 def __dir__() -> list[str]:

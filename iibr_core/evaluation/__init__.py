@@ -17,5 +17,5 @@ if TYPE_CHECKING:
     from iibr_core.evaluation.report_folder import require_report_folder
     from iibr_core.evaluation.tables import summary_line
     from iibr_core.evaluation.trials import DisparityFrom
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

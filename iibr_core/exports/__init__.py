@@ -28,5 +28,5 @@ if TYPE_CHECKING:
     )
     from iibr_core.exports.settings import MOST_FRAMES, RATE_LIMITS, ExportSettings, settle, size_of_width
     from iibr_core.exports.source import ExportSource
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

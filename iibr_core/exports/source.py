@@ -17,7 +17,8 @@ from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
 from iibr_core.scenes.gloss import add_gloss
-from iibr_core.scenes.loaded_photo import LoadedPhoto, inpainting_aids
+from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.making import views_of_photo
 from iibr_core.scenes.scene import Progress, Scene
 from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
 
@@ -66,21 +67,8 @@ class ExportSource:
         if self.loaded is None:
             made = self._views_of_folder()
         else:
-            from iibr_core.color import photo_in_srgb
-            from iibr_core.generation.light_field import generate
-
             source, plan = self.scene.source, self.plan(zero)
-            disparity = plan.field_disparity(self.loaded.disparity)
-            aids = inpainting_aids(source, self.loaded, self.report_progress)
-            made = generate(
-                photo_in_srgb(self.loaded.photo),
-                disparity,
-                plan,
-                self.should_stop,
-                quality=source.quality,
-                inpaint=source.inpaint,
-                aids=aids,
-            )
+            made = views_of_photo(source, self.loaded, plan, self.should_stop, self.report_progress)
         scene = self.scene if zero is None else replace(self.scene, infinity_px=self._infinity_px(zero))
         made = add_gloss(made, self.optics.gloss, scene, self.should_stop)
         for view in made:

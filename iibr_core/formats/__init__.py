@@ -62,5 +62,5 @@ if TYPE_CHECKING:
     from iibr_core.formats.poses import central_camera, read_poses
     from iibr_core.formats.quilts import DEVICES
     from iibr_core.formats.unfinished import CLAIMS
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

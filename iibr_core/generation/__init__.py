@@ -35,5 +35,5 @@ if TYPE_CHECKING:
     from iibr_core.generation.plan import ScenePlan, plan_literal
     from iibr_core.generation.relief import measure_relief
     from iibr_core.generation.stored_views import encode_for_storage, stored_colors
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

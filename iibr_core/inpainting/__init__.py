@@ -13,5 +13,5 @@ if TYPE_CHECKING:
     from iibr_core.inpainting.background import fill_background
     from iibr_core.inpainting.protocol import Inpainter
     from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, load_inpainter, require_inpainter
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

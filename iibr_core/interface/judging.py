@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from iibr_core.evaluation import protocol
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.interface.scenes import encoded
+from iibr_core.interface.pictures import encoded
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, ReportProgress, ignore_progress

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack, get_args
@@ -14,24 +14,26 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, photo_in_srgb
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.depth.search import open_with_depth
-from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_photo
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.light_fields.registry import is_light_field, open_light_field
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
-from iibr_core.generation.light_field import generate
 from iibr_core.generation.memory_model import budget_of
-from iibr_core.generation.plan import PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
+from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.view_maker import ViewMaker
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.interface.fields import LightField, MakeView, View, gather
+from iibr_core.interface.pictures import photo_of
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.scenes.dense import read_dense
+from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo, photo_of_arrays
+from iibr_core.scenes.making import make_plan, views_of_photo
+from iibr_core.scenes.scene import Source
 from iibr_core.types import (
     Disparity,
     FloatImage,
     GridShape,
     InputError,
-    Photo,
     Quality,
     ReportProgress,
     ViewOffset,
@@ -128,38 +130,41 @@ def _told(made: _Making, should_stop: ShouldStop, report_progress: ReportProgres
 class PhotoScene(Scene):
     """A photo and its disparity."""
 
-    def __init__(self, photo: Photo, disparity: Disparity, depth_source: str) -> None:
-        self._photo, self._given = photo_in_srgb(photo), disparity
-        self.name, self.photo, self.focal_px = photo.name, self._photo.pixels, photo.focal_px
-        self.depth_source, self.notes = depth_source, photo.notes + disparity.notes
+    def __init__(self, loaded: LoadedPhoto, source: Source) -> None:
+        """source: what it was opened by; the options of each light field change what they name."""
+        self._loaded, self._source = loaded, source
+        photo = loaded.photo
+        self.name, self.photo, self.focal_px = photo.name, photo_in_srgb(photo).pixels, photo.focal_px
+        self.depth_source, self.notes = loaded.origin.words, photo.notes + loaded.disparity.notes
 
     @property
     def disparity(self) -> FloatImage:
         """As it was given or found, (H, W) float32, larger is closer."""
-        return self._given.values
+        return self._loaded.disparity.values
 
     def plan(self, grid: Grid = None, **options: Unpack[ViewOptions]) -> ScenePlan:
         """What will be made, and what that takes. Arguments of `light_field`. Raises InputError."""
+        return make_plan(self._source_for(grid, options), self._loaded, options.get("depth_strength", 1.0))
+
+    def _source_for(self, grid: Grid, options: ViewOptions) -> Source:
+        """Raises InputError for options that mean nothing."""
         _require_known(options, ViewOptions.__annotations__)
-        shape, strength = _grid_shape(grid), options.get("depth_strength", 1.0)
-        parallax = options.get("parallax", "viewing")
-        memory, quality, inpaint = options.get("memory_bytes"), options.get("quality"), _inpainting(options)
+        shape, parallax, quality = _grid_shape(grid), options.get("parallax", "viewing"), options.get("quality")
         if quality not in (None, *get_args(Quality)):
             raise InputError(f"quality {quality!r}: give {' or '.join(map(repr, get_args(Quality)))}")
-        if parallax == "viewing":
-            overrides = PlanOverrides(shape, strength, None, memory, quality, inpaint)
-            return plan_for_viewing(self._photo, self._given, overrides)
-        if parallax != "literal":
+        if parallax not in get_args(Parallax):
             raise InputError(f"parallax {parallax!r}: give 'viewing' or 'literal'")
-        if shape is None or strength != 1:
+        if parallax == "literal" and (shape is None or options.get("depth_strength", 1) != 1):
             raise InputError("parallax 'literal' takes disparity as it is: give a grid, and no depth_strength")
-        return plan_literal(self._photo, self._given, shape, memory, quality, keeps_views=True, inpaint=inpaint)
+        depth = replace(self._source.depth, memory_bytes=options.get("memory_bytes"))
+        inpaint, is_literal = _inpainting(options), parallax == "literal"
+        return replace(self._source, depth=depth, grid=shape, quality=quality, inpaint=inpaint, is_literal=is_literal)
 
     def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
         plan = self.plan(grid, **options)
-        disparity = plan.field_disparity(self._given)
-        views = generate(self._photo, disparity, plan, should_stop, inpaint=_inpainting(options))
-        return _Making(plan.grid, views, _ViewsBetween(self.photo, disparity.values, plan), "making views")
+        views = views_of_photo(self._source_for(grid, options), self._loaded, plan, should_stop)
+        values = plan.field_disparity(self._loaded.disparity).values
+        return _Making(plan.grid, views, _ViewsBetween(self.photo, values, plan), "making views")
 
 
 class FieldScene(Scene):
@@ -176,15 +181,9 @@ class FieldScene(Scene):
         wanted = _grid_shape(grid) or self._grid
         if wanted == self._grid:
             return _Making(wanted, read_views(self._field)[1], None, "reading views")
-        return _Making(wanted, self._denser(wanted, should_stop, options), None, "making views")
-
-    def _denser(self, grid: GridShape, should_stop: ShouldStop, options: ViewOptions) -> Iterator[View]:
-        from iibr_core.generation.dense_field import densify, require_steps
-        from iibr_core.generation.given_views import read_given_views
-
-        require_steps(self._grid, grid, self.name)
-        given = read_given_views(self._field, budget_of(options.get("memory_bytes")), should_stop)
-        return densify(given, self._grid, grid, should_stop, load_inpainter(_inpainting(options)))
+        budget = budget_of(options.get("memory_bytes"))
+        dense = read_dense(self._field, wanted, budget, _inpainting(options), should_stop)
+        return _Making(wanted, dense.views, None, "making views")
 
 
 def open(
@@ -204,10 +203,8 @@ def open(
     path = Path(path)
     if is_light_field(path):
         return FieldScene(open_light_field(path))
-    found = open_with_depth(
-        path, _choice_of(depth, refine), max_pixels, should_stop=should_stop, report_progress=report_progress
-    )
-    return PhotoScene(found.photo, found.disparity, found.origin.words)
+    source = Source(str(path), _choice_of(depth, refine), max_pixels=max_pixels)
+    return PhotoScene(load_photo(source, should_stop, report_progress, keeps_views=False), source)
 
 
 def from_arrays(
@@ -218,13 +215,14 @@ def from_arrays(
     focal_px: focal length in px, None for that of a usual lens. The disparity counts as it is: nothing is refined, and
     its unit matters for parallax "literal" alone. Raises InputError for other shapes and values that are not finite.
     """
-    given, disparity = _photo_of(photo, focal_px, name), np.asarray(disparity)
+    given, disparity = photo_of(photo, focal_px, name), np.asarray(disparity)
     if disparity.shape != given.size:
         raise InputError(
             f"a disparity of shape {disparity.shape} for a photo of {tuple(given.size)}: give the same (H, W)"
         )
     with np.errstate(over="ignore"):
-        return PhotoScene(given, Disparity(disparity.astype(np.float32), "the given array"), "the given array")
+        values = disparity.astype(np.float32)
+    return PhotoScene(photo_of_arrays(given, Disparity(values, "the given array")), Source(""))
 
 
 def estimate_depth(
@@ -239,7 +237,7 @@ def estimate_depth(
     height in the picture and contours alone; None: the recommended one. Raises InputError where it is not here or gives
     nothing of use, Cancelled once should_stop is true.
     """
-    given = read_photo(Path(photo)) if isinstance(photo, str | Path) else _photo_of(photo)
+    given = read_photo(Path(photo)) if isinstance(photo, str | Path) else photo_of(photo)
     if model == "guess":
         from iibr_core.depth.pictorial_cues import estimate_from_cues
 
@@ -297,17 +295,3 @@ def _choice_of(depth: DepthStart | str | Path, refine: float) -> DepthChoice:
         case "auto" | "embedded" | "model" | "rough" | "flat":
             return DepthChoice(depth, refine=refine)
     return DepthChoice(file=str(depth), refine=refine)
-
-
-def _photo_of(pixels: NDArray[Any], focal_px: float | None = None, name: str = "photo") -> Photo:
-    pixels = np.asarray(pixels)
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or not pixels.size:
-        raise InputError(f"a photo of shape {pixels.shape}: give (H, W, 3)")
-    given = np.maximum(encoded(pixels), 0)
-    return Photo(given, focal_px or focal_px_from_fov(pixels.shape[1]), name, is_hdr=bool(given.max() > 1))
-
-
-def encoded(pixels: NDArray[Any]) -> FloatImage:
-    """float32, 1 = white."""
-    with np.errstate(over="ignore"):
-        return encoded_from_stored(pixels) if pixels.dtype == np.uint8 else pixels.astype(np.float32)

@@ -25,5 +25,5 @@ if TYPE_CHECKING:
     )
     from iibr_core.rendering.ray_set import RaySet
     from iibr_core.rendering.view_synthesis import ViewSynthesis
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

@@ -17,5 +17,5 @@ if TYPE_CHECKING:
     from iibr_core.runtime.resources import resource_folder
     from iibr_core.runtime.tiling import Cancelled, ShouldStop, never, raise_if_stopped
     from iibr_core.runtime.time_left import TimeLeft, about_left
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

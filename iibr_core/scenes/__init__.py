@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
+    from iibr_core.scenes.dense import read_dense
     from iibr_core.scenes.gloss import GlossFound, GlossRequest, add_gloss, answer, read_environment
     from iibr_core.scenes.inputs import inputs_of, named_by
     from iibr_core.scenes.lens_limits import (
@@ -28,16 +29,15 @@ if TYPE_CHECKING:
         has_sound_gloss,
         is_finite,
     )
+    from iibr_core.scenes.light_fields import find_disparity
     from iibr_core.scenes.loaded_photo import (
         LoadedPhoto,
         deepen,
-        inpainting_aids,
         load_photo,
-        make_plan,
         prepare_brush,
-        still_disparity,
         without_history,
     )
+    from iibr_core.scenes.making import inpainting_aids, make_plan, still_disparity, views_of_photo
     from iibr_core.scenes.opening import (
         SceneReady,
         SceneRequest,
@@ -60,5 +60,5 @@ if TYPE_CHECKING:
         source_with_map,
     )
     from iibr_core.scenes.screen_size import ScreenSize
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

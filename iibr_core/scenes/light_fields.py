@@ -18,9 +18,20 @@ from iibr_core.depth.subject import subject_disparity
 from iibr_core.generation.memory_model import Budget, budget_of, require_field, require_matching
 from iibr_core.runtime.machine import memory_bytes
 from iibr_core.runtime.tiling import ShouldStop
+from iibr_core.scenes.dense import read_dense
 from iibr_core.scenes.opening_work import MeasureViews, OpeningWork, ViewsWork
 from iibr_core.scenes.scene import Progress, Scene, Source
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    ImageSize,
+    InputError,
+    ReportProgress,
+    ViewOffset,
+    ViewUpdate,
+    ignore_progress,
+    image_size,
+)
 
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.scene import MultiView
@@ -96,36 +107,50 @@ def _filled_between(
 ) -> Showing:
     """The field with views made between its own, from all of them."""
     from iibr_core.formats.light_fields.views import grid_of
-    from iibr_core.generation.dense_field import densify, require_steps
-    from iibr_core.generation.given_views import DenseFieldWork, read_given_views
-    from iibr_core.inpainting.registry import load_inpainter
 
     if source.depth.file is not None:
         raise InputError(
             f"{source.depth.file}: is the disparity of one view, and views between take that of all: open"
             f" {field.name} without it"
         )
-    assert source.filled_grid is not None
-    grid = grid_of(field)
-    steps = require_steps(grid, source.filled_grid, field.name)
-
-    work, opening = DenseFieldWork(grid, source.filled_grid), ViewsWork(math.prod(source.filled_grid))
+    wanted = source.filled_grid
+    assert wanted is not None
+    opening = ViewsWork(math.prod(wanted))
 
     def report(done: float, total: float, doing: str) -> None:
-        report_progress(opening.advance(work.reading(done, total), doing=doing))
+        report_progress(opening.advance((done, total), doing=doing))
 
-    given = read_given_views(field, budget, should_stop, report)
-    low, high = min(view.disparity.min() for view in given), max(view.disparity.max() for view in given)
-    middle = given[0]
+    dense = read_dense(field, wanted, budget, source.inpaint, should_stop, report, nearest_to)
+    low, high = min(view.disparity.min() for view in dense.given), max(view.disparity.max() for view in dense.given)
+    middle, steps = dense.given[0], dense.steps
     centre = ViewUpdate(middle.row, middle.column, middle.colors, middle.disparity / np.float32(steps))
     scene = replace(
-        _scene_as_read(source, field, grid, centre, (float(low) / steps, float(high) / steps)),
-        grid=source.filled_grid,
+        _scene_as_read(source, field, grid_of(field), centre, (float(low) / steps, float(high) / steps)),
+        grid=wanted,
         depth_source="light field" if len(field.disparity) == len(field.views) else FROM_VIEWS,
         has_view_disparity=True,
     )
-    made = densify(given, grid, source.filled_grid, should_stop, load_inpainter(source.inpaint), nearest_to)
-    return Showing(scene, made, lambda there, drafts, share: opening.advance(work.making(share), there, drafts))
+    work = dense.work
+    return Showing(scene, dense.views, lambda there, drafts, share: opening.advance(work.making(share), there, drafts))
+
+
+def find_disparity(field: MultiView, budget: Budget, report_progress: ReportProgress = ignore_progress) -> FloatImage:
+    """Disparity (H, W) of the centre view, of a pair the left one, from all views: px per view step.
+
+    Raises InputError, also where memory does not suffice.
+    """
+    from iibr_core.depth.multi_view.estimate import FINDING, estimate_coarse, estimate_disparity
+    from iibr_core.formats.light_fields.views import grid_of, read_views
+
+    grid, (size, views) = grid_of(field), read_views(field)
+    require_field(budget, field.name, size, grid)
+    # Of a pair it is the left one's.
+    read = sorted(views, key=lambda view: (view.row, view.column) != field.views[field.centre].place)
+    colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
+    report_progress(0, 0, FINDING)
+    coarse = estimate_coarse(colors, offsets, 0)
+    require_matching(budget, field.name, size, coarse.range_px, offsets)
+    return estimate_disparity(colors, offsets, 0, coarse.range_px, report_progress=report_progress)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.depth.choice import DepthOrigin
-from iibr_core.depth.editing.edits import UNEDITED, Levels, levels_of
+from iibr_core.depth.editing.edits import Levels, levels_of
 from iibr_core.formats.files import require_file
 from iibr_core.generation.memory_model import (
     Budget,
@@ -25,13 +24,10 @@ from iibr_core.generation.memory_model import (
     require_reading,
     require_views,
 )
-from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
-from iibr_core.generation.relief import measure_relief
-from iibr_core.inpainting.protocol import InpaintingAids
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
-from iibr_core.scenes.scene import DepthSettings, Progress, Source
-from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ReportProgress, ignore_progress
+from iibr_core.scenes.scene import DepthSettings, Source
+from iibr_core.types import Disparity, ImageSize, InputError, Photo, ReportProgress, ignore_progress
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas
@@ -81,7 +77,7 @@ def stamp_of(path: Path) -> tuple[int, ...]:
 def load_photo(
     source: Source,
     should_stop: ShouldStop = never,
-    report_progress: Callable[[Progress], None] = lambda progress: None,
+    report_progress: ReportProgress = ignore_progress,
     depth_settings: DepthSettings | None = None,
     keeps_views: bool = True,
     asks_model: bool = True,
@@ -102,7 +98,7 @@ def load_photo(
         now = time.perf_counter()
         if now - said_at.get(doing, -math.inf) >= TELL_EVERY_S:
             said_at[doing] = now
-            report_progress(Progress(doing=f"{doing}, {done / total:.0%}" if done and total else doing))
+            report_progress(done, total, doing)
 
     path = Path(source.path)
     max_pixels, stored_size, notes = _pixels_to_read(source, keeps_views)
@@ -160,14 +156,12 @@ def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto
     return _prepare(found, "", source, DepthSettings(NOT_YET), (own_size, stamp), should_stop)
 
 
-def inpainting_aids(
-    source: Source, loaded: LoadedPhoto, report_progress: ReportProgress = ignore_progress
-) -> InpaintingAids:
-    """What inpainting this photo may ask: what gave its depth, where that was a model."""
-    from iibr_core.depth.search import PhotoWithDepth, estimator_of
+def photo_of_arrays(photo: Photo, disparity: Disparity) -> LoadedPhoto:
+    """A photo and its disparity as they were given, from no file: nothing is refined."""
+    from iibr_core.depth.search import PhotoWithDepth
 
-    found = PhotoWithDepth(loaded.photo, loaded.found, loaded.origin)
-    return InpaintingAids(estimator_of(found, source.depth), report_progress)
+    found = PhotoWithDepth(photo, disparity, DepthOrigin("file", disparity.source))
+    return _prepare(found, "", Source(""), DepthSettings(NOT_YET), (photo.size, ()), never)
 
 
 def apply_depth_settings(
@@ -244,35 +238,6 @@ def _require_map(source: Source, budget: Budget, keeps_views: bool) -> None:
             raise
         return
     require_map(budget, path.name, header.size, header.bytes_beside, keeps_views)
-
-
-def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_views: bool = True) -> ScenePlan:
-    """The plan for viewing, or for disparity as it is given. What was not edited keeps its parallax: clips and strokes
-    must not move all the rest.
-
-    keeps_views: else each is written and forgotten. Raises InputError where an override is out of range.
-    """
-    if source.is_literal:
-        if source.grid is None:
-            raise InputError("--literal counts disparity in px from view to view: say how many with --grid")
-        memory = source.depth.memory_bytes
-        return plan_literal(
-            loaded.photo, loaded.disparity, source.grid, memory, source.quality, keeps_views, source.inpaint
-        )
-    zero = source.focus_disparity
-    if loaded.depth_settings.edits != UNEDITED:
-        zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
-        range_px, edited_px = (measure_relief(map_.values).range for map_ in (loaded.refined, loaded.disparity))
-        wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
-        depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
-    memory = source.depth.memory_bytes
-    overrides = PlanOverrides(source.grid, depth_strength, zero, memory, source.quality, source.inpaint)
-    return plan_for_viewing(loaded.photo, loaded.disparity, overrides, keeps_views)
-
-
-def still_disparity(source: Source, before_strokes: FloatImage) -> float:
-    """The disparity (as given) of the plane that stays still, wherever the brush goes."""
-    return float(np.median(before_strokes)) if source.focus_disparity is None else source.focus_disparity
 
 
 def prepare_brush() -> None:

@@ -20,14 +20,8 @@ from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.light_fields import showings_of_light_field
-from iibr_core.scenes.loaded_photo import (
-    LoadedPhoto,
-    apply_depth_settings,
-    inpainting_aids,
-    load_photo,
-    make_plan,
-    sketch_photo,
-)
+from iibr_core.scenes.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, sketch_photo
+from iibr_core.scenes.making import make_plan, views_of_photo
 from iibr_core.scenes.opening_work import MeasureViews, ViewsWork
 from iibr_core.scenes.scene import DepthSettings, FilledField, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
@@ -167,26 +161,20 @@ def _results_of_photo(
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
     depth_settings = request.depth_settings or DepthSettings(source.depth.refine)
+
+    def tell(done: float, total: float, doing: str) -> None:
+        report_progress(Progress(doing=f"{doing}, {done / total:.0%}" if done and total else doing))
+
     loaded = (
-        load_photo(source, should_stop, report_progress, depth_settings, asks_model=request.asks_model)
+        load_photo(source, should_stop, tell, depth_settings, asks_model=request.asks_model)
         if request.loaded is None
         else apply_depth_settings(request.loaded, depth_settings, should_stop)
     )
     plan = request.plan or make_plan(source, loaded, request.depth_strength)
-    disparity = plan.field_disparity(loaded.disparity)
     yield SceneReady(request.generation, scene_of_photo(source, loaded, plan), loaded, _centre_view(loaded, plan))
 
-    from iibr_core.generation.light_field import generate
-
     draft_bytes = plan.draft_bytes if request.takes_drafts else None
-
-    def report_painting(done: float, total: float, doing: str) -> None:
-        report_progress(Progress(doing=f"{doing}, {done / total:.0%}"))
-
-    views = generate(
-        loaded.photo, disparity, plan, should_stop, nearest_to, source.quality, source.inpaint, draft_bytes,
-        inpainting_aids(source, loaded, report_painting),
-    )  # fmt: skip
+    views = views_of_photo(source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, in_srgb=False)
     work = ViewsWork(plan.grid.rows * plan.grid.columns)
     yield from _count_views(
         request.generation, views, lambda there, drafts, share: work.advance((share, 1.0), there, drafts)

@@ -14,5 +14,5 @@ if TYPE_CHECKING:
     from iibr_core.training.losses import LossWeights
     from iibr_core.training.run_files import checkpoint_path, require_run_files
     from iibr_core.training.trainer import Batch
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

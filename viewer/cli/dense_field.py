@@ -23,25 +23,18 @@ def write_dense_field(
     source: Source, grid: GridShape, out: Path, new_writer: WriterFactory, with_disparity: bool
 ) -> None:
     """To a place that the writer admits. Raises InputError, also where the views find no places on the grid."""
-    from iibr_core.formats import grid_of, open_light_field
-    from iibr_core.generation import DenseFieldWork, budget_of, densify, read_given_views, require_steps
-    from iibr_core.inpainting import load_inpainter
+    from iibr_core.formats import open_light_field
+    from iibr_core.generation import budget_of
+    from iibr_core.scenes import read_dense
 
     field = open_light_field(Path(source.path))
-    require_steps(grid_of(field), grid, source.path)
-    inpainter = load_inpainter(source.inpaint)
-    work = DenseFieldWork(grid_of(field), grid)
     with show_progress("reading") as show:
-
-        def report(done: float, total: float, doing: str) -> None:
-            show(*work.reading(done, total), doing)
-
-        given = read_given_views(field, budget_of(source.depth.memory_bytes), report_progress=report)
-        size = image_size(given[0].colors)
+        dense = read_dense(field, grid, budget_of(source.depth.memory_bytes), source.inpaint, report_progress=show)
+        size = image_size(dense.given[0].colors)
         with (
             new_writer(out, grid, field.focal_px or float(size.width), field.name, with_disparity) as writer,
-            closing(densify(given, grid_of(field), grid, inpainter=inpainter)) as views,
+            closing(dense.views) as views,
         ):
-            said = write_views(views, writer, grid, size, lambda share: show(*work.making(share), MAKING))
+            said = write_views(views, writer, grid, size, lambda share: show(*dense.work.making(share), MAKING))
     print(f"{said}: {out}")
     print_notes(field.notes)

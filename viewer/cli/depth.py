@@ -23,23 +23,14 @@ def depth(
     Example: iibr depth field -o field_disparity.pfm
     """
     require_memory(memory, keeps_views=True)
-    from iibr_core.depth import FINDING, estimate_coarse, estimate_disparity
-    from iibr_core.formats import grid_of, open_light_field, read_views, require_file_place, write_map
-    from iibr_core.generation import budget_of, require_field, require_matching
+    from iibr_core.formats import open_light_field, require_file_place, write_map
+    from iibr_core.generation import budget_of
+    from iibr_core.scenes import find_disparity
 
     require_file_place(out, inputs_of_command(context), force)
     scene = open_light_field(field)
-    grid, (size, views) = grid_of(scene), read_views(scene)
-    budget = budget_of(memory)
-    require_field(budget, scene.name, size, grid)
     with show_progress("reading") as show:
-        # Of a pair it is the left one's.
-        read = sorted(views, key=lambda view: (view.row, view.column) != scene.views[scene.centre].place)
-        colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
-        show(0, 0, FINDING)
-        coarse = estimate_coarse(colors, offsets, 0)
-        require_matching(budget, scene.name, size, coarse.range_px, offsets)
-        values = estimate_disparity(colors, offsets, 0, coarse.range_px, report_progress=show)
+        values = find_disparity(scene, budget_of(memory), show)
     note = write_map(out, values)
     print(f"{scene.name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")
     print_notes((note,) if note else ())

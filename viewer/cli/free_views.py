@@ -14,7 +14,7 @@ import typer
 from iibr_core.formats import UnfinishedFolder, require_folder_place, require_own_folder
 from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.options import given_options, require_model
-from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 from viewer.model.free_camera import Poses
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_lit
     with show_progress("reading") as show:
         from iibr_core.scenes import load_photo
 
-        loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
+        loaded = load_photo(source, report_progress=untimed(show), keeps_views=False)
     from iibr_core.generation import fitted_cameras
 
     given = known.given

@@ -28,7 +28,7 @@ from viewer.cli.options import (
     require_model,
 )
 from viewer.cli.scene_options import SceneOptions, require_heeded
-from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress
+from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress, untimed
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
@@ -112,19 +112,15 @@ def _write_light_field(
 ) -> None:
     require_model(source.depth)
 
-    from iibr_core.color import photo_in_srgb
-    from iibr_core.generation import generate as generated
-    from iibr_core.scenes import add_gloss, inpainting_aids, load_photo, make_plan, scene_of_photo
+    from iibr_core.scenes import add_gloss, load_photo, make_plan, scene_of_photo, views_of_photo
 
     with show_progress("reading") as show:
-        loaded = load_photo(source, report_progress=lambda progress: show(0, 0, progress.doing), keeps_views=False)
-        photo_read = photo_in_srgb(loaded.photo)  # layouts of light fields say nothing of colour
+        tell = untimed(show)
+        loaded = load_photo(source, report_progress=tell, keeps_views=False)
         plan = make_plan(source, loaded, depth_strength, keeps_views=False)
-        disparity_read = plan.field_disparity(loaded.disparity)
-        aids = inpainting_aids(source, loaded, lambda done, total, doing: show(0, 0, f"{doing}, {done / total:.0%}"))
         with (
             new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
-            closing(generated(photo_read, disparity_read, plan, inpaint=source.inpaint, aids=aids)) as made,
+            closing(views_of_photo(source, loaded, plan, report_progress=tell)) as made,
         ):
             views = add_gloss(made, gloss, scene_of_photo(source, loaded, plan))
             said = write_views(views, writer, grid, loaded.photo.size, lambda share: show(share, 1.0, MAKING))

@@ -26,5 +26,5 @@ if TYPE_CHECKING:
         require_sound,
         tone_curve,
     )
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

@@ -17,5 +17,5 @@ if TYPE_CHECKING:
     from iibr_core.exports.batch.scheduler import TlsFiles, remote_workers
     from iibr_core.exports.batch.task import BatchSettings
     from iibr_core.exports.batch.workers import WorkerSource
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)

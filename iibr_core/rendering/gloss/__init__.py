@@ -23,5 +23,5 @@ if TYPE_CHECKING:
         require_sound,
     )
     from iibr_core.rendering.gloss.shading import GlossMaps
-
-__getattr__ = offered_by(__file__)
+else:
+    __getattr__ = offered_by(__file__)
