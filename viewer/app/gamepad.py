@@ -68,3 +68,26 @@ def _past_dead_zone(value: float) -> float:
     if not math.isfinite(value) or abs(value) <= DEAD_ZONE:
         return 0.0
     return math.copysign((min(abs(value), 1.0) - DEAD_ZONE) / (1 - DEAD_ZONE), value)
+
+
+class GamepadReader:
+    """It sends no events: where there is one, it is asked now and then, and every frame while it is held.
+
+    is_resting: whether it is not held; None without one.
+    """
+
+    def __init__(self) -> None:
+        self._pad: Gamepad | None = None
+        self._read_at = 0.0
+
+    @property
+    def is_resting(self) -> bool | None:
+        """See the class."""
+        return None if self._pad is None else self._pad.is_resting
+
+    def read(self, pad: Gamepad | None, state: AppState, now_s: float) -> list[Action]:
+        """What follows from how it is held now."""
+        before, seconds, self._pad, self._read_at = self._pad, now_s - self._read_at, pad, now_s
+        if pad is None or pad.is_resting:
+            return []
+        return actions_from_gamepad(pad, before or Gamepad(), state, seconds)

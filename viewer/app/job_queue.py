@@ -18,8 +18,8 @@ from iibr_core.scenes import SceneRequest, Source, is_same_field
 from viewer.app.job import Job, Lane
 from viewer.app.job_scene import JobScenes
 from viewer.app.save_places import inputs_of_scene
-from viewer.app.window_work import WindowWork
 from viewer.background.file_worker import Done, FileRequest, FileWorker
+from viewer.background.window_work import WindowWork
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.state.app_state import AppState

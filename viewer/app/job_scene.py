@@ -18,7 +18,7 @@ from iibr_core.runtime import raise_if_stopped
 from iibr_core.scenes import FilledField, GlossRequest, Progress, SceneReady, ViewReady, answer, results_of
 from iibr_core.types import ViewUpdate
 from viewer.app.job import Job
-from viewer.app.window_work import Result, Steps, WindowWork
+from viewer.background.window_work import Result, Steps, WindowWork
 from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot
 

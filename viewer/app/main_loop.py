@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,9 +12,9 @@ from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_look import FreeLook
-from viewer.app.gamepad import Gamepad, actions_from_gamepad
-from viewer.app.gloss_finder import GlossFinder
+from viewer.app.gamepad import GamepadReader
 from viewer.app.keys import actions_from_keys, is_touched, read_keys
+from viewer.app.pace import DIALOG_LOOK_S, IDLE_WAIT_S, NoticeClock, Pace
 from viewer.app.pointer import (
     NO_POINTER,
     Pointer,
@@ -22,9 +22,9 @@ from viewer.app.pointer import (
     actions_from_pointer,
     gesture_end,
     gesture_start,
-    read_pointer,
 )
-from viewer.app.preferences_store import load_preferences, store_preferences
+from viewer.app.pointer_reading import read_pointer
+from viewer.app.preferences_store import PreferencesKeeper, load_preferences
 from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
@@ -32,15 +32,14 @@ from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
 from viewer.background.comparison_worker import ComparisonWorker
+from viewer.background.gloss import GlossFinder
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
 from viewer.model.actions import (
     Action,
-    DismissNotice,
     DoTask,
-    Notify,
     OpenPath,
     PictureDrawn,
     PlaceWindow,
@@ -60,8 +59,6 @@ from viewer.model.layout import Layout, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.inspection import Probed
-from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import Preferences
 from viewer.model.state.tasks import ReadTruthTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
@@ -71,29 +68,6 @@ from viewer.ui.style import Look
 UPLOAD_BUDGET_S = 0.006
 SAVE_BUDGET_S = 0.025
 """A turn, for a picture that is being saved: about as long as a frame, so that whoever drags gets every other turn."""
-
-IDLE_WAIT_S = 1.0
-"""Nothing is expected to happen unannounced; this only bounds the harm of a lost wake-up."""
-
-TOOLTIP_LOOK_S, TOOLTIP_S = 0.08, 0.5
-"""How often, and for how long, a pointer that rests on the panel is looked at: ImGui tells what it points at after
-0.15 s, counted in frames, and needs one to measure the words.
-"""
-
-MOTION_FRAME_S = 1 / 60
-DIALOG_LOOK_S = 0.1
-"""How often an open file dialog is asked for its answer."""
-
-GAMEPAD_LOOK_S = 0.05
-"""How often a gamepad that rests is asked."""
-
-FRAMES_OF_A_CLICK = 3
-"""A press and its release, and the next press, are heard of in as many frames."""
-
-SETTLING_FRAMES = 3
-"""ImGui hands out quick events over several frames and lays out in two: so many must look the same before a sleep."""
-
-EMPTY = AppState()
 
 
 @dataclass(frozen=True)
@@ -114,11 +88,12 @@ class Frame:
 class App:
     """The viewer: one window, one worker. state changes only through `reduce`; frames_shown counts what was shown."""
 
-    def __init__(self, state: AppState = EMPTY, kept_in: Path | None = None) -> None:
+    def __init__(self, state: AppState | None = None, kept_in: Path | None = None) -> None:
         """Open the window. kept_in: folder of preferences and recent files; None keeps nothing.
 
         Raises InputError where no window can be opened.
         """
+        state = state or AppState()
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
         self._window_slot = WindowSlot(kept_in)
@@ -135,26 +110,19 @@ class App:
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self.free_look = FreeLook(self.scene_view, wake)
-        self.gloss_finder = GlossFinder(self.scene_view, wake)
+        self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, wake)
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, wake)
         self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, wake)
         self._side_effects = SideEffects(self.scene_view, wake, self.window.clipboard_text)
         self._sessions = SessionStore(kept_in, wake)
-        self._kept_in = kept_in
-        self._kept = _worth_keeping(self.state)
-        self._stepped_at = 0.0
-        self._noticed: Notice | None = None
-        self._noticed_at = 0.0
-        self._gamepad: Gamepad | None = None
-        self._gamepad_at = 0.0
-        self._took_s: deque[float] = deque(maxlen=FRAMES_OF_A_CLICK)
+        self._preferences = PreferencesKeeper(self.state, kept_in)
+        self._notice_clock = NoticeClock()
+        self._gamepads = GamepadReader()
         self._shown: Frame | None = None
-        self._same_frames = 0
-        self._is_busy = True
         self._pointer = NO_POINTER
-        self._pointer_moved_at = 0.0
+        self._pace = Pace()
 
     def run(self) -> None:
         """Show frames until the user quits."""
@@ -167,18 +135,18 @@ class App:
         start = time.perf_counter()
         news = self.scene_loader.take_results(self.state) + self._take_dropped() + self._take_events()
         self.do(*news)
-        self._is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
+        self._pace.is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
         self.do(*self.scene_loader.preview_depth(self.state))
-        self.do(*self.gloss_finder.advance(self.state))
+        self.do(*self.gloss_finder.advance(self.state.optics.gloss))
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
         if picture and self.scene_view.report != self.state.report:
             self.do(PictureDrawn(self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
-        self._ui.begin(layout, look, sum(self._took_s))
+        self._ui.begin(layout, look, sum(self._pace.took_s))
         self._pointer = pointer = read_pointer(self._pointer)
         if pointer.step_x or pointer.step_y:
-            self._pointer_moved_at = time.perf_counter()
+            self._pace.pointer_moved_at = time.perf_counter()
         actions: list[Action] = [Touch()] if self.state.awaits_touch and is_touched() else []
         actions += gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
@@ -193,10 +161,10 @@ class App:
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_look.advance(self.state))
-        self._is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
+        self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self.scene_loader.advance(self.state)
-        self._keep_news()
-        self._took_s.append(time.perf_counter() - start)
+        self.do(*self._preferences.keep_news(self.state))
+        self._pace.took_s.append(time.perf_counter() - start)
 
     @property
     def _is_resting(self) -> bool:
@@ -209,17 +177,10 @@ class App:
     @property
     def wait_s(self) -> float:
         """How long the next turn may sleep before it looks."""
-        if self.state.motion.is_running:
-            return max(self._stepped_at + MOTION_FRAME_S - time.perf_counter(), 0.0)
-        if self._is_busy or self._same_frames < SETTLING_FRAMES:
-            return 0.0
-        if self._pointer.is_over_panel and time.perf_counter() - self._pointer_moved_at < TOOLTIP_S:
-            return TOOLTIP_LOOK_S
-        if self._gamepad is not None:
-            return GAMEPAD_LOOK_S if self._gamepad.is_resting else 0.0
-        if self._side_effects.is_waiting:
-            return DIALOG_LOOK_S
-        return IDLE_WAIT_S if self.scene_view.shows_all_views() else VIEW_REFRESH_S
+        idle_s = IDLE_WAIT_S if self.scene_view.shows_all_views() else VIEW_REFRESH_S
+        idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
+        is_moving, is_over_panel = self.state.motion.is_running, self._pointer.is_over_panel
+        return self._pace.wait_s(is_moving, is_over_panel, self._gamepads.is_resting, idle_s)
 
     def layout(self) -> Layout:
         """Where things lie in the window as it is now."""
@@ -238,8 +199,7 @@ class App:
 
     def look(self) -> Look:
         """Theme, and size of text and widgets on this display."""
-        preferences = self.state.preferences
-        return Look(self.window.ui_scale * preferences.font_scale, preferences.theme)
+        return Look(self.window.ui_scale * self.state.preferences.font_scale, self.state.preferences.theme)
 
     def close(self) -> None:
         """Stop the worker, keep what is kept, and free everything. A file that is being written is finished first."""
@@ -247,7 +207,7 @@ class App:
         self.scene_loader.close()
         self._comparisons.close()
         self.gloss_finder.close()
-        self._keep()
+        self._preferences.keep(self.state)
         self._sessions.close(self.state)
         self._side_effects.close()
         self._ui.release()
@@ -263,41 +223,25 @@ class App:
     def do(self, *actions: Action) -> None:
         """Change the state. What follows from it may take a few frames to be seen, see SETTLING_FRAMES."""
         if actions:
-            self._same_frames = 0
+            self._pace.same_frames = 0
         for action in actions:
             self.state = reduce(self.state, action)
         self.scene_loader.look_from(self.state.optics.eye)
 
     def _take_events(self) -> list[Action]:
         """What neither user nor worker says: the clock, side effects done, the window moved, the worker lost."""
-        self._stepped_at = time.perf_counter()
+        self._pace.stepped_at = time.perf_counter()
         actions = self._side_effects.run(self.state) + self._sessions.run(self.state)
         while (result := self._comparisons.next_result()) is not None:
             actions += self.inspection_view.take(result)
-        actions += self._expire_notices(self._stepped_at)
-        actions += self._take_gamepad(self._stepped_at)
+        actions += self._notice_clock.expire(self.state, self._pace.stepped_at)
+        actions += self._gamepads.read(self.window.gamepad(), self.state, self._pace.stepped_at)
         if self.state.motion.is_running:
-            actions.append(Tick(self._stepped_at))
+            actions.append(Tick(self._pace.stepped_at))
         actions += self._place_window()
         if self.scene_loader.has_lost(self.state):
             actions.append(WorkerLost())
         return actions
-
-    def _take_gamepad(self, now_s: float) -> list[Action]:
-        """It sends no events: where there is one, it is asked now and then, and every frame while it is held."""
-        pad, before = self.window.gamepad(), self._gamepad
-        seconds, self._gamepad, self._gamepad_at = now_s - self._gamepad_at, pad, now_s
-        if pad is None or pad.is_resting:
-            return []
-        return actions_from_gamepad(pad, before or Gamepad(), self.state, seconds)
-
-    def _expire_notices(self, now_s: float) -> list[Action]:
-        """The newest is the one that is seen: the others' time begins when they are."""
-        notice = self.state.notices[-1] if self.state.notices else None
-        if notice is not self._noticed:
-            self._noticed, self._noticed_at = notice, now_s
-        is_over = notice is not None and now_s - self._noticed_at > notice.seconds
-        return [DismissNotice(notice)] if notice is not None and is_over else []
 
     def _place_window(self) -> list[Action]:
         """Where the window is, where that is news."""
@@ -331,43 +275,21 @@ class App:
         if request != before:
             self._comparisons.want(request, self.inspection_view.inputs(request, self.state))
 
-    def _keep_news(self) -> None:
-        """At once: it is what one misses after a crash."""
-        if _worth_keeping(self.state) != self._kept:
-            self._kept = _worth_keeping(self.state)
-            self._keep()
-
-    def _keep(self) -> None:
-        if self._kept_in is None:
-            return
-        try:
-            store_preferences(self.state, self._kept_in)
-        except InputError as error:
-            self.do(Notify(Notice(str(error), is_error=True)))
-
     def _show(self, frame: Frame) -> None:
         if frame == self._shown or not all(self.window.framebuffer_size):
-            self._same_frames += 1
+            self._pace.same_frames += 1
             return
         self._gl.ctx.screen.use()
         self._ui.draw()
         self.window.show_frame()
-        self._shown, self._same_frames = frame, 0
+        self._shown, self._pace.same_frames = frame, 0
         self.frames_shown += 1
-
-
-def _worth_keeping(state: AppState) -> tuple[tuple[str, ...], Preferences]:
-    """Recent files and preferences, but for where the window is: that changes with every move of it."""
-    return state.recent, replace(state.preferences, window=None)
 
 
 def run(state: AppState, kept_in: Path | None = None) -> None:
     """Open the window on this state and show it until the user quits. Raises InputError where none can be opened."""
-    app = App(state, kept_in)
-    try:
+    with closing(App(state, kept_in)) as app:
         app.run()
-    finally:
-        app.close()
 
 
 def initial_state(

@@ -18,6 +18,7 @@ from iibr_core.exports import FolderOrder
 from iibr_core.formats import atomic_write, read_text, status_of
 from iibr_core.scenes import clamp
 from iibr_core.types import InputError
+from viewer.model.actions import Action, Notify
 from viewer.model.reducers.worker_events import RECENT_KEPT
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -75,6 +76,35 @@ def store_preferences(state: AppState, folder: Path) -> None:
         raise InputError(f"{folder}: cannot be made ({error.strerror or error}); preferences are not kept") from error
     _write(folder / PREFERENCES_FILE, dataclasses.asdict(state.preferences))
     _write(folder / RECENT_FILE, recent)
+
+
+class PreferencesKeeper:
+    """Writes preferences and recent files as soon as they change: they are what one misses after a crash."""
+
+    def __init__(self, state: AppState, folder: Path | None) -> None:
+        """folder: None keeps nothing. state: as it was read from there."""
+        self._folder, self._kept = folder, _worth_keeping(state)
+
+    def keep_news(self, state: AppState) -> list[Action]:
+        """Write them if they changed; says what went wrong."""
+        if _worth_keeping(state) == self._kept:
+            return []
+        self._kept = _worth_keeping(state)
+        return self.keep(state)
+
+    def keep(self, state: AppState) -> list[Action]:
+        """Write them; says what went wrong."""
+        try:
+            if self._folder is not None:
+                store_preferences(state, self._folder)
+        except InputError as error:
+            return [Notify(Notice(str(error), is_error=True))]
+        return []
+
+
+def _worth_keeping(state: AppState) -> tuple[tuple[str, ...], Preferences]:
+    """Recent files and preferences, but for where the window is: that changes with every move of it."""
+    return state.recent, dataclasses.replace(state.preferences, window=None)
 
 
 def _write(path: Path, value: Any) -> None:

@@ -20,8 +20,7 @@ from iibr_core.scenes import (
     without_history,
 )
 from iibr_core.types import InputError, ViewOffset
-from viewer.app.depth_finder import DepthFinder
-from viewer.background.depth_estimate import same_places
+from viewer.background.depth_estimate import DepthFinder, same_places
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed, ProgressReport
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_whole_photo
@@ -66,7 +65,7 @@ class SceneLoader:
         self._set_title = set_title
         self._worker = SceneWorker(wake)
         self._preview = DepthPreview(scene_view)
-        self._depth_finder = DepthFinder(scene_view, wake)
+        self._depth_finder = DepthFinder(wake)
         self._brush_loader = FileWorker("iibr-brush", wake)
         self._has_brush = False
         self._submitted = 0
@@ -83,7 +82,7 @@ class SceneLoader:
 
     def take_results(self, state: AppState) -> list[Action]:
         """The worker's results, as actions, for about TAKE_BUDGET_S, at least one; the one place where they arrive."""
-        actions = self._show_sketch(state) + self._depth_finder.advance(state)
+        actions = self._show_sketch(state) + self._depth_finder.advance(state, self._scene_view.loaded)
         end = time.perf_counter() + TAKE_BUDGET_S
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._take(result, state)

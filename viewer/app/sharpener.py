@@ -5,19 +5,17 @@ It takes the place of the one drawn from the views as soon as it is there, and g
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import FullPicture, encode_light, is_full, needs_smaller
-from iibr_core.runtime import Cancelled
+from iibr_core.exports import FullPicture, is_full, needs_smaller
 from iibr_core.scenes import LoadedPhoto, ScreenSize
-from iibr_core.types import SRGB, FloatImage
-from viewer.background.jobs import Failed, Job, JobThread
+from iibr_core.types import FloatImage
+from viewer.background.jobs import Failed
+from viewer.background.sharpening import SharpeningWorker, SharpPart
 from viewer.display.scene_view import SceneView, window_of
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
@@ -26,16 +24,6 @@ from viewer.model.actions import Action, Notify
 from viewer.model.layout import WHOLE
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.notices import Notice
-
-if TYPE_CHECKING:
-    from iibr_core.rendering import LargePhoto
-
-
-@dataclass(frozen=True, eq=False)
-class SharpPart:
-    """A part of a picture, drawn: (height, width, 3), sRGB-encoded."""
-
-    pixels: NDArray[np.uint8]
 
 
 class Sharpener:
@@ -46,16 +34,13 @@ class Sharpener:
         self.pixels: NDArray[np.uint8] | None = None
         self._scene_view = scene_view
         self._passes = InspectionPasses(gl.ctx, scene_view.renderer.programs)
-        self._worker: JobThread[FullPicture, SharpPart | Failed[None]] = JobThread(
-            "iibr-sharp", wake, self._draw, lambda request, message: Failed(None, message)
-        )
+        self._worker = SharpeningWorker(wake)
         self._wanted: Picture | None = None
         self._request: FullPicture | None = None
         self._drawing: PictureDrawing | None = None
         self._texture: int | None = None
         self._smaller: tuple[Picture, FloatImage] | None = None
         self._refused: LoadedPhoto | None = None
-        self._photo: tuple[LoadedPhoto, LargePhoto] | None = None
 
     @property
     def is_drawing(self) -> bool:
@@ -75,7 +60,8 @@ class Sharpener:
         if key != self._wanted or (self._drawing is not None and not is_resting):
             self._stop()
         if picture is None or state.zoom is None:
-            self._photo = self._smaller = None
+            self._worker.forget()
+            self._smaller = None
         request = self._request_of(picture, state) if picture is not None and is_resting else None
         if self._wanted is None and request is not None:
             self._wanted, self._request = key, request
@@ -139,18 +125,6 @@ class Sharpener:
         if self._drawing is not None:
             self._drawing.stop()
         self._wanted = self._request = self._drawing = self._texture = self.pixels = None
-
-    def _draw(self, job: Job[FullPicture, SharpPart | Failed[None]]) -> Iterator[SharpPart]:
-        """In the drawing thread. The photo is kept: the next part of it is then drawn at once."""
-        request, kept = job.request, self._photo
-        with suppress(Cancelled):
-            photo = kept[1] if kept is not None and kept[0] is request.loaded else request.load(job.should_stop)
-            self._photo = request.loaded, photo
-            if request.needs_fills and photo.fills is None:
-                photo = photo.with_fills(request.fill(job.should_stop))
-                self._photo = request.loaded, photo
-            light = request.draw_from(photo, job.should_stop)
-            yield SharpPart(encode_light(light, False, SRGB, request.scene.color_space, job.should_stop))
 
 
 def _key(picture: Picture) -> Picture:

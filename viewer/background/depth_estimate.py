@@ -10,11 +10,16 @@ import numpy as np
 from iibr_core.scenes import LoadedPhoto, Source, deepen
 from iibr_core.types import FloatImage
 from viewer.background.jobs import Failed, Job, JobThread
-from viewer.model.actions import SamePlaces
+from viewer.model.actions import Action, Notify, SamePlaces
+from viewer.model.reducers.depth_models import wanted_model
+from viewer.model.state.app_state import AppState
+from viewer.model.state.model_download import DepthEstimated, GiveUpEstimate
+from viewer.model.window_words import notice_in_window
 
 COMPARED = 200
 """So many rows and columns of two maps are compared, at most."""
 PAIRS = 33
+STOPPED = "Estimating depth stopped unexpectedly."
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +47,53 @@ class Estimated:
 EstimateResult = Estimated | Failed[EstimateRequest]
 
 
-class DepthEstimates(JobThread[EstimateRequest, EstimateResult]):
-    """A new request gives up the one before."""
+class DepthFinder(JobThread[EstimateRequest, EstimateResult]):
+    """Has a model asked where the state wants that. Everything is called from the thread of the window."""
 
     def __init__(self, wake: Callable[[], None]) -> None:
         """wake: called, in the thread, when a result was posted."""
         super().__init__("iibr-depth", wake, _results_of, Failed)
+        self._asked: EstimateRequest | None = None
+        self._found: LoadedPhoto | None = None
+
+    def advance(self, state: AppState, loaded: LoadedPhoto | None) -> list[Action]:
+        """Say what came, and ask for what is wanted now of the photo that is loaded."""
+        actions: list[Action] = []
+        while (result := self.next_result()) is not None:
+            actions += self._take(result)
+        model = wanted_model(state)
+        if actions:
+            return actions
+        if model is None or loaded is None or state.scene is None:
+            if self._asked is not None:
+                self.cancel()
+                self._asked = None
+        elif self._asked is None or not self._asked.is_for(loaded, model):
+            self._asked = EstimateRequest(state.scene.source, loaded, model, state.depth.refine)
+            self.submit(self._asked)
+        elif self.is_lost:
+            return self._fail(STOPPED)
+        return []
+
+    def newest(self, loaded: LoadedPhoto | None) -> LoadedPhoto | None:
+        """The photo that is shown, with the depth found for it since, where that is not shown yet."""
+        found = self._found
+        if loaded is None or found is None or found.photo is not loaded.photo or found.found is loaded.found:
+            self._found = None
+            return loaded
+        return found
+
+    def _take(self, result: EstimateResult) -> list[Action]:
+        match result:
+            case Failed():
+                return self._fail(result.message)
+            case Estimated(request, loaded):
+                self._asked, self._found = None, loaded
+                return [DepthEstimated(request.model)]
+
+    def _fail(self, message: str) -> list[Action]:
+        self._asked = None
+        return [GiveUpEstimate(), Notify(notice_in_window(message, is_error=True))]
 
 
 def _results_of(job: Job[EstimateRequest, EstimateResult]) -> Iterator[EstimateResult]:

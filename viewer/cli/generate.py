@@ -78,11 +78,7 @@ def generate(
     if poses is not None:
         if grid is not None:
             raise InputError("--grid makes a light field, --poses pictures of any cameras: give one of them")
-        require_heeded_with_poses(context)
-        source = scene.source(path, None)
-        require_existing(source)
-        require_views_folder(out, inputs_of_command(context, source), force)
-        write_free_views(source, poses, photo_pose, bool(literal), out)
+        _generate_from_poses(context, scene.source(path, None), poses, photo_pose, bool(literal), out, force)
         return
     if grid is None:
         raise InputError("give --grid, for a light field, or --poses, for pictures of any cameras")
@@ -99,6 +95,21 @@ def generate(
         _write_light_field(
             source, grid, out, new_writer, scene.depth_strength, gloss.gloss if gloss else None, with_disparity
         )
+
+
+def _generate_from_poses(
+    context: typer.Context,
+    source: Source,
+    poses: Path,
+    photo_pose: int | None,
+    is_literal: bool,
+    out: Path,
+    may_replace: bool,
+) -> None:
+    require_heeded_with_poses(context)
+    require_existing(source)
+    require_views_folder(out, inputs_of_command(context, source), may_replace)
+    write_free_views(source, poses, photo_pose, is_literal, out)
 
 
 def _write_light_field(

@@ -255,14 +255,11 @@ Memory = Annotated[
     int | None,
     typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
 ]
-
 Literal = Annotated[
     bool,
     typer.Option("--literal", help="Disparity counts as given, in px from view to view, not as the window shows it."),
 ]
-
 Force = Annotated[bool, typer.Option("--force", help="Replace what is there already; what is read, never.")]
-
 PosesFile = Annotated[
     Path | None,
     typer.Option(

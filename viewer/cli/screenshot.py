@@ -73,6 +73,34 @@ def profile_from_text(text: str) -> ColorSpace:
     return PROFILES[text]
 
 
+@dataclass(frozen=True)
+class FileOptions:
+    """How the picture is written."""
+
+    bits: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="16 for .png, .tif, .exr: of a channel.", show_default="the usual"),
+    ] = None
+    picture_quality: Annotated[
+        int, typer.Option(min=1, max=BEST_QUALITY, metavar="N", help="Of .jpg, .webp and .avif.")
+    ] = AS_USUAL.quality
+    profile: Annotated[
+        ColorSpace | None,
+        typer.Option(
+            parser=profile_from_text,
+            metavar="|".join(PROFILES),
+            help="Colours of the picture: sRGB, Display P3.",
+            show_default="p3 for photos with more colours than sRGB",
+        ),
+    ] = None
+    gps: Annotated[bool, typer.Option("--gps", help="Keep the place where the photo was taken.")] = False
+
+    @property
+    def form(self) -> PictureFormat:
+        """The same as a record."""
+        return PictureFormat(self.bits, self.picture_quality, self.profile, self.gps)
+
+
 @with_option_records
 def screenshot(
     context: typer.Context,
@@ -93,23 +121,7 @@ def screenshot(
         typer.Option(parser=size_from_text, metavar="WxH", help="Image size.", show_default="the photo's, or 1280x800"),
     ] = None,
     full: Annotated[bool, typer.Option("--full", help="At the photo's own size, from all its pixels.")] = False,
-    bits: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="16 for .png, .tif, .exr: of a channel.", show_default="the usual"),
-    ] = None,
-    picture_quality: Annotated[
-        int, typer.Option(min=1, max=BEST_QUALITY, metavar="N", help="Of .jpg, .webp and .avif.")
-    ] = AS_USUAL.quality,
-    profile: Annotated[
-        ColorSpace | None,
-        typer.Option(
-            parser=profile_from_text,
-            metavar="|".join(PROFILES),
-            help="Colours of the picture: sRGB, Display P3.",
-            show_default="p3 for photos with more colours than sRGB",
-        ),
-    ] = None,
-    gps: Annotated[bool, typer.Option("--gps", help="Keep the place where the photo was taken.")] = False,
+    file: FileOptions,
     ui: Annotated[bool, typer.Option("--ui", help="With the panels, as in the window.")] = False,
     backend: Annotated[Backend, typer.Option(help="Where OpenGL comes from.")] = Backend.auto,
     scene: SceneOptions,
@@ -135,7 +147,7 @@ def screenshot(
         require_utf8(path, scene.disparity, scene.depth_model)
     if like is not None:
         shot = _shot_like(shot, like, given_options(context), ui)
-    form = PictureFormat(bits, picture_quality, profile, gps)
+    form = file.form
     require_picture_place(output, shot.size, inputs_of_command(context, shot.source), force, form)
     require_picture_memory(shot.size, shot.source.depth.memory_bytes, is_float(output, form))
     require_model(shot.source.depth)

@@ -22,7 +22,7 @@ from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.image_export import export_picture
 from viewer.app.job_queue import JobQueue
-from viewer.app.main_loop import SETTLING_FRAMES
+from viewer.app.pace import SETTLING_FRAMES
 from viewer.model.actions import AskToSave, DismissNotice, DoTask
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING, CancelJobTask, JobProgress

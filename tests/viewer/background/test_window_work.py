@@ -10,7 +10,7 @@ import pytest
 
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.types import InputError
-from viewer.app.window_work import Steps, WindowWork
+from viewer.background.window_work import Steps, WindowWork
 
 
 class Desk:
