@@ -1,31 +1,47 @@
-"""Time of a refocused picture, in alternation with the plainest shift-and-sum shader on the same views.
+"""The renderer's switches: time of a picture, drawn in many ways and by the plainest shader, against its error.
 
-    python -m benchmarks.refocus --data FOLDER [--radius 2] [--size 768x512] [--repeats 3]
+    python -m benchmarks.refocus --data FOLDER [--only NAME,...] [--repeats 3]
 
-FOLDER is a light field of any layout; it may hold the centre view's disparity as *.npy.
+Fields of the scenes of FOLDER are drawn through an aperture and through a pinhole between the views, in turns: *at
+once*, which the viewer shows first, and otherwise. Errors are against a plain float sum in numpy over four times as
+many views as are stored. The plain shader shifts and sums views from their texture, and does nothing else.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.report import emit, head, parser_of, row, start
-from benchmarks.harness.scenes import read_views
-from benchmarks.harness.timing import cost_of
+from benchmarks.harness.report import emit, is_wanted, parser_of, start
+from benchmarks.harness.scenes import BenchScene, data_scenes
+from benchmarks.harness.timing import Cost, cost_of, in_turns, median_cost, median_ratio
+from benchmarks.speed.report import Figures, Measured, table
+from benchmarks.speed.variants import LEAST_STORED_SIDE, is_stored
+from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.evaluation.metrics import bounded_psnr, flip
+from iibr_core.evaluation.refocus import FocalStack, Focus
+from iibr_core.generation.cost_model import CORES
+from iibr_core.generation.light_field import generate
+from iibr_core.generation.plan import plan_literal
 from iibr_core.rendering.optics import Optics
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import FloatImage, GridShape, ViewOffset
+from viewer.gpu.context import GLContext
 from viewer.gpu.headless_context import create_headless
+from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, scale_size, stretch_image
 from viewer.gpu.refocus.renderer import Renderer
 
-FRAMES = 12
-
+APERTURE_VIEWS = 6.0
+BETWEEN = ViewOffset(-0.5, 1.5)
+"""An eye between the stored views, on one of those that only the best picture has."""
+FINER = 2
+"""Views of the best picture, to each stored one across and down."""
+PLAIN = "plain shader"
 PLAIN_VERTEX = """#version 330 core
 out vec2 uv;
 void main() { uv = vec2(gl_VertexID % 2, gl_VertexID / 2) * 2.0; gl_Position = vec4(uv * 2.0 - 1.0, 0.0, 1.0); }
@@ -33,8 +49,8 @@ void main() { uv = vec2(gl_VertexID % 2, gl_VertexID / 2) * 2.0; gl_Position = v
 PLAIN_FRAGMENT = """#version 330 core
 uniform sampler2DArray views;
 uniform int columns, first, last;
-uniform float shear, radius;
-uniform vec2 eye;
+uniform vec2 shear, eye;
+uniform float radius;
 in vec2 uv;
 out vec4 color;
 void main() {
@@ -50,93 +66,182 @@ void main() {
 """
 
 
-def open_views(renderer: Renderer, views: NDArray[np.uint8], centre: NDArray[np.float32] | None) -> None:
-    """Upload the views, with disparity where the centre view's is given."""
-    grid = GridShape(*views.shape[:2])
-    renderer.open_field(grid, views.shape[3], views.shape[2], hdr=False, with_disparity=centre is not None)
-    for at in np.ndindex(*grid):
-        renderer.upload_view(
-            *at, views[at], None if centre is None else approximate_disparity(centre, grid.offset(*at))
-        )
+@dataclass(frozen=True)
+class DrawVariant:
+    """One way to draw the same picture. every: of the views across and down, one in so many is stored; 0: centre and
+    corners only. is_half_float: textures of half floats instead of bytes. is_converged: every sample there is.
+    """
+
+    name: str
+    level: QualityLevel = BEST_QUALITY
+    prefilter: bool = True
+    adaptive: bool = True
+    every: int = 1
+    is_half_float: bool = False
+    knows_disparity: bool = True
+    is_converged: bool = False
 
 
-def approximate_disparity(disparity: NDArray[np.float32], offset: ViewOffset) -> NDArray[np.float32]:
-    """Disparity of another view, (H, W), near enough to time with: moved by its own value, looked up backwards."""
-    y, x = np.indices(disparity.shape)
-    moved = disparity
-    for _ in range(2):
-        rows = np.clip(np.rint(y + moved * offset.t).astype(int), 0, disparity.shape[0] - 1)
-        columns = np.clip(np.rint(x + moved * offset.s).astype(int), 0, disparity.shape[1] - 1)
-        moved = disparity[rows, columns]
-    return moved
-
-
-def plain_pass(
-    ctx: moderngl.Context, views: NDArray[np.uint8], size_px: tuple[int, int], radius: float, focus: float
-) -> Callable[[float], None]:
-    """The plain shader, ready to draw for an eye that many view steps right of the centre."""
-    rows, columns, height, width, _ = views.shape
-    texture = ctx.texture_array((width, height, rows * columns), 3, views.tobytes(), alignment=1)
-    texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.LINEAR, moderngl.LINEAR), False, False
-    program = ctx.program(PLAIN_VERTEX, PLAIN_FRAGMENT)
-    centre, reach = columns // 2, math.floor(radius + 0.5)
-    bounds = {"first": max(centre - reach, 0), "last": min(centre + reach, columns - 1)}
-    for name, value in {"columns": columns, "shear": -focus / width, "radius": radius, **bounds}.items():
-        program[name] = value
-    target = ctx.simple_framebuffer(size_px, components=4)
-    quad = ctx.vertex_array(program, [])
-
-    def draw(eye_s: float) -> None:
-        texture.use(0)
-        target.use()
-        program["eye"] = (centre + eye_s, float(centre))
-        quad.render(moderngl.TRIANGLES, vertices=3)
-
-    return draw
-
-
-def milliseconds(ctx: moderngl.Context, draw: Callable[[float], None]) -> list[float]:
-    """Times of FRAMES pictures, each finished, the eye moving a little; the first two, which warm up, left out."""
-
-    def picture(k: int) -> None:
-        draw(0.002 * k)
-        ctx.finish()
-
-    return [1e3 * cost_of(partial(picture, k)).wall_s for k in range(FRAMES + 2)][2:]
+REFERENCE = DrawVariant("at once")
+SHARED = (
+    DrawVariant("until converged", is_converged=True),
+    DrawVariant("half the picture's width", QualityLevel(scale=0.5)),
+    DrawVariant("textures of half floats", is_half_float=True),
+    DrawVariant("every 2nd view stored", every=2),
+    DrawVariant("centre and corners stored", every=0),
+    DrawVariant("views without disparity", knows_disparity=False),
+)
+APERTURE_VARIANTS = (
+    REFERENCE,
+    *SHARED,
+    DrawVariant("every 2nd sample across and down", QualityLevel(stride=2)),
+    DrawVariant("every 2nd sample, half width", QualityLevel(stride=2, scale=0.5)),
+    DrawVariant("no smoothing", prefilter=False),
+    DrawVariant("tiles skip nothing", adaptive=False),
+    DrawVariant(PLAIN),
+)
+PINHOLE_VARIANTS = (
+    REFERENCE,
+    *SHARED,
+    DrawVariant("of 2 views", QualityLevel(sources=2)),
+    DrawVariant("of 1 view", QualityLevel(sources=1)),
+)
 
 
 def main() -> None:
-    parser = parser_of(__doc__, "repeats", data={"required": True, "help": "a light field of any layout"})
-    parser.add_argument("--radius", type=float, default=2.0, help="of the aperture, in view steps")
-    parser.add_argument("--size", default="768x512")
-    emit(report(parser.parse_args()))
-
-
-def report(args: argparse.Namespace) -> Iterator[str]:
-    width, height = map(int, args.size.split("x"))
-    views = read_views(args.data)
-    disparity_file = next(iter(sorted(args.data.glob("*.npy"))), None)
-    centre = None if disparity_file is None else np.nan_to_num(np.load(disparity_file)).astype(np.float32)
-    focus = 0.0 if centre is None else float(np.quantile(centre, 0.25))
+    parser = parser_of(__doc__, "repeats", "only", data={"required": True})
+    options = parser.parse_args()
+    scenes = (scene for scene in data_scenes(options.data, with_soft=False) if is_wanted(scene.name, options.only))
+    large = (scene for scene in scenes if 2 * scene.reach + 1 >= LEAST_STORED_SIDE)
     gl = create_headless()
-    renderer = Renderer(gl)
-    open_views(renderer, views, centre)
+    try:
+        drawn = (figures for scene in large for figures in measure_drawing(gl, scene, options.repeats))
+        emit(f"### {each.what}\n\n{table(each)}\n" for each in drawn)
+    finally:
+        gl.release()
 
-    def ours(eye_s: float) -> None:
-        eye = ViewOffset(0.0, eye_s)
-        renderer.render(Optics(eye, focus_disparity=focus, aperture_diameter=2 * args.radius), (width, height))
 
-    plain = plain_pass(gl.ctx, views, (width, height), args.radius, focus)
-    times: dict[str, list[float]] = {}
-    for _ in range(args.repeats):
-        times.setdefault("plain shader", []).extend(milliseconds(gl.ctx, plain))
-        for renderer.prefilter, name in ((True, "picture, smoothing on"), (False, "picture, smoothing off")):
-            times.setdefault(name, []).extend(milliseconds(gl.ctx, ours))
-    yield f"{gl.renderer}, {args.size}, aperture radius {args.radius:g} views, focus at {focus:.1f} px per view step\n"
-    yield head("what", "least, ms", "median, ms", "times the plain one")
-    for name, each in times.items():
-        ratio = min(each) / min(times["plain shader"])
-        yield row(name, f"{min(each):.1f}", f"{np.median(each):.1f}", f"{ratio:.2f}")
+def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int) -> Iterator[Figures]:
+    """A refocused picture, and one through a pinhole between the views, of a scene's field, drawn in every way."""
+    focus, diameter = float(np.median(scene.disparity)), min(APERTURE_VIEWS, 2.0 * scene.reach)
+    refocused = Optics(focus_disparity=focus, aperture_diameter=diameter)
+    pictures = {
+        f"{scene.name}, refocused, aperture of {diameter:g} view steps": (refocused, APERTURE_VARIANTS),
+        f"{scene.name}, pinhole between views": (Optics(eye=BETWEEN), PINHOLE_VARIANTS),
+    }
+    drawer = _Drawer(gl, scene)
+    try:
+        for truth, (what, (optics, variants)) in zip(best_pictures(scene, refocused), pictures.items()):
+            errors = [drawer.errors(optics, variant, truth) for variant in variants]
+            costs = in_turns({variant.name: partial(drawer.cost, optics, variant) for variant in variants}, repeats)
+            drawn = tuple(
+                Measured(name, median_cost(own), median_ratio(own, costs[REFERENCE.name]), *figures)
+                for (name, own), figures in zip(costs.items(), errors)
+            )
+            yield Figures(what, "", drawn)
+    finally:
+        drawer.renderer.release()
+
+
+Work = tuple[Callable[[], None], Callable[[], NDArray[np.uint8]]]
+"""What draws a picture, and what reads it."""
+
+
+class _Drawer:
+    """Draws variants of one field, with the views that each wants uploaded."""
+
+    def __init__(self, gl: GLContext, scene: BenchScene) -> None:
+        self.gl, self.renderer = gl, Renderer(gl)
+        self._grid, self._size_px = scene.grid, (scene.photo.shape[1], scene.photo.shape[0])
+        self._views = list(generate(*scene.given, plan_literal(*scene.given, scene.grid), quality="fast"))
+        self._uploaded: tuple[int, bool, bool] | None = None
+
+    def cost(self, optics: Optics, variant: DrawVariant) -> Cost:
+        """Of one picture. cpu_s: what it takes alone: on software GL processor time over the cores, which other
+        programs disturb less, else time by the clock.
+        """
+        draw, _ = self._drawing(optics, variant)
+        draw()  # what is uploaded has to arrive first
+        self.gl.ctx.finish()
+        cost = cost_of(lambda: (draw(), self.gl.ctx.finish()))
+        return Cost(cost.wall_s, cost.cpu_s / CORES if self.gl.is_software else cost.wall_s)
+
+    def errors(self, optics: Optics, variant: DrawVariant, truth: FloatImage) -> tuple[float, float, int]:
+        """PSNR, FLIP, samples drawn."""
+        draw, read = self._drawing(optics, variant)
+        draw()
+        image = stretch_image(read(), self._size_px).astype(np.float32) / np.float32(255)
+        margin = (image.shape[0] - truth.shape[0]) // 2
+        image = image[margin : margin + truth.shape[0], margin : margin + truth.shape[1]]
+        return bounded_psnr(image, truth), flip(image, truth), self.renderer.samples_drawn
+
+    def _drawing(self, optics: Optics, variant: DrawVariant) -> Work:
+        """The picture, its views uploaded."""
+        if variant.name == PLAIN:
+            return self._plain(optics)
+        renderer = self.renderer
+        self._upload(variant)
+
+        def draw() -> None:
+            renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
+            renderer.render(optics, scale_size(self._size_px, variant.level.scale), level=variant.level)
+            if variant.is_converged:
+                renderer.refine()
+
+        return draw, renderer.read_image
+
+    def _upload(self, variant: DrawVariant) -> None:
+        stored = variant.every, variant.is_half_float, variant.knows_disparity
+        if stored == self._uploaded:
+            return
+        self.renderer.open_field(
+            self._grid, *self._size_px, hdr=variant.is_half_float, with_disparity=variant.knows_disparity
+        )
+        for view in self._views:
+            if is_stored(self._grid.offset(view.row, view.column), self._grid.centre[0], variant.every):
+                colors = view.colors
+                if variant.is_half_float:
+                    colors = stored_from_encoded(encoded_from_stored(colors), True)
+                disparity = view.disparity if variant.knows_disparity else None
+                self.renderer.upload_view(view.row, view.column, colors, disparity)
+        self._uploaded = stored
+
+    def _plain(self, optics: Optics) -> Work:
+        """The plain shader, for an eye in the middle."""
+        ctx, (width, height), centre = self.gl.ctx, self._size_px, self._grid.centre[0]
+        in_order = sorted(self._views, key=lambda view: (view.row, view.column))
+        pixels = b"".join(view.colors.tobytes() for view in in_order)
+        texture = ctx.texture_array((width, height, len(in_order)), 3, pixels, alignment=1)
+        texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.LINEAR, moderngl.LINEAR), False, False
+        program, radius = ctx.program(PLAIN_VERTEX, PLAIN_FRAGMENT), optics.aperture_diameter / 2
+        reach, shear = math.floor(radius + 0.5), -optics.focus_disparity
+        told = {"columns": self._grid.columns, "radius": radius, "eye": (float(centre), float(centre))}
+        bounds = {"first": max(centre - reach, 0), "last": min(centre + reach, self._grid.columns - 1)}
+        for name, value in {**told, **bounds, "shear": (shear / width, shear / height)}.items():
+            program[name] = value
+        target, quad = ctx.simple_framebuffer(self._size_px, components=3), ctx.vertex_array(program, [])
+
+        def draw() -> None:
+            texture.use(0)
+            target.use()
+            quad.render(moderngl.TRIANGLES, vertices=3)
+
+        return draw, lambda: np.frombuffer(target.read(alignment=1), np.uint8).reshape(height, width, 3)
+
+
+def best_pictures(scene: BenchScene, optics: Optics, eye: ViewOffset = BETWEEN) -> tuple[FloatImage, FloatImage]:
+    """Of views FINER times as close as the field's: refocused by evaluation's plain sum, the part that all
+    show, and the one of an eye; (H, W, 3), sRGB-encoded.
+    """
+    side = FINER * 2 * scene.reach + 1
+    grid, (photo, disparity) = GridShape(side, side), replace(scene, disparity=scene.disparity / FINER).given
+    stack = FocalStack([Focus("", optics.focus_disparity / FINER, FINER * optics.aperture_diameter / 2)])
+    for view in generate(photo, disparity, plan_literal(photo, disparity, grid), quality="fast"):
+        at, colors = grid.offset(view.row, view.column), encoded_from_stored(view.colors)
+        stack.add(at, colors)
+        if at == (FINER * eye.t, FINER * eye.s):
+            between = colors
+    return stack.pictures()[0], between
 
 
 if __name__ == "__main__":

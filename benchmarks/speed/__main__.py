@@ -11,7 +11,7 @@ from __future__ import annotations
 import platform
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
@@ -35,10 +35,8 @@ from benchmarks.harness.timing import (
     median_cost,
     median_ratio,
 )
-from benchmarks.speed.drawing import measure_drawing, pinhole_renderer
 from benchmarks.speed.report import Bench, Figures, Measured, SpeedTarget, write_bench
 from benchmarks.speed.variants import (
-    LEAST_STORED_SIDE,
     REFERENCE,
     VARIANTS,
     Draw,
@@ -46,6 +44,7 @@ from benchmarks.speed.variants import (
     evaluated_views,
     field_cost,
     is_possible,
+    pinhole_renderer,
 )
 from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.generation.cost_model import CORES
@@ -54,7 +53,6 @@ from iibr_core.generation.plan import PlanOverrides, plan_for_viewing, plan_lite
 from iibr_core.generation.relief import measure_relief
 from iibr_core.types import TOTAL_PARALLAX, ImageSize, InputError, Quality, ReportProgress, image_size
 from viewer.cli.terminal import show_progress
-from viewer.gpu.context import GLContext
 from viewer.gpu.headless_context import create_headless
 
 DRAWN_SIZE, DRAWN_PX = ImageSize(256, 256), 2.0
@@ -80,26 +78,19 @@ def main() -> None:
     else:
         own = drawn_scene(0, DRAWN_SIZE, DRAWN_PX, FIELD, judged_of(FIELD))
         scenes = [own] if options.quick else [own, soften(own)]
-    with headless_gl() as gl, show_progress("measuring") as show:
-        bench = measure(scenes, options.repeats, gl, options.quick, show)
+    with drawing() as draw, show_progress("measuring") as show:
+        bench = measure(scenes, options.repeats, draw, options.quick, show)
     for path in write_bench(options.out, bench):
         print(path)
 
 
-def measure(
-    scenes: Sequence[BenchScene], repeats: int, gl: GLContext | None, quick: bool, show: ReportProgress
-) -> Bench:
-    """Every variant of the core on each scene, of the renderer on those with views enough to leave some out."""
-    with nullcontext() if gl is None else pinhole_renderer(gl) as draw:
-        figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
-    own = [scene for scene in scenes if not scene.is_soft]
-    large = [scene for scene in own if gl and 2 * scene.reach + 1 >= LEAST_STORED_SIDE]
-    drawings = tuple(each for scene in large for each in measure_drawing(gl, scene, repeats, show))
-    usual = [one for one in own if image_size(one.photo) == USUAL_SIZE and one.grid == FIELD]
+def measure(scenes: Sequence[BenchScene], repeats: int, draw: Draw | None, quick: bool, show: ReportProgress) -> Bench:
+    """Every variant on each scene; targets on its own maps."""
+    figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
+    usual = [one for one in scenes if not one.is_soft and image_size(one.photo) == USUAL_SIZE and one.grid == FIELD]
     targets = [] if quick else [target for one in usual[:1] for target in field_targets(one, repeats, show)]
     targets += front_targets([one for one in figures if not one.is_soft])
-    machine = f"{platform.machine()}, {platform.system()}" + (f", {gl.renderer}" if gl else "")
-    return Bench(figures, drawings, tuple(targets), f"{machine}.")
+    return Bench(figures, tuple(targets), f"{platform.machine()}, {platform.system()}.")
 
 
 def measure_scene(
@@ -176,16 +167,17 @@ def front_targets(scenes: Sequence[Figures]) -> Iterator[SpeedTarget]:
 
 
 @contextmanager
-def headless_gl() -> Iterator[GLContext | None]:
+def drawing() -> Iterator[Draw | None]:
     """What draws without a display; None where there is no OpenGL."""
     try:
         gl = create_headless()
     except InputError as error:
-        print(f"note: drawing, and variants that leave views out, are not measured: {error}", file=sys.stderr)
+        print(f"note: variants that leave views out are not measured: {error}", file=sys.stderr)
         yield None
         return
     try:
-        yield gl
+        with pinhole_renderer(gl) as draw:
+            yield draw
     finally:
         gl.release()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,10 +81,9 @@ class SpeedTarget:
 
 @dataclass(frozen=True)
 class Bench:
-    """Everything that was measured. drawings: of pictures. machine: in words."""
+    """Everything that was measured. machine: in words."""
 
     scenes: tuple[Figures, ...]
-    drawings: tuple[Figures, ...]
     targets: tuple[SpeedTarget, ...]
     machine: str = ""
 
@@ -131,7 +130,7 @@ def markdown_of(bench: Bench) -> str:
     """All tables. The first, the means over the scenes, is what to show elsewhere."""
     parts = [title("Speed against error", "benchmarks.speed", bench.machine), HEAD]
     parts += (f"## {what}\n\n{means_table(scenes)}\n" for what, scenes in bench.kinds)
-    parts += (f"## {each.what}\n\n{each.about}\n\n{table(each)}\n" for each in (*bench.scenes, *bench.drawings))
+    parts += (f"## {each.what}\n\n{each.about}\n\n{table(each)}\n" for each in bench.scenes)
     rows = ((target.what, target.target, target.measured, holds(target.is_met)) for target in bench.targets)
     parts.append(f"## Targets\n\n{markdown(('figure', 'target', 'measured', 'holds'), rows)}\n")
     return "\n".join(parts)
@@ -163,13 +162,11 @@ def table(figures: Figures) -> str:
 
 
 def panels(bench: Bench) -> list[Panel]:
-    """Means over scenes, those scenes that have more variants, and drawing."""
+    """Means over scenes, and those scenes that have more variants."""
     found = [
         Panel(what, {name: (ratio, gain) for name, (ratio, gain, _) in means(scenes).items()})
         for what, scenes in bench.kinds
     ]
     shared = {name for panel in found for name in panel.points}
-    more: Iterable[Figures] = (one for one in bench.scenes if not one.is_soft and not one.gains.keys() <= shared)
-    for each in (*more, *bench.drawings):
-        found.append(Panel(each.what.replace(", ", ",\n", 1), each.gains, each.measured[0].name))
-    return found
+    more = (one for one in bench.scenes if not one.is_soft and not one.gains.keys() <= shared)
+    return found + [Panel(each.what, each.gains, each.measured[0].name) for each in more]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 import cv2
@@ -17,7 +17,10 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.types import FloatImage, ImageSize, Quality, StoredColors, ViewOffset
+from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, StoredColors, ViewOffset
+from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.renderer import Renderer
+from viewer.model.state.optics import Optics
 
 LEAST_STORED_SIDE = 5
 """Fields with fewer views a side have none to leave out."""
@@ -79,6 +82,32 @@ def is_stored(at: ViewOffset, reach: int, every: int) -> bool:
 def is_possible(variant: Variant, scene: BenchScene, has_drawing: bool) -> bool:
     """Whether the scene has views to leave out, and something draws what is between."""
     return variant.every == 1 or (has_drawing and 2 * scene.reach + 1 >= LEAST_STORED_SIDE)
+
+
+@contextmanager
+def pinhole_renderer(gl: GLContext) -> Iterator[Draw]:
+    """What draws pinhole pictures from stored views, as the viewer fills in views that are not stored."""
+    renderer = Renderer(gl)
+    try:
+        yield lambda stored, offsets: _draw_pinholes(renderer, stored, offsets)
+    finally:
+        renderer.release()
+
+
+def _draw_pinholes(renderer: Renderer, stored: Stored, offsets: Iterable[ViewOffset]) -> list[FloatImage]:
+    reach = round(max(abs(part) for at in stored for part in at))
+    grid = GridShape(2 * reach + 1, 2 * reach + 1)
+    colors = next(iter(stored.values()))[0]
+    height, width = colors.shape[:2]
+    renderer.open_field(grid, width, height, hdr=colors.dtype != np.uint8, with_disparity=True)
+    for at, (pixels, disparity) in stored.items():
+        renderer.upload_view(round(at.t) + reach, round(at.s) + reach, pixels, disparity)
+    pictures = []
+    for at in offsets:
+        renderer.render(Optics(eye=at), (width, height))
+        renderer.refine()
+        pictures.append(encoded_from_stored(renderer.read_image()))
+    return pictures
 
 
 def field_cost(variant: Variant, scene: BenchScene) -> Cost:

@@ -33,7 +33,6 @@ def test_it_writes_tables_and_plots(
     assert capsys.readouterr().out.splitlines() == [str(out / f"speed.{kind}") for kind in ("md", "svg")]
     text = (out / "speed.md").read_text()
     assert "| every 2nd view stored |" in text
-    assert "## Drawing: square, pinhole between views" in text
     assert "## Targets" in text
 
 
