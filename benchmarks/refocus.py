@@ -22,7 +22,6 @@ from benchmarks.harness.report import emit, is_wanted, parser_of, start
 from benchmarks.harness.scenes import BenchScene, data_scenes
 from benchmarks.harness.timing import Cost, cost_of, in_turns, median_cost, median_ratio
 from benchmarks.speed.report import Figures, Measured, table
-from benchmarks.speed.variants import LEAST_STORED_SIDE, is_stored
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.evaluation.refocus import FocalStack, Focus
@@ -39,6 +38,8 @@ from viewer.gpu.refocus.renderer import Renderer
 APERTURE_VIEWS = 6.0
 BETWEEN = ViewOffset(-0.5, 1.5)
 """An eye between the stored views, on one of those that only the best picture has."""
+LEAST_SIDE = 5
+"""Fields with fewer views a side have none to leave out."""
 FINER = 2
 """Views of the best picture, to each stored one across and down."""
 PLAIN = "plain shader"
@@ -112,7 +113,7 @@ def main() -> None:
     parser = parser_of(__doc__, "repeats", "only", data={"required": True})
     options = parser.parse_args()
     scenes = (scene for scene in data_scenes(options.data, with_soft=False) if is_wanted(scene.name, options.only))
-    large = (scene for scene in scenes if 2 * scene.reach + 1 >= LEAST_STORED_SIDE)
+    large = (scene for scene in scenes if 2 * scene.reach + 1 >= LEAST_SIDE)
     gl = create_headless()
     try:
         drawn = (figures for scene in large for figures in measure_drawing(gl, scene, options.repeats))
@@ -227,6 +228,13 @@ class _Drawer:
             quad.render(moderngl.TRIANGLES, vertices=3)
 
         return draw, lambda: np.frombuffer(target.read(alignment=1), np.uint8).reshape(height, width, 3)
+
+
+def is_stored(at: ViewOffset, reach: int, every: int) -> bool:
+    """Whether a field that stores every so manieth view has this one; 0: the centre and the corners."""
+    if every == 0:
+        return at == (0, 0) or abs(at.t) == abs(at.s) == reach
+    return at.t % every == 0 and at.s % every == 0
 
 
 def best_pictures(scene: BenchScene, optics: Optics, eye: ViewOffset = BETWEEN) -> tuple[FloatImage, FloatImage]:

@@ -37,7 +37,8 @@ def views(docs: Path) -> str:
         return f"{full} dB ({seen}, {holes})"
 
     rows = ((name, words(scene, "balanced"), words(scene, "reference warp")) for name, scene in SCENES.items())
-    return markdown((f"{CENTRE}: full frame (visible, holes)", "iibr", "resampling warp with background fill"), rows)
+    names = "from the centre view and its map: full frame (visible, holes)", "iibr", "resampling warp, filled holes"
+    return markdown(names, rows)
 
 
 def soft_maps(docs: Path) -> str:

@@ -9,9 +9,7 @@ Machines differ and are shared: quote medians and ratios.
 from __future__ import annotations
 
 import platform
-import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
@@ -36,24 +34,13 @@ from benchmarks.harness.timing import (
     median_ratio,
 )
 from benchmarks.speed.report import Bench, Figures, Measured, SpeedTarget, write_bench
-from benchmarks.speed.variants import (
-    REFERENCE,
-    VARIANTS,
-    Draw,
-    Variant,
-    evaluated_views,
-    field_cost,
-    is_possible,
-    pinhole_renderer,
-)
+from benchmarks.speed.variants import REFERENCE, VARIANTS, Variant, evaluated_views, field_cost
 from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.generation.cost_model import CORES
 from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import PlanOverrides, plan_for_viewing, plan_literal
-from iibr_core.generation.relief import measure_relief
-from iibr_core.types import TOTAL_PARALLAX, ImageSize, InputError, Quality, ReportProgress, image_size
+from iibr_core.generation.plan import plan_for_viewing, plan_literal
+from iibr_core.types import ImageSize, InputError, Quality, ReportProgress, image_size
 from viewer.cli.terminal import show_progress
-from viewer.gpu.headless_context import create_headless
 
 DRAWN_SIZE, DRAWN_PX = ImageSize(256, 256), 2.0
 USUAL_SIZE = ImageSize(512, 512)
@@ -78,59 +65,43 @@ def main() -> None:
     else:
         own = drawn_scene(0, DRAWN_SIZE, DRAWN_PX, FIELD, judged_of(FIELD))
         scenes = [own] if options.quick else [own, soften(own)]
-    with drawing() as draw, show_progress("measuring") as show:
-        bench = measure(scenes, options.repeats, draw, options.quick, show)
+    with show_progress("measuring") as show:
+        bench = measure(scenes, options.repeats, options.quick, show)
     for path in write_bench(options.out, bench):
         print(path)
 
 
-def measure(scenes: Sequence[BenchScene], repeats: int, draw: Draw | None, quick: bool, show: ReportProgress) -> Bench:
+def measure(scenes: Sequence[BenchScene], repeats: int, quick: bool, show: ReportProgress) -> Bench:
     """Every variant on each scene; targets on its own maps."""
-    figures = tuple(measure_scene(scene, VARIANTS, repeats, show, draw) for scene in scenes)
+    figures = tuple(measure_scene(scene, VARIANTS, repeats, show) for scene in scenes)
     usual = [one for one in scenes if not one.is_soft and image_size(one.photo) == USUAL_SIZE and one.grid == FIELD]
     targets = [] if quick else [target for one in usual[:1] for target in field_targets(one, repeats, show)]
     targets += front_targets([one for one in figures if not one.is_soft])
     return Bench(figures, tuple(targets), f"{platform.machine()}, {platform.system()}.")
 
 
-def measure_scene(
-    scene: BenchScene, variants: Sequence[Variant], repeats: int, show: ReportProgress, draw: Draw | None = None
-) -> Figures:
-    """Every possible variant on one scene, timed in turns. draw: what fills in where views are left out."""
-    possible = [variant for variant in variants if is_possible(variant, scene, draw is not None)]
+def measure_scene(scene: BenchScene, variants: Sequence[Variant], repeats: int, show: ReportProgress) -> Figures:
+    """Every variant on one scene, timed in turns."""
     errors = {}
-    for k, variant in enumerate(possible):
-        show(k, len(possible), f"{scene.name}: error of {variant.name}")
-        made = evaluated_views(variant, scene, draw)
+    for k, variant in enumerate(variants):
+        show(k, len(variants), f"{scene.name}: error of {variant.name}")
+        made = evaluated_views(variant, scene)
         each = [(bounded_psnr(image, scene.truth[at]), flip(image, scene.truth[at])) for at, image in made.items()]
         errors[variant.name] = [float(mean) for mean in np.mean(each, axis=0)]
-    ways = {variant.name: partial(field_cost, variant, scene) for variant in possible}
+    ways = {variant.name: partial(field_cost, variant, scene) for variant in variants}
     costs = in_turns(ways, repeats, lambda done, total, name: show(done, total, f"{scene.name}: {name}"))
-    measured = []
-    for variant in possible:
-        own = costs[variant.name]
-        ratio = median_ratio(own, costs[REFERENCE.name])
-        measured.append(Measured(variant.name, median_cost(own), ratio, *errors[variant.name]))
+    measured = tuple(
+        Measured(name, median_cost(own), median_ratio(own, costs[REFERENCE.name]), *errors[name])
+        for name, own in costs.items()
+    )
     height, width = image_size(scene.photo)
-    planned = planned_variant(scene, possible)
-    found = Figures(scene.name, "", tuple(measured), planned, scene.is_soft)
+    planned: str = plan_literal(*scene.given, scene.grid).quality  # variants of one quality alone are called so
+    found = Figures(scene.name, "", measured, planned, scene.is_soft)
     about = (
         f"{len(scene.field)} views of {width}x{height}, {len(scene.truth)} judged. The plan would choose *{planned}*,"
         f" {found.behind_front_db:.2f} dB behind the best that takes no longer."
     )
     return replace(found, about=about)
-
-
-def planned_variant(scene: BenchScene, variants: Sequence[Variant]) -> str:
-    """That of the plan's quality, with as few stored views as it finds enough for this parallax."""
-    full = 2 * scene.reach
-    moved_px = measure_relief(scene.disparity).range * full
-    strength = max(moved_px / (TOTAL_PARALLAX * scene.photo.shape[1]), 1e-6)
-    side = plan_for_viewing(*scene.given, PlanOverrides(depth_strength=strength)).grid.columns
-    chosen = Variant("", plan_literal(*scene.given, scene.grid).quality)
-    plain = [variant for variant in variants if replace(variant, name="", every=1) == chosen and variant.every > 0]
-    enough = [variant for variant in plain if full // variant.every + 1 >= min(side, full + 1)]
-    return max(enough, key=lambda variant: variant.every, default=REFERENCE).name
 
 
 def field_targets(scene: BenchScene, repeats: int, show: ReportProgress) -> Iterator[SpeedTarget]:
@@ -164,22 +135,6 @@ def front_targets(scenes: Sequence[Figures]) -> Iterator[SpeedTarget]:
         what = f"the plan's default against the fastest within {AS_GOOD_DB:g} dB, {scene.what}"
         said = f"{slower:.2f} times its time (*{as_good.name}*)"
         yield SpeedTarget(what, f"<= {MOST_SLOWER:g} times", said, slower <= MOST_SLOWER)
-
-
-@contextmanager
-def drawing() -> Iterator[Draw | None]:
-    """What draws without a display; None where there is no OpenGL."""
-    try:
-        gl = create_headless()
-    except InputError as error:
-        print(f"note: variants that leave views out are not measured: {error}", file=sys.stderr)
-        yield None
-        return
-    try:
-        with pinhole_renderer(gl) as draw:
-            yield draw
-    finally:
-        gl.release()
 
 
 if __name__ == "__main__":

@@ -231,7 +231,7 @@ def _mean_figures(switch: Switch, scenes: Sequence[Judged]) -> Figures:
 def measure(switch: Switch, scene: BenchScene, truth: BenchScene) -> Figures:
     """Means over the judged views of a scene. truth: the same with its exact map."""
     with switch.applied():
-        made = evaluated_views(switch.variant, scene, None)
+        made = evaluated_views(switch.variant, scene)
     full, hole = [], []
     for at, image in made.items():
         full.append(bounded_psnr(image, truth.truth[at]))

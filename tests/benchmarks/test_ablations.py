@@ -47,7 +47,7 @@ def judged() -> tuple[BenchScene, BenchScene]:
 
 def views(switch: Switch, scene: BenchScene) -> np.ndarray:
     with switch.applied():
-        return np.array(list(evaluated_views(switch.variant, scene, None).values()))
+        return np.array(list(evaluated_views(switch.variant, scene).values()))
 
 
 @pytest.mark.parametrize("switch", [one for one in SWITCHES[1:] if one.name not in UNCHANGED], ids=lambda one: one.name)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.harness.scenes import BenchScene
-from benchmarks.refocus import APERTURE_VARIANTS, PINHOLE_VARIANTS, PLAIN, best_pictures, measure_drawing
+from benchmarks.refocus import APERTURE_VARIANTS, PINHOLE_VARIANTS, PLAIN, best_pictures, is_stored, measure_drawing
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.rendering.optics import Optics
 from iibr_core.types import ViewOffset
@@ -62,3 +62,8 @@ def test_every_way_to_draw_is_measured(scene: BenchScene, gl: GLContext) -> None
     samples = {drawn.name: drawn.samples for drawn in refocused.measured}
     # Samples this near to each other converge in one pass.
     assert samples["every 2nd sample across and down"] < samples["at once"] == samples["until converged"]
+
+
+def test_views_are_left_out_of_a_field(scene: BenchScene) -> None:
+    counts = [sum(is_stored(at, scene.reach, every) for at in scene.field) for every in (1, 2, 0)]
+    assert counts == [25, 9, 5]

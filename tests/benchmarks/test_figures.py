@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from benchmarks import figures
 from benchmarks.figures import FIGURES, NEEDS, ROOT, Figure, make_all, stale_pages
 from benchmarks.harness.pages import cell, put_between, table
+from benchmarks.harness.readme import TABLES, write_readme
 from benchmarks.harness.report import DOCS, WITH_CHANGES, current_commit, made_by
 from iibr_core.types import InputError
 
@@ -117,6 +119,22 @@ def test_every_report_says_what_made_it(name: str) -> None:
     assert text.count("Made by `") == len(re.findall(r"Made by `[^`]+` at commit [0-9a-f]{7,}", text))
     assert WITH_CHANGES not in text
     assert "Since then" not in text
+
+
+def test_the_readme_says_what_the_reports_say() -> None:
+    """A table whose pages are not yet made in the form that is read stays; `--check` says so."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert all(text.count(f"<!-- {mark} -->") == 1 for mark in TABLES)
+    assert not [fault for fault in write_readme(ROOT, only_check=True) if "is not what its page says" in fault]
+
+
+def test_a_changed_readme_is_noticed(tmp_path: Path) -> None:
+    shutil.copytree(DOCS, tmp_path / "docs")
+    text = (ROOT / "README.md").read_text("utf-8")
+    (tmp_path / "README.md").write_text(text.replace("| balanced ", "| unbalanced "))
+    assert "table switches is not what its page says" in list(write_readme(tmp_path, only_check=True))
+    list(write_readme(tmp_path))
+    assert (tmp_path / "README.md").read_text("utf-8") == text
 
 
 def test_an_old_report_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

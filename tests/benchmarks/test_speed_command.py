@@ -24,7 +24,6 @@ def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
 def test_it_writes_tables_and_plots(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """On a 5x5 field, so that the viewer draws what variants leave out."""
     monkeypatch.setattr("benchmarks.harness.scenes.MOST_JUDGED", 3)
     write_grid(tmp_path / "square", 5)
     out = tmp_path / "docs"
@@ -32,7 +31,7 @@ def test_it_writes_tables_and_plots(
     assert run(monkeypatch, "--data", tmp_path / "square", "--out", out, "--quick", "--repeats", 1) == 0
     assert capsys.readouterr().out.splitlines() == [str(out / f"speed.{kind}") for kind in ("md", "svg")]
     text = (out / "speed.md").read_text()
-    assert "| every 2nd view stored |" in text
+    assert "| half width |" in text
     assert "## Targets" in text
 
 

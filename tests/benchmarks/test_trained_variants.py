@@ -49,13 +49,13 @@ def scene() -> BenchScene:
 
 
 def test_every_variant_is_trained_and_asked_in_its_own_way(weights: Path, scene: BenchScene) -> None:
-    default = evaluated_views(DEFAULT.variant, scene, None)
+    default = evaluated_views(DEFAULT.variant, scene)
     seen = []
     for variant in TRAINED_VARIANTS:
         switch = trained_switch(variant, weights)
         with switch.applied():
-            seen += evaluated_views(switch.variant, scene, None).values()
-    after = evaluated_views(DEFAULT.variant, scene, None)
+            seen += evaluated_views(switch.variant, scene).values()
+    after = evaluated_views(DEFAULT.variant, scene)
     assert all(np.isfinite(view).all() for view in seen)
     assert all(not np.array_equal(one, next(iter(default.values()))) for one in seen)
     np.testing.assert_array_equal(next(iter(after.values())), next(iter(default.values())))
