@@ -8,6 +8,7 @@ DATA holds hci_antinous, the Middlebury pairs, and photos that hold depth of the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def in_three_ways(scene: BenchScene, soft: FloatImage) -> tuple[float, float, fl
 
 def views_psnr(scene: BenchScene, disparity: FloatImage) -> float:
     """Mean PSNR (dB) of a scene's judged views, made with another disparity."""
-    quality = plan_literal(*scene.given, scene.grid).quality
+    quality = plan_literal(*replace(scene, disparity=disparity).given, scene.grid).quality
     with ViewMaker(scene.photo, disparity, scene.field, (quality,)) as maker:
         made = {at: maker.view(quality, at).colors for at in scene.truth}
     return float(np.mean([bounded_psnr(quantise_as_stored(made[at]), scene.truth[at]) for at in made]))

@@ -62,17 +62,16 @@ NEEDS = {
 }
 FIGURES = (
     Figure(
-        ("evaluation/report.md",), "iibr evaluate DATA tests/data/thin_lens --views 24 --out OUT --force", 8, ("DATA",)
+        ("evaluation/report.md",), "iibr evaluate DATA tests/data/thin_lens --views 24 --out OUT --force", 6, ("DATA",)
     ),
     Figure(("speed.md", "speed.svg"), "benchmarks.speed --data DATA --repeats 2 --out OUT", 15, ("DATA",)),
     Figure(("depth.md",), "benchmarks.depth --data DATA", 4, ("DATA",)),
     Figure(("stages.md",), "benchmarks.stages --data DATA", 20, ("DATA",)),
-    Figure(("tables/ablations.md",), "benchmarks.tables.ablations --data DATA --out OUT/ablations.md", 8, ("DATA",)),
     Figure(
-        ("tables/trained.md",),
-        "benchmarks.tables.ablations --data DATA --weights out/trained --out OUT/trained.md",
-        28,
-        ("DATA", "torch"),
+        ("tables/ablations.md",),
+        "benchmarks.tables.ablations --data DATA --scenes 2 --out OUT/ablations.md",
+        5,
+        ("DATA",),
     ),
     Figure(("free_views.md#poses",), "benchmarks.free_views --scenes 8 --size 384x288 --seed 7", 2),
     Figure(("figures.md#against-warp",), "benchmarks.against_warp --data DATA --repeats 2", 2, ("DATA",)),
@@ -84,8 +83,8 @@ FIGURES = (
     Figure(("figures.md#time-left",), "benchmarks.time_left", 4),
     Figure(("figures.md#plan",), "benchmarks.prediction --data DATA --photos DATA", 6, ("DATA", "Linux")),
     Figure(("memory.md#predicted",), "benchmarks.memory predicted", 3, ("Linux",)),
-    Figure(("memory.md#bounds",), "benchmarks.memory bounds 12 48", 10, ("Linux",)),
-    Figure(("memory.md#use",), "benchmarks.use --steps 250", 6, ("X",)),
+    Figure(("memory.md#bounds",), "benchmarks.memory bounds 12", 5, ("Linux",)),
+    Figure(("memory.md#use",), "benchmarks.use --steps 150", 4, ("X",)),
     Figure(("memory.md#day",), "benchmarks.memory day", 2, ("Linux",)),
     Figure(("edges_fork.png", "edges_handlebar.png"), "docs/make_edges.py OUT", 0.5),
     Figure(("screenshot.png", "inspection.png"), "docs/make_screenshots.py OUT", 0.5),
@@ -185,8 +184,8 @@ def stale_pages() -> Iterator[str]:
         for commit in dict.fromkeys(COMMIT.findall((DOCS / page).read_text("utf-8"))) or [""]:
             later = git("rev-list", "--count", f"{commit}..HEAD", "--", *(f":/{folder}" for folder in SHAPING))
             if later != "0" or not commit:
-                age = f"{later or 'unknown many'} commits behind" if commit else "says no commit"
-                yield f"docs/{page}: {commit and commit + ', '}{age}"
+                age = f"at {commit}, {later} commits behind" if later else f"at {commit}, which this history lacks"
+                yield f"docs/{page}: {age if commit else 'says no commit'}"
     yield from (f"README.md: {fault}" for fault in write_readme(ROOT, only_check=True))
 
 

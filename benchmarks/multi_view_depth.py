@@ -1,6 +1,6 @@
 """Disparity found from the views of a light field: how right it is, what it costs, and what views between views gain.
 
-    python -m benchmarks.multi_view_depth --data DATA [--no-views]
+    python -m benchmarks.multi_view_depth --data DATA
 
 Of light fields below DATA with 3x3 views and more. Where one has a true map of its centre view (gt_*.npy), bad pixels
 and the square error are told, 15 px of border left out, as the HCI benchmark does. Every second view is held back,
@@ -35,19 +35,16 @@ BAD_PX = 0.07
 
 def main() -> None:
     parser = parser_of(__doc__, data={"required": True})
-    parser.add_argument("--no-views", action="store_true")
-    options = parser.parse_args()
-    emit(report(options.data, not options.no_views))
+    emit(report(parser.parse_args().data))
 
 
-def report(data: Path, with_views: bool) -> Iterator[str]:
+def report(data: Path) -> Iterator[str]:
     names = f"bad pixels (> {BAD_PX}), %", "square error x 100", "views held back: drawn, dB", "plain blend, dB"
     yield head("light field", "views", "coarse, s of processor time", "whole, s", *names)
     for folder in (data, *sorted(data.iterdir())):
         if (folder / "views").is_dir() and len(list((folder / "views").iterdir())) >= 9:
             views = read_views(folder)
-            judged = judge_views(views) if with_views else ("", "")
-            yield row(folder.name, "{}x{}".format(*views.shape[:2]), *judge_map(folder, views), *judged)
+            yield row(folder.name, "{}x{}".format(*views.shape[:2]), *judge_map(folder, views), *judge_views(views))
 
 
 def judge_map(folder: Path, views: NDArray[np.uint8]) -> Iterator[str]:

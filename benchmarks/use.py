@@ -3,9 +3,8 @@
 python -m benchmarks.use [--steps 1000] [--seed 0]
 
 Says what memory the process fills after so many actions and once it rests, against a fresh window that rests with the
-same photo and grid: photos differ in size, and grids in views. Then how threads and open files stand, and how long
-frames took but while something was opened, of wall time and of processor time of the window's own thread: other
-programs make frames wait, and only the second tells what this one costs.
+same photo and grid: photos differ in size, and grids in views; and how threads and open files stand. How long frames
+take `benchmarks.window` tells.
 """
 
 from __future__ import annotations
@@ -45,7 +44,6 @@ SIZES = (600, 900), (700, 600), (480, 720), (640, 960), (512, 512), (560, 840)
 """Of the photos in the folder: (height, width)."""
 GRIDS = 5, 7, 9
 FRAMES_A_STEP = 3
-SLOW_FRAME_S = 0.25
 RESTS_AFTER, OPEN_S = 10, 60.0
 COUNTED_AFTER = 10, 100, 250, 500, 1000, 2000
 MIB = 2**20
@@ -57,22 +55,18 @@ EXPORTS = (
 
 
 class User:
-    """Shows frames of a window. frames: seconds (wall, processor) of those while nothing was opened, and what was done.
-    out: folder to save to.
-    """
+    """Does things in a window. out: folder to save to."""
 
     def __init__(self, app: App, out: Path, seed: int = 0) -> None:
         self.app, self.out, self.random = app, out, random.Random(seed)
-        self.frames: list[tuple[float, float, str]] = []
-        self._doing = ""
 
     def step(self) -> None:
         """Do something, often what is often done."""
-        self._doing = self.random.choice(2 * OFTEN + SELDOM)
-        if self._doing in ASKED:
-            self.do(*ASKED[self._doing](self))
+        thing = self.random.choice(2 * OFTEN + SELDOM)
+        if thing in ASKED:
+            self.do(*ASKED[thing](self))
         else:
-            DONE[self._doing](self)
+            DONE[thing](self)
 
     def between(self, low: float, high: float) -> float:
         """A random number."""
@@ -106,12 +100,8 @@ class User:
             self.frame()
 
     def frame(self) -> None:
-        """A turn of the loop, as long as it takes without the sleep it begins with."""
-        waits = self.app.wait_s > 0
-        began, used, was_open = time.perf_counter(), time.thread_time(), self.is_open()
+        """A turn of the loop."""
         self.app.step()
-        if was_open and self.is_open() and not waits and self._doing not in ("switch", "change_grid"):
-            self.frames.append((time.perf_counter() - began, time.thread_time() - used, self._doing))
 
 
 def drag(user: User) -> None:
@@ -201,10 +191,8 @@ def report(steps: int, seed: int) -> Iterator[str]:
         with open_window(Source(str(folder))) as app:
             user = User(app, Path(name), seed)
             open_first(user)
-            user.frames.clear()
             yield from take_steps(user, steps)
-    yield from about_frames(user.frames)
-    yield f"Threads of Python left when the window is closed: {threading.active_count() - threads_before}."
+    yield f"\nThreads of Python left when the window is closed: {threading.active_count() - threads_before}."
 
 
 def open_first(user: User) -> None:
@@ -244,16 +232,6 @@ def take_steps(user: User, steps: int) -> Iterator[str]:
             go_back(user)
             user.rest()
             yield line(f"{number} actions, back at the first photo")
-
-
-def about_frames(frames: list[tuple[float, float, str]]) -> Iterator[str]:
-    """How long they took, and what the longest one did."""
-    yield "\n" + head("frames", "median, ms", "longest, ms", f"over {1e3 * SLOW_FRAME_S:.0f} ms")
-    for what, index in (("wall time", 0), ("processor time", 1)):
-        took = sorted(frame[index] for frame in frames)
-        slow = sum(seconds > SLOW_FRAME_S for seconds in took)
-        yield row(what, f"{took[len(took) // 2] * 1e3:.0f}", f"{took[-1] * 1e3:.0f}", slow)
-    yield f"\nThe longest by processor time was while it did: {max(frames, key=lambda frame: frame[1])[2]}."
 
 
 if __name__ == "__main__":

@@ -162,11 +162,8 @@ def table(figures: Figures) -> str:
 
 
 def panels(bench: Bench) -> list[Panel]:
-    """Means over scenes, and those scenes that have more variants."""
-    found = [
+    """Means over scenes."""
+    return [
         Panel(what, {name: (ratio, gain) for name, (ratio, gain, _) in means(scenes).items()})
         for what, scenes in bench.kinds
     ]
-    shared = {name for panel in found for name in panel.points}
-    more = (one for one in bench.scenes if not one.is_soft and not one.gains.keys() <= shared)
-    return found + [Panel(each.what, each.gains, each.measured[0].name) for each in more]
