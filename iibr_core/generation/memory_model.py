@@ -1,7 +1,7 @@
 """What a process takes in all, so that `--memory` is a bound: refused or made smaller before anything is allocated.
 
 The whole is counted: the process before it does anything, which was measured, and the arrays that it holds at the
-same time, so many bytes for each of their pixels. `python -m benchmarks.memory predicted` compares it with processes.
+same time, each by its name and type. `python -m benchmarks.memory predicted` compares it with processes.
 """
 
 from __future__ import annotations
@@ -10,6 +10,10 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from iibr_core.generation.outer_views import outer_views_of_grid
+from iibr_core.rendering.ambiguous_rays import FEATURES, HYPOTHESES
 from iibr_core.runtime.machine import (
     MAPPED_BYTES,
     MOST_USUAL_SHARE,
@@ -20,39 +24,55 @@ from iibr_core.runtime.machine import (
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
 from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
 
+
+def bytes_of(**arrays: str) -> int:
+    """What one pixel takes in these arrays: each by its name, and of what type its values are there; "3f4" is three
+    floats of four bytes.
+    """
+    return sum(np.dtype(each).itemsize for each in arrays.values())
+
+
 MIB = 2**20
 VIEWER_BYTES, WRITER_BYTES = 350 * MIB, 260 * MIB
-"""Of a process that does nothing yet: Python and compiled kernels; OpenGL, where views are shown."""
+"""Measured, of a process that does nothing yet: Python and compiled kernels; OpenGL, where views are shown."""
 HEADROOM = 1.06
 """Times the arrays: small ones are not counted, and heaps are never full."""
-READING_BYTES, PHOTO_BYTES = 90, 28
-"""Of one pixel of the photo while it is read and its depth looked for; then: its colours as floats, its disparity as
-found, as refined and as the views take it, the view in the middle as it is stored.
+READING_BYTES, DEPTH_MAP_BYTES, TILE_BYTES = 90, 26, 121
+"""Measured, the most per pixel: of a photo while it is read and its depth looked for; of a map of depth while it
+becomes disparity; of the tile of a photo at its own size that is being drawn, beside its rays.
 """
-RAY_BYTES, STATISTICS_BYTES, DETAIL_BYTES = 21, 12, 5
-"""Of one pixel of one source image: colours, disparity, coverage, flag (`RaySet`); its statistics, where the
-transformer is asked. Of one of the photo's: what tells its details.
-"""
-WORKING_BYTES, CANDIDATE_BYTES, AMBIGUOUS_BYTES = 42, 85, 750
-"""Of one pixel of a view in the making: float colours, with and without specks, disparity, flags. Of the band of rows
-in the making: five candidates and their weights; hypotheses and features of rays that the transformer is asked for.
-"""
-HOLE_BYTES = 160
+USUAL_HOLES, USUAL_AMBIGUOUS = 0.12, 0.2
+"""Shares of a view, before anything is known of a scene but its size."""
+PHOTO_BYTES = bytes_of(colors="3f4", found="f4", refined="f4", field="f4", stored="3u1", inpainted="?")
+RAY_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4", edge_level="u1")
+"""Of one source image, see `RaySet`."""
+STATISTICS_BYTES = bytes_of(low="f4", high="f4", step="f4")
+"""Of one source image, where the transformer is asked."""
+DETAIL_BYTES = bytes_of(detail="f4", joined="u1")
+FILLED_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4")
+VIEW_BYTES = bytes_of(colors="3f4", disparity="f4", occluded="?", inpainted="?", uncovered="f4") + FILLED_BYTES
+"""Of a view in the making, with what it adds to the rays."""
+CANDIDATE_BYTES = bytes_of(coverage="5f4", disparity="5f4", source="5u1", weights="5f4", count="u1", shown="f4")
+BAND_BYTES = CANDIDATE_BYTES + bytes_of(image="u1", colors="3f4")
+"""Of the band of rows in the making."""
+UNDECIDED_BYTES = bytes_of(pixel="i4", number="u1", uncovered="f4") + HYPOTHESES * bytes_of(
+    disparity="f4", source="u1", share="f4", nearest="f4"
+)
+AMBIGUOUS_BYTES = UNDECIDED_BYTES + HYPOTHESES * bytes_of(mask="?", features=f"{FEATURES}f4")
+"""Of a ray that the transformer is still to be asked for, and is being asked for."""
+HOLE_BYTES = bytes_of(pixel="2i8", number="i4", around="16i8", reach="f4", changed="3f4")
 """Of one pixel of a hole while it is filled: what surrounds it in sixteen directions."""
-DRAFT_BYTES, UNDECIDED_BYTES = 11, 68
-"""Of one pixel of a draft: the view as it is stored; of one that the transformer is still to be asked for, more."""
-MAP_BYTES, DEPTH_MAP_BYTES = 6, 26
-"""Of one pixel of a disparity map at its own size; more where it is depth."""
-STORED_BYTES, STORED_HDR_BYTES = 7, 10
-"""Of one pixel of a view in a light field: colours and disparity."""
-TARGET_BYTES, MOST_TARGET_PIXELS = 24, 8_000_000
-"""Of one pixel of what a picture is drawn into; larger ones are drawn in parts."""
-PICTURE_BYTES, FLOAT_PICTURE_BYTES = 9, 64
-"""Of one pixel of a picture on its way to a file: 8 bits a channel, or linear light."""
-OWN_SIZE_BYTES, TILE_BYTES = 28, 121
-"""Of one pixel of a photo that is drawn at its own size: its colours and its light as floats, its disparity. Of one
-pixel of the tile that is being drawn, beside its rays: the view, its holes, the light of a lens.
-"""
+DRAFT_BYTES = bytes_of(colors="3u1", with_specks="3u1", disparity="f4", inpainted="?")
+MAP_BYTES = bytes_of(values="f4", is_known="?", is_finite="?")
+STORED_BYTES, STORED_HDR_BYTES = (bytes_of(colors=each, disparity="f4") for each in ("3u1", "3f2"))
+"""Of a view in a light field."""
+TARGET_BYTES = bytes_of(light="4f4", color="4f2")
+MOST_TARGET_PIXELS = 8_000_000
+"""What a picture is drawn into; larger ones are drawn in parts."""
+PICTURE_BYTES = bytes_of(drawn="3u1", turned="3u1", encoded="3u1")
+FLOAT_PICTURE_BYTES = bytes_of(drawn="4f4", turned="4f4", linear="4f4", encoded="4f4")
+OWN_SIZE_BYTES = bytes_of(colors="3f4", light="3f4", disparity="f4")
+"""Of a photo that is drawn at its own size."""
 TILE_IMAGES = 7
 """Source images that a tile is drawn from: its own two, and what was inpainted on the side that is looked at from."""
 MOST_COMPLETING = 10
@@ -77,7 +97,8 @@ class Making(NamedTuple):
     @classmethod
     def usual(cls, pixels: float) -> Making:
         """What scenes take before anything is known of them but their size."""
-        return cls(pixels, pixels, 10, 0.12, 0.2, "balanced")
+        images = 2 + len(outer_views_of_grid(USUAL_GRID))
+        return cls(pixels, pixels, images, USUAL_HOLES, USUAL_AMBIGUOUS, "balanced")
 
 
 def making_bytes(making: Making) -> int:
@@ -86,8 +107,8 @@ def making_bytes(making: Making) -> int:
     """
     pixels, asks = making.pixels, making.quality != "fast"
     band = min(pixels, MOST_BAND_PIXELS)
-    in_flight = THREADS * (pixels * WORKING_BYTES + band * (CANDIDATE_BYTES + making.ambiguous_share * AMBIGUOUS_BYTES))
-    filling = pixels * (WORKING_BYTES + making.hole_share * HOLE_BYTES)
+    in_flight = THREADS * (pixels * VIEW_BYTES + band * (BAND_BYTES + making.ambiguous_share * AMBIGUOUS_BYTES))
+    filling = pixels * (VIEW_BYTES + making.hole_share * HOLE_BYTES)
     rays = making.images * (RAY_BYTES + (STATISTICS_BYTES if asks else 0)) + DETAIL_BYTES
     return round(making.canvas_pixels * rays + max(in_flight, filling))
 
@@ -216,7 +237,7 @@ def require_field(budget: Budget, name: str, size: ImageSize, grid: GridShape) -
 def require_dense_field(budget: Budget, name: str, size: ImageSize, sparse: GridShape) -> None:
     """Raise InputError where views cannot be made between those of a sparse grid, each of this (height, width)."""
     rays = 2 * RAY_BYTES * (math.prod(sparse) + MOST_COMPLETING)
-    each = STORED_HDR_BYTES * math.prod(sparse) + rays + THREADS * (READING_BYTES + WORKING_BYTES)
+    each = STORED_HDR_BYTES * math.prod(sparse) + rays + THREADS * (READING_BYTES + VIEW_BYTES)
     what = f"making views between {sparse.columns} x {sparse.rows} of {name} ({size})"
     budget.require(WRITER_BYTES + math.prod(size) * each, what, "raise --memory, or take fewer or smaller views")
 

@@ -234,4 +234,5 @@ def test_a_draft_takes_about_what_the_plan_says():
     with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
         draft = StoredViews(synthesis, rays, GridShape(5, 5), False, tiling.never).draft(ViewOffset(1.0, 1.0))
     undecided = sum(len(part.pixel) for part in draft.undecided)
-    assert draft.nbytes == pytest.approx(60 * 80 * DRAFT_BYTES + undecided * UNDECIDED_BYTES, rel=0.1)
+    counted = 60 * 80 * DRAFT_BYTES + undecided * UNDECIDED_BYTES
+    assert 0.8 * counted < draft.nbytes <= counted
