@@ -1,7 +1,7 @@
 """What making a scene's views will cost, before any is made: time and memory in each quality.
 
-Cost follows what the scene needs: how many views, how much of them shows no smooth surface, how many of their rays are
-ambiguous. The constants were measured; `python -m benchmarks.prediction` fits them anew.
+Time is three measured rates, each times what there is of it: pixels of all views, those of them where surfaces part,
+rays that the transformer is asked for. `python -m benchmarks.prediction` fits the rates anew.
 """
 
 from __future__ import annotations
@@ -24,36 +24,28 @@ from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffse
 CORES = THREADS
 STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
-GAP_PX = 1.0
-"""A depth edge disoccludes something if it opens a gap wider than this in the outermost view."""
 SMOOTH_PX = 0.4
 """A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
 OPEN_SHARE = 0.28
 """Of the rays where surfaces meet, so many are left open by the closed form."""
 REMADE = 0.6
 """What an outer view takes once more, of the closed form's time, where the transformer is asked."""
-SOFT_GROWTH = 1.1
-"""The power of the parallax by which rays near soft edges become ambiguous."""
 MOST_PARALLAX_PX = 1e6
 
 
 class Workload(NamedTuple):
-    """What there is to do, in pixels and rays of all views together.
+    """What there is to do for all views together.
 
-    source_pixels: made rays of, in all images of the ray set. view_pixels: each gets candidates, weights, a colour.
-    rough_pixels: those of them where no smooth surface shows, so that rays are splatted. ambiguous_rays, soft_rays:
-    that the transformer is asked for; where surfaces meet, and near soft edges.
+    pixels: of views. rough_pixels: those of them where no smooth surface shows. rays: the transformer is asked for.
     """
 
-    source_pixels: float
-    view_pixels: float
+    pixels: float
     rough_pixels: float
-    ambiguous_rays: float
-    soft_rays: float
+    rays: float
 
 
-NANOSECONDS = Workload(53.0, 60.0, 446.0, 1747.0, 1923.0)
-"""What each piece of work takes one core."""
+NANOSECONDS = Workload(45.0, 600.0, 1200.0)
+"""What each takes one core."""
 
 
 class CostEstimate(NamedTuple):
@@ -95,29 +87,25 @@ class ParallaxStatistics:
 
     @property
     def edge_share(self) -> float:
-        """Share of the pixels near an edge that opens a gap in the outermost view."""
-        return float((self.step > GAP_PX).mean())
+        """Share of the pixels near an edge where surfaces meet in the outermost view."""
+        return self._share_beyond(AMBIGUOUS_PX, 1.0)
 
     @property
     def has_disocclusion(self) -> bool:
         """Whether any view shows what the photo hides, at depth edges or beyond the frame."""
-        return self.most_px > STILL_PX or bool((self.step > GAP_PX).any())
-
-    def meeting_share(self, parallax: float) -> float:
-        """Share of the pixels where surfaces meet in a view with this share of the outermost one's parallax."""
-        return float((self.step * np.float32(parallax) > AMBIGUOUS_PX).mean())
+        return self.most_px > STILL_PX
 
     def rough_share(self, parallax: float) -> float:
-        """Share of the pixels where no smooth surface shows in such a view."""
-        return float((self.step * np.float32(parallax) > SMOOTH_PX).mean())
-
-    def soft_share(self, parallax: float) -> float:
-        """Share of the rays that soft edges make ambiguous there."""
-        return float(self.soft.mean() * parallax**SOFT_GROWTH)
+        """Share of the pixels where no smooth surface shows, with so much of the outermost view's parallax."""
+        return self._share_beyond(SMOOTH_PX, parallax)
 
     def ambiguous_share(self, parallax: float) -> float:
-        """Share of the rays that are ambiguous there."""
-        return min(OPEN_SHARE * self.meeting_share(parallax) + self.soft_share(parallax), 1.0)
+        """Share of the rays that are ambiguous there: where surfaces meet, and near soft edges."""
+        soft = float(self.soft.mean() * parallax)
+        return min(OPEN_SHARE * self._share_beyond(AMBIGUOUS_PX, parallax) + soft, 1.0)
+
+    def _share_beyond(self, least_px: float, parallax: float) -> float:
+        return float((self.step * np.float32(parallax) > least_px).mean())
 
 
 def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatistics:
@@ -168,15 +156,12 @@ def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstim
 def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> Workload:
     """What there is to do for all views of a grid in one quality."""
     pixels, views = statistics.step.size, grid.rows * grid.columns - 1
+    outer, asks = _inpainted_views(statistics, grid), quality != "fast"
     # The outer views complete the ray set in closed form; for the transformer, most but their colours is made again.
-    twice = REMADE * _inpainted_views(statistics, grid) if quality != "fast" else 0
-    rough = pixels * (_sum_over_views(statistics.rough_share, grid) + twice * statistics.rough_share(1.0))
-    sources = math.prod(statistics.canvas) * (2 + _inpainted_views(statistics, grid)) if views else 0
-    asked, soft = 0.0, 0.0
-    if quality != "fast":
-        asked = pixels * _sum_over_views(statistics.ambiguous_share, grid)
-        soft = min(pixels * _sum_over_views(statistics.soft_share, grid), asked)
-    return Workload(sources, pixels * (views + twice), rough, asked - soft, soft)
+    again = REMADE * outer if asks else 0.0
+    rough = _sum_over_views(statistics.rough_share, grid) + again * statistics.rough_share(1.0)
+    rays = _sum_over_views(statistics.ambiguous_share, grid) if asks else 0.0
+    return Workload(pixels * (views + again), pixels * rough, pixels * rays)
 
 
 def _sum_over_views(share: Callable[[float], float], grid: GridShape) -> float:

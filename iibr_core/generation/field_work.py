@@ -9,7 +9,7 @@ from iibr_core.generation.cost_model import REMADE, CostEstimates
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import Quality
 
-OUTER_WORK = 1.25 + 0.4 * THREADS
+OUTER_WORK = 1 + THREADS / 2
 """An outer view: all threads make it, and one alone inpaints it."""
 OUTER_BY_MODEL = 100.0
 """The same where a diffusion model inpaints it."""
