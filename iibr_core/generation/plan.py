@@ -33,13 +33,13 @@ from iibr_core.generation.memory_model import (
     whole_bytes,
 )
 from iibr_core.generation.outer_views import outer_views_of_grid
-from iibr_core.generation.relief import Relief, measure_relief
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS
+from iibr_core.generation.plan_reasons import edge_reasons, grid_reason, quality_reason, wild_reasons
+from iibr_core.generation.relief import measure_relief
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import (
     DEFAULT_QUALITY,
     TOTAL_PARALLAX,
     Disparity,
-    FloatImage,
     GridShape,
     InputError,
     Photo,
@@ -146,14 +146,14 @@ def plan_for_viewing(
         most_moved = 0.5 * parallax_px / relief.range if parallax_px else 0.0
         statistics = measure_parallax(disparity.values - np.float32(zero), most_moved)
         grid = _grid_for(parallax_px, statistics, photo, budget, wanted.quality or DEFAULT_QUALITY)
-        reasons.append(_grid_reason(grid, parallax_px))
+        reasons.append(grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
     scale = parallax_px / steps / relief.range * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
     if parallax_px:
         reasons.append(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
-    reasons += _wild_reasons(given, relief)
+    reasons += wild_reasons(given, relief)
     plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, wanted.inpaint, budget)
     _require_room(plan, photo, budget, keeps_views)
     return replace(plan, given_range=(relief.low, relief.high))
@@ -222,13 +222,6 @@ def _grid_for(
     return GridShape(side, side)
 
 
-def _grid_reason(grid: GridShape, parallax_px: float) -> str:
-    if grid == (1, 1):
-        return "One view: the disparity is the same everywhere, so every viewpoint shows the photo."
-    step = parallax_px / (grid.columns - 1)
-    return f"{grid.columns} x {grid.rows} views: neighbours differ by {step:.1f} px, the renderer fills in between."
-
-
 def _complete_plan(
     photo: Photo,
     disparity: Disparity,
@@ -267,8 +260,8 @@ def _complete_plan(
         peak_bytes,
         (
             *reasons,
-            *_edge_reasons(statistics, inpaint, len(outer_views_of_grid(grid))),
-            _quality_reason(costs, quality, wanted is not None),
+            *edge_reasons(statistics, inpaint, len(outer_views_of_grid(grid))),
+            quality_reason(costs, quality, wanted is not None),
             f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(peak_bytes + draft_bytes)} to make them,"
             f" {mebibytes(in_all)} in all.",
         ),
@@ -283,36 +276,3 @@ def _choose_quality(costs: CostEstimates) -> Quality:
     longer_s = CORES * (costs.balanced.seconds - costs.fast.seconds)
     is_dear = longer_s > max(MOST_LONGER_S, MOST_LONGER * CORES * costs.fast.seconds)
     return "fast" if is_dear or longer_s <= 0 else "balanced"
-
-
-def _wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
-    """A sentence where the map holds what lies far beyond its relief."""
-    far, near = relief.low - relief.range / 2, relief.high + relief.range / 2
-    count = int(np.count_nonzero((given < far) | (given > near))) if relief.range > 0 else 0
-    if not count:
-        return []
-    return [f"{count} pixels lie far beyond that range, as mistakes do: they count as the nearest or the farthest."]
-
-
-def _edge_reasons(statistics: ParallaxStatistics, inpaint: str, outer_views: int) -> list[str]:
-    near_edges = f"{statistics.edge_share:.1%} of the pixels lie near a depth edge; "
-    if not statistics.has_disocclusion:
-        return [near_edges + "nothing is disoccluded, so nothing is inpainted."]
-    name = inpaint.partition(":")[0]
-    why = "nearest to true views, though smooth" if inpaint == DEFAULT_INPAINTER else "as asked"
-    reasons = [f"{near_edges}holes behind them are inpainted by {name}: {why}."]
-    if inpaint not in INPAINTERS:
-        reasons.append(f"The model paints up to {outer_views} views, each in seconds on a GPU, in minutes without one.")
-    return reasons
-
-
-def _quality_reason(costs: CostEstimates, quality: Quality, is_asked: bool) -> str:
-    fast, balanced = costs.fast.seconds, costs.balanced.seconds
-    why = ": no ray is ambiguous."
-    if is_asked:
-        why = ", as asked."
-    elif quality == "balanced":
-        why = ": the transformer decides the rays that are ambiguous."
-    elif balanced > fast:
-        why = f": asking the transformer would take {balanced / fast:.1f} times as long and hardly show."
-    return f"{quality.capitalize()} quality{why}"
