@@ -15,7 +15,17 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from iibr_core.formats.files import entries_of, is_folder, reason_of, status_of
+from iibr_core.formats.files import entries_of, is_folder, status_of
+from iibr_core.formats.places import (
+    is_within,
+    places_of,
+    reads_file,
+    real_place,
+    require_folder_for,
+    require_no_dangling_link,
+    require_outside,
+    require_writable,
+)
 from iibr_core.formats.unfinished import (
     CLAIMS,
     NEW,
@@ -28,14 +38,8 @@ from iibr_core.formats.unfinished import (
 )
 from iibr_core.types import InputError
 
-MOST_NAME_BYTES = 255
-MOST_PATH_BYTES = 4000
-"""Of the 4096 that Linux takes: a temporary name needs some."""
-MOST_LINKS = 40
 TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
 """What a folder's place says where something is there."""
-FOLDER_LEVELS = 3
-"""How deep the pictures of data sets lie below the folder that is named: scene, subfolder, picture."""
 
 
 class AlreadyThereError(InputError):
@@ -48,8 +52,8 @@ def require_file_place(path: Path, inputs: Iterable[Path] = (), may_replace: boo
 
     inputs: files and folders that are read.
     """
-    real = _real_place(path)
-    _require_folder_for(path, real)
+    real = real_place(path)
+    require_folder_for(path, real)
     remove_leftovers(real.parent)
     status = status_of(real)
     if status is not None and stat.S_ISDIR(status.st_mode):
@@ -57,8 +61,8 @@ def require_file_place(path: Path, inputs: Iterable[Path] = (), may_replace: boo
     if status is not None and not stat.S_ISREG(status.st_mode):
         raise InputError(f"{path}: is a device or a pipe; give the name of a file")
     for read in inputs:
-        _require_outside(path, real, read)
-        if status is not None and _reads(read, status):
+        require_outside(path, real, read)
+        if status is not None and reads_file(read, status):
             raise InputError(f"{path}: is read here ({read}), and no input is overwritten; choose another name")
     if status is not None and not may_replace:
         raise AlreadyThereError(f"{path}: is there already; give --force to replace it, or choose another name")
@@ -73,13 +77,13 @@ def require_folder_place(
 
     inputs: files and folders that are read. is_whole: whether all of it is replaced, not files in it.
     """
-    real = _real_place(folder)
+    real = real_place(folder)
     remove_leftovers(real.parent if is_whole else real)
     _require_possible_folder(folder, real, is_whole)
     status = status_of(real)
     for read in inputs:
-        _require_outside(folder, real, read)
-        if status is not None and any(_is_within(place.parent, status) for place in _places_of(read)):
+        require_outside(folder, real, read)
+        if status is not None and any(is_within(place.parent, status) for place in places_of(read)):
             raise InputError(f"{folder}: holds {read}, which is read, and no input is overwritten; choose another")
     if status is not None and is_whole and os.path.ismount(real):
         raise InputError(f"{folder}: a disk is mounted there; name a folder in it")
@@ -91,7 +95,7 @@ def require_folder_place(
 
 def _require_possible_folder(folder: Path, real: Path, is_whole: bool) -> None:
     """Raise InputError where no folder is and none can be made, or may not be written to."""
-    _require_no_dangling_link(folder, real)
+    require_no_dangling_link(folder, real)
     status = status_of(real)
     if status is not None and not stat.S_ISDIR(status.st_mode):
         raise InputError(f"{folder}: is a file, not a folder; choose another name")
@@ -99,7 +103,7 @@ def _require_possible_folder(folder: Path, real: Path, is_whole: bool) -> None:
     there = next(place for place in (above, *above.parents) if os.path.lexists(place))
     if not is_folder(there):
         raise InputError(f"{folder}: {there} is a file, not a folder; choose another place")
-    _require_writable(folder, there)
+    require_writable(folder, there)
 
 
 def require_own_folder(folder: Path, own_files: str) -> None:
@@ -127,18 +131,7 @@ def require_files_in(
         if is_folder(folder):
             require_file_place(folder / name, inputs, may_replace)
         else:
-            _claim_place(_real_place(folder / name), may_replace)
-
-
-def require_no_link(path: Path, folder: Path) -> None:
-    """Raise InputError where `path`, or a folder on the way to it below `folder`, is a link: what it leads to is not
-    what was named.
-    """
-    for place in (path, *path.parents):
-        if place == folder:
-            return
-        if os.path.islink(place):
-            raise InputError(f"{place}: is a link, and nothing is written through it; remove it")
+            _claim_place(real_place(folder / name), may_replace)
 
 
 def open_to_append(path: Path) -> int:
@@ -172,7 +165,7 @@ def _require_single_file(path: Path, status: os.stat_result | None) -> None:
 def make_folder(folder: Path) -> None:
     """Make a folder, and those above it, where there is none; links are followed. Raises InputError."""
     try:
-        _real_place(folder).mkdir(parents=True, exist_ok=True)
+        real_place(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be created ({error.strerror or error}); choose another place") from error
 
@@ -184,8 +177,8 @@ def atomic_write(path: Path) -> Iterator[Path]:
     The temporary file is there, empty, with the extension of `path`. Raises InputError where the folder is missing, is
     no folder, or may not be written to.
     """
-    real = _real_place(path)
-    _require_folder_for(path, real)
+    real = real_place(path)
+    require_folder_for(path, real)
     if not any(map(TEMPORARY_NAME.fullmatch, real.parts)):  # else once for every view of a light field
         remove_leftovers(real.parent)
     suffix = real.suffix if TEMPORARY_NAME.fullmatch(f".iibr-{'0' * 16}{real.suffix}") else ""
@@ -214,7 +207,7 @@ class UnfinishedFolder:
     def __init__(self, folder: Path) -> None:
         """Raises InputError where it cannot be made."""
         self.folder = folder
-        self._real = _real_place(folder)
+        self._real = real_place(folder)
         _require_possible_folder(folder, self._real, is_whole=True)
         self._made_parents = [parent for parent in self._real.parents if not os.path.lexists(parent)]
         self._around: Path | None = None
@@ -270,7 +263,7 @@ class UnfinishedFolder:
 def release_place(path: Path) -> None:
     """Nothing will be written there after all: others may. Nothing happens where it was written."""
     with suppress(InputError):
-        CLAIMS.release(_real_place(path))
+        CLAIMS.release(real_place(path))
 
 
 def _claim_place(real: Path, may_replace: bool) -> None:
@@ -298,87 +291,3 @@ def _put_file(temporary: Path, real: Path) -> None:
 
 def _taken(path: Path) -> str:
     return f"{path}: another program has written it meanwhile, and it is kept; choose another name"
-
-
-def _real_place(path: Path) -> Path:
-    """Where `path` leads, links followed. Raises InputError where nothing can be of that name, or nobody may look."""
-    try:
-        longest = max((len(os.fsencode(part)) for part in path.parts), default=0)
-        real = Path(os.path.realpath(path))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: is no place to write to ({reason_of(error)}); choose another") from error
-    if longest > MOST_NAME_BYTES:
-        raise InputError(f"{path}: a name has {longest} bytes, {MOST_NAME_BYTES} at most are possible; shorten it")
-    if len(os.fsencode(real)) > MOST_PATH_BYTES:
-        raise InputError(f"{path}: the path is longer than {MOST_PATH_BYTES} bytes; choose another place")
-    status_of(real)
-    if os.path.islink(real):
-        raise InputError(f"{path}: its links lead in a circle; choose another name")
-    return real
-
-
-def _require_folder_for(path: Path, real: Path) -> None:
-    folder = path.parent if real.parent == Path(os.path.realpath(path.parent)) else real.parent
-    if not is_folder(real.parent):
-        raise InputError(f"{path}: the folder {folder} does not exist; create it or choose another")
-    _require_writable(path, real.parent)
-
-
-def _require_writable(path: Path, folder: Path) -> None:
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: the folder {folder} may not be written to; choose another place")
-
-
-def _require_no_dangling_link(folder: Path, real: Path) -> None:
-    """A disk that is not there now must not be replaced by a folder of its name."""
-    for place in (folder, *folder.parents):
-        if os.path.islink(place) and status_of(place) is None and not (place == folder and is_folder(real.parent)):
-            raise InputError(f"{folder}: {place} is a link to what is not there; choose another place")
-
-
-def _require_outside(path: Path, real: Path, read: Path) -> None:
-    """Raise InputError where an input is a folder, and `path` it or in it."""
-    status = status_of(read)
-    if status is not None and stat.S_ISDIR(status.st_mode) and _is_within(real, status):
-        raise InputError(f"{path}: lies in {read}, which is read, and nothing is written there; choose another place")
-
-
-def _is_within(path: Path, folder: os.stat_result) -> bool:
-    """Whether a place, which need not be there, is this folder or lies in it."""
-    found = (status_of(place) for place in (path, *path.parents))
-    return any(status is not None and os.path.samestat(status, folder) for status in found)
-
-
-def _places_of(read: Path) -> Iterator[Path]:
-    """Where an input lies: under the name given, under those that its links lead by, and at their end."""
-    for _ in range(MOST_LINKS):
-        read = Path(os.path.realpath(read.parent), read.name)
-        yield read
-        if not os.path.islink(read):
-            break
-        read = read.parent / os.readlink(read)
-    yield Path(os.path.realpath(read))
-
-
-def _reads(read: Path, target: os.stat_result) -> bool:
-    """Whether an input is this file or, being a folder, holds it, under whatever name."""
-    status = status_of(read)
-    if status is None:
-        return False
-    if stat.S_ISDIR(status.st_mode):
-        return _folder_reads(read, target, FOLDER_LEVELS)
-    return os.path.samestat(status, target)
-
-
-def _folder_reads(folder: Path, target: os.stat_result, levels: int) -> bool:
-    with suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            with suppress(OSError):  # a link to nothing
-                if entry.is_dir():
-                    if levels > 1 and _folder_reads(Path(entry.path), target, levels - 1):
-                        return True
-                elif (entry.is_symlink() or entry.inode() == target.st_ino) and os.path.samestat(
-                    os.stat(entry.path), target
-                ):
-                    return True
-    return False

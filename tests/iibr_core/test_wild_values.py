@@ -602,7 +602,9 @@ READS_OR_TELLS = {
     "formats.files": "reason_of shown_name printable status_of is_file is_folder ordinary_file file_within "
     "stays_within entries_of require_file open_binary read_text refuse_bomb",
     "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
-    "atomic_write UnfinishedFolder release_place require_own_folder require_no_link open_to_append",
+    "atomic_write UnfinishedFolder release_place require_own_folder open_to_append",
+    "formats.places": "real_place require_folder_for require_writable require_no_dangling_link require_no_link "
+    "require_outside is_within places_of reads_file",
     "formats.unfinished": "Claims remove_leftovers remove_around make_temporary lock_of unlock",
     "formats.poses": "read_poses read_llff_poses",
     "formats.light_fields.numbered_grid": "read_numbered_grid NumberedGridWriter",

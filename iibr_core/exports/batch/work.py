@@ -40,7 +40,8 @@ def _export(task: PhotoTask, open_drawn: OpenDrawn | None) -> Path:
     """Raises InputError."""
     from iibr_core.exports.opening import open_for_export
     from iibr_core.exports.registry import export_path, require_export_place, writer_of
-    from iibr_core.formats.outputs import AlreadyThereError, make_folder, release_place, require_no_link
+    from iibr_core.formats.outputs import AlreadyThereError, make_folder, release_place
+    from iibr_core.formats.places import require_no_link
     from iibr_core.scenes.inputs import inputs_of
     from iibr_core.scenes.lens_limits import LensChoice
 
