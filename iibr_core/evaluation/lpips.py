@@ -16,9 +16,11 @@ from torch.nn import functional
 from iibr_core.formats.files import is_file, is_folder
 from iibr_core.types import FloatImage, InputError
 
-LAYERS = ((0, 64, 4, 2), (3, 192, 1, 2), (6, 384, 1, 1), (8, 256, 1, 1), (10, 256, 1, 1))
-"""Of AlexNet: number in torchvision's file, channels, stride, padding; a pooling before the second and the third."""
+LAYERS = (0, 3, 6, 8, 10)
+"""Numbers of AlexNet's convolutions in torchvision's file; a pooling before the second and the third."""
 POOLED = (3, 6)
+FIRST_STRIDE, MOST_PADDING = 4, 2
+"""The others go a pixel at a time; padding keeps the size, but for the first."""
 SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
 LEAST_PX = 64
 FILES = "torchvision's alexnet-owt-*.pth and LPIPS's alex.pth"
@@ -33,14 +35,15 @@ class Lpips:
             raise InputError(f"{folder}: is no folder; --lpips wants one with {FILES}")
         backbone = next(iter(sorted(folder.glob("alexnet*.pth"))), folder / "alexnet-owt-7be5be79.pth")
         kinds = ("weight", "bias")
-        names = [f"features.{number}.{kind}" for number, *_ in LAYERS for kind in kinds]
+        names = [f"features.{number}.{kind}" for number in LAYERS for kind in kinds]
         stored = _tensors(backbone, names)
         self._convolutions = [(stored[2 * k], stored[2 * k + 1]) for k in range(len(LAYERS))]
         self._shares = _tensors(folder / "alex.pth", [f"lin{k}.model.1.weight" for k in range(len(LAYERS))])
-        for path, tensors in ((backbone, stored[::2]), (folder / "alex.pth", self._shares)):
-            found = [tensor.shape[0 if path == backbone else 1] for tensor in tensors if tensor.ndim == 4]
-            if found != [channels for _, channels, _, _ in LAYERS]:
-                raise InputError(f"{path}: is another network; --lpips wants a folder with {FILES}")
+        weights = stored[::2]
+        fits = all(tensor.ndim == 4 for tensor in (*weights, *self._shares))
+        if not fits or [weight.shape[0] for weight in weights] != [share.shape[1] for share in self._shares]:
+            both = f"{backbone.name} and alex.pth"
+            raise InputError(f"{folder}: {both} belong to different networks; --lpips wants a folder with {FILES}")
 
     def __call__(self, image: FloatImage, truth: FloatImage) -> float:
         """Of (H, W, 3), sRGB-encoded in 0..1; NaN where they are too small for the network (below LEAST_PX)."""
@@ -55,9 +58,10 @@ class Lpips:
         shift, scale = (torch.tensor(values).view(1, 3, 1, 1) for values in (SHIFT, SCALE))
         x = (torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None] * 2 - 1 - shift) / scale
         found = []
-        for (number, _, stride, padding), (weight, bias) in zip(LAYERS, self._convolutions):
+        for number, (weight, bias) in zip(LAYERS, self._convolutions):
             if number in POOLED:
                 x = functional.max_pool2d(x, 3, 2)
+            stride, padding = FIRST_STRIDE if number == 0 else 1, min(weight.shape[-1] // 2, MOST_PADDING)
             x = functional.relu(functional.conv2d(x, weight, bias, stride, padding))
             found.append(x / (x.square().sum(dim=1, keepdim=True).sqrt() + 1e-10))
         return found
