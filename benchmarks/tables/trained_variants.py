@@ -42,7 +42,7 @@ COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
 def with_raw_coordinates(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
     """Behind the features, the paper's: Pluecker coordinates of target and source ray, and disparity; in widths."""
     height, width = rays.view_size
-    offsets = rays.arrays[0][np.where(ambiguous.mask, ambiguous.source % PLAIN, 0)]
+    offsets = rays.arrays.offsets[np.where(ambiguous.mask, ambiguous.source % PLAIN, 0)]
     d = np.where(ambiguous.mask, ambiguous.disparity, 0)
     moved = np.array(ambiguous.offset) - offsets
     y, x = (ambiguous.pixel[:, i, None] - margin for i, margin in enumerate((rays.margins.top, rays.margins.left)))

@@ -106,7 +106,7 @@ def _generate_views(
             outer_offsets.add(offset)
             if transformer is not None:
                 # What joined the set is kept there.
-                before = view.colors if len(rays) == images else rays.in_view(rays.arrays[1][images])
+                before = view.colors if len(rays) == images else rays.in_view(rays.arrays.colors[images])
                 unfinished[offset] = partial(views.make, offset, ShownBefore(before, images))
             images, share = len(rays), work.add(work.outer)
             if transformer is None or draft_bytes is not None:

@@ -8,8 +8,8 @@ candidates are K surfaces, and K = 5 is plenty.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,18 +39,17 @@ COVERED = 0.999
 """A surface that covers this much of a pixel hides what lies behind it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(NamedTuple):
     """The candidates of the target rays in rows [first_row, first_row + N) of one view.
 
-    count: (N, W), how many of the K slots are used. coverage: (K, N, W), the area of the target pixel their
+    number: (N, W), how many of the K slots are used. coverage: (K, N, W), the area of the target pixel their
     footprints cover (may exceed 1). disparity: (K, N, W), coverage-weighted mean. source: (K, N, W), index into the
-    ray set. Slots beyond count are undefined. smooth: cells that one smooth surface fills (`find_coherent_cells`).
+    ray set. Slots beyond number are undefined. smooth: cells that one smooth surface fills (`find_coherent_cells`).
     """
 
     offset: ViewOffset
     first_row: int
-    count: NDArray[np.uint8]
+    number: NDArray[np.uint8]
     coverage: FloatImage
     disparity: FloatImage
     source: NDArray[np.uint8]
@@ -63,6 +62,7 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     At most `most` for each ray, the front-most kept.
     """
     first_row, last_row = rows
+    offset = ViewOffset(*map(float, offset))  # kernels are compiled for one kind of offset
     # Where one smooth surface shows, its rays are found backwards, cell by cell; elsewhere source rays are splatted.
     smooth, about = find_coherent_cells(rays, offset, rows)
     shape = (most, last_row - first_row, rays.size.width)
@@ -75,20 +75,12 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
         np.empty(shape, np.uint8),
         smooth,
     )
-    offsets, _, disparity, coverage, _ = rays.arrays
-    cells = rays.cells
-    for k in range(len(rays)):
-        t, s = offset.t - offsets[k, 0], offset.s - offsets[k, 1]
+    arrays, cells = rays.arrays, rays.cells
+    for k, (t, s) in enumerate(rays.to_view(offset)):
         needed = land_incoherent(cells, k, t, s, rows, smooth)
-        _land_rays(
-            disparity[k], coverage[k], rays.joined, rays.steep_cells(k), needed, needed.any(axis=1), k, s, t, first_row,
-            found.count, found.coverage, found.disparity, found.source,
-        )  # fmt: skip
-    _mean_disparity(found.count, found.coverage, found.disparity)
-    backward_warp(
-        disparity[0], *offset, first_row, smooth, about,
-        found.count, found.coverage, found.disparity, found.source,
-    )  # fmt: skip
+        _land_rays(arrays, k, rays.joined, rays.steep_cells(k), needed, needed.any(axis=1), s, t, found)
+    _mean_disparity(found)
+    backward_warp(arrays.disparity[0], offset, about, found)
     return found
 
 
@@ -128,16 +120,15 @@ def _rearmost(coverage, disparity, row, column):
 
 
 @kernel
-def _land_rays(
-    ray_disparity, ray_coverage, joined, steep, needed, needed_rows, index, s, t, first_row,
-    count, coverage, disparity, source,
-):  # fmt: skip
-    """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, `disparity`
-    holds sums weighted by coverage.
+def _land_rays(rays, index, joined, steep, needed, needed_rows, s, t, found):
+    """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, found's
+    disparity holds sums weighted by coverage.
 
     A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives
     way.
     """
+    ray_disparity, ray_coverage, first_row = rays.disparity[index], rays.coverage[index], found.first_row
+    count, coverage, disparity, source = found.number, found.coverage, found.disparity, found.source
     slots, rows, width = coverage.shape
     height = len(ray_disparity)
     # The same as a difference of disparities.
@@ -223,8 +214,9 @@ def _land_rays(
 
 
 @kernel
-def _mean_disparity(count, coverage, disparity):
+def _mean_disparity(found):
     """Turn the weighted sums of disparity into means."""
+    count, coverage, disparity = found.number, found.coverage, found.disparity
     rows, width = count.shape
     for row in range(rows):
         for x in range(width):

@@ -40,19 +40,7 @@ def find_coherent_cells(
     smooth = np.ones(shape, np.bool_)
     parallax = max(*map(abs, offset), 1e-9)
     incoherent = ~(cells.step <= rays.smooth_step(offset))
-    _land_cells(
-        cells.low,
-        cells.high,
-        cells.row_ranges,
-        incoherent,
-        np.array(offset) - rays.arrays[0],
-        first,
-        rays.photo_images,
-        parallax,
-        far,
-        near,
-        smooth,
-    )
+    _land_cells(cells, incoherent, rays.to_view(offset), first, rays.photo_images, parallax, far, near, smooth)
     # Something lands, and its parts stay together.
     smooth &= (near >= far) & ((near - far) * parallax <= ONE_SURFACE_PX)
     return smooth, np.where(smooth, far, np.float32(0.0))
@@ -63,7 +51,7 @@ def land_incoherent(
 ) -> NDArray[np.bool_]:
     """Which cells (M, N) of source k, t and s away, land on any cell of these rows that is not smooth."""
     needed = np.zeros(cells.step.shape, np.bool_)
-    _land_incoherent(cells.low[k], cells.high[k], cells.row_ranges[k], t, s, rows[0] // CELL_PX, smooth, needed)
+    _land_incoherent(cells, k, t, s, rows[0] // CELL_PX, smooth, needed)
     return needed
 
 
@@ -76,7 +64,7 @@ def land_marked(
     """
     first = rows[0] // CELL_PX
     landed = np.zeros((-(-rows[1] // CELL_PX) - first, marked.shape[2]), np.bool_)
-    _land_marked(cells.low, cells.high, offsets, marked, first, around_px, landed)
+    _land_marked(cells, offsets, marked, first, around_px, landed)
     return landed
 
 
@@ -96,8 +84,9 @@ def _touches(least, most, t, row, rows):
 
 
 @kernel
-def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, photo_images, parallax, far, near, smooth):
+def _land_cells(cells, incoherent, offsets, first_cell, photo_images, parallax, far, near, smooth):
     """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
+    low, high, row_ranges = cells.low, cells.high, cells.row_ranges
     rows, columns = smooth.shape
     # The photo comes first: inpainted rays are compared with what it shows.
     for k in range(len(offsets)):
@@ -124,7 +113,8 @@ def _land_cells(low, high, row_ranges, incoherent, offsets, first_cell, photo_im
 
 
 @kernel
-def _land_incoherent(low, high, row_ranges, t, s, first_cell, smooth, needed):
+def _land_incoherent(cells, k, t, s, first_cell, smooth, needed):
+    low, high, row_ranges = cells.low[k], cells.high[k], cells.row_ranges[k]
     rows, columns = smooth.shape
     for v in range(low.shape[0]):
         if not _touches(row_ranges[v, 0], row_ranges[v, 1], t, v - first_cell, rows):
@@ -142,7 +132,8 @@ def _land_incoherent(low, high, row_ranges, t, s, first_cell, smooth, needed):
 
 
 @kernel
-def _land_marked(low, high, offsets, marked, first_cell, around_px, landed):
+def _land_marked(cells, offsets, marked, first_cell, around_px, landed):
+    low, high = cells.low, cells.high
     rows, columns = landed.shape
     around = around_px / CELL_PX
     for k in range(len(marked)):
@@ -162,13 +153,13 @@ def _land_marked(low, high, offsets, marked, first_cell, around_px, landed):
 
 
 @kernel
-def backward_warp(
-    surface, t, s, first_row, smooth, about, count, coverage, disparity, source
-):  # fmt: skip
+def backward_warp(surface, offset, about, found):
     """Give every ray of the smooth cells one candidate that covers it: the photo's ray, of disparity (H, W) `surface`.
 
     Its disparity d is the fixed point of d = surface(x + d s, y + d t), bilinear.
     """
+    (t, s), first_row, smooth = offset, found.first_row, found.smooth
+    count, coverage, disparity, source = found.number, found.coverage, found.disparity, found.source
     rows, width = count.shape
     # The bilinear taps of the last position, too, lie inside.
     last_u, last_v = surface.shape[1] - 1.001, surface.shape[0] - 1.001

@@ -5,7 +5,7 @@ Made once for a ray set; views look it up. Soft edges tell an estimated or enlar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,7 @@ EDGE_PARALLAX_PX = 2.0
 """Least parallax, in the outermost view, of the edges whose softness is measured."""
 
 
-@dataclass(frozen=True, eq=False)
-class DisparityStatistics:
+class DisparityStatistics(NamedTuple):
     """Of S source images. low, high (S, H, W): least and greatest disparity within AROUND_PX of each ray. step
     (S, H, W): the largest step between neighbours within STEP_AROUND_PX; all px per view step, 0 where nothing is.
     softness: 0..1, of the photo's depth edges: 0 where each is one step, near 1 where they are slopes. soft (H, W):

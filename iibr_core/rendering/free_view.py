@@ -78,7 +78,7 @@ def render_free_view(
     view = RenderedView(
         np.zeros((*size, 3), np.float32), np.zeros(size, np.float32), np.zeros(size, np.bool_), np.zeros(size, np.bool_)
     )
-    matrices = [target_from_rays @ _photo_from_source(offset) for offset in rays.arrays[0]]
+    matrices = [target_from_rays @ _photo_from_source(offset) for offset in rays.arrays.offsets]
     drawing = [tuple(map(float, matrix.ravel())) for matrix in matrices]
     looking_up = np.stack([np.linalg.inv(matrix).ravel() for matrix in matrices])
     landing = [_landing(rays, k, matrix, should_stop) for k, matrix in enumerate(drawing)]
@@ -86,10 +86,9 @@ def render_free_view(
 
     def band(first: int, last: int) -> None:
         nearest, source = _draw(rays, drawing, landing, surface, sealed_step, (first, last), size.width)
-        _, images, surfaces, _, edge_level = rays.arrays
         _resolve(
-            images, surfaces, edge_level, rays.photo_images, looking_up, frame, rays.farthest_views,
-            first, nearest, source, view.colors, view.disparity, view.occluded, view.inpainted,
+            rays.arrays, looking_up, frame, rays.farthest_views, first, nearest, source,
+            view.colors, view.disparity, view.occluded, view.inpainted,
         )  # fmt: skip
 
     in_bands(band, size, should_stop, most_pixels=MOST_BAND_PIXELS // SAMPLES**2)
@@ -133,16 +132,12 @@ def _draw(
     first, last = rows
     shape = SAMPLES * (last - first), SAMPLES * width
     nearest, source = np.full(shape, -np.inf, np.float32), np.zeros(shape, np.uint8)
-    _, _, disparity, coverage, _ = rays.arrays
     apart = np.zeros_like(rays.joined)
     for k, matrix in enumerate(matrices):
         joined = rays.joined if k == 0 else apart
         # What the photo shows goes before what was made up beside it.
         ahead = surface if k >= rays.photo_images else 0.0
-        _draw_rays(
-            disparity[k], coverage[k], joined, landing[k], matrix, k, rays.photo_images, ahead, sealed_step, first,
-            nearest, source,
-        )  # fmt: skip
+        _draw_rays(rays.arrays, k, joined, landing[k], matrix, ahead, sealed_step, first, nearest, source)
     return nearest, source
 
 
@@ -183,12 +178,11 @@ def _land_cells(low, high, m, first, last, landing):
 
 
 @kernel
-def _draw_rays(
-    disparity, coverage, joined, landing, m, index, photo_images, ahead, sealed_step, first_row, nearest, source
-):  # fmt: skip
+def _draw_rays(rays, index, joined, landing, m, ahead, sealed_step, first_row, nearest, source):
     """Draw the rays of one image; see `_draw`. ahead: so much nearer than the photo's surface it must
     be to hide it.
     """
+    disparity, coverage = rays.disparity[index], rays.coverage[index]
     height, width = disparity.shape
     last_row = first_row + len(nearest) // SAMPLES - 1
     corners, is_drawn = np.empty((width, 4, 3)), np.empty(width, np.bool_)
@@ -201,7 +195,7 @@ def _draw_rays(
             any_drawn = any_drawn or is_drawn[x]
         if any_drawn:
             _land_squares(disparity, joined, m, y, sealed_step, corners, is_drawn)
-            _draw_squares(corners, is_drawn, coverage[y], index, photo_images, ahead, first_row, nearest, source)
+            _draw_squares(corners, is_drawn, coverage[y], index, rays.photo_images, ahead, first_row, nearest, source)
 
 
 @kernel
@@ -284,10 +278,10 @@ def _sample_after(position):
 
 @kernel
 def _resolve(
-    images, surfaces, edge_level, photo_images, inverses, frame, farthest_views,
-    first_row, nearest, seen, colors, disparity, occluded, inpainted,
+    rays, inverses, frame, farthest_views, first_row, nearest, seen, colors, disparity, occluded, inpainted
 ):  # fmt: skip
     """The target rows that the samples are of: colours, disparity, holes, and what the photo shows nothing of."""
+    images, surfaces, edge_level, photo_images = rays.colors, rays.disparity, rays.edge_level, rays.photo_images
     _, height, width = surfaces.shape
     top, bottom, left, right = frame
     is_taken = np.empty(SAMPLES**2, np.bool_)

@@ -58,9 +58,9 @@ def blend_hypotheses(
     Colours are summed in linear light; disparity and source are the heaviest hypothesis's.
     """
     colors = np.zeros((len(weights), 3), np.float32)
-    offsets, images, surfaces, *_ = rays.arrays
+    arrays = rays.arrays
     _blend(
-        images, surfaces, np.array(ambiguous.offset) - offsets, rays.photo_images,
+        arrays.colors, arrays.disparity, rays.to_view(ambiguous.offset), rays.photo_images,
         ambiguous.pixel, ambiguous.disparity, ambiguous.source, weights, colors,
     )  # fmt: skip
     heaviest = weights.argmax(axis=1)[:, None]

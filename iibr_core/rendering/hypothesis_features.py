@@ -8,7 +8,6 @@ from __future__ import annotations
 from math import floor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.rendering.ambiguous_rays import (
     FEATURES,
@@ -26,6 +25,7 @@ from iibr_core.rendering.ambiguous_rays import (
 )
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.resampling import ShownRays
 from iibr_core.rendering.undecided_rays import find_undecided_rays
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage
@@ -37,14 +37,14 @@ def find_ambiguous_rays(
     rays: RaySet,
     candidates: Candidates,
     weights: FloatImage,
-    shown: tuple[FloatImage, NDArray[np.uint8]],
+    shown: ShownRays,
     rows: tuple[int, int],
     every: bool = False,
     hypotheses: int = HYPOTHESES,
 ) -> AmbiguousRays:
     """The ambiguous rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them.
 
-    shown: what `resampling.heaviest_candidate` gives: disparity and source (N, W). every: take all rays near which
+    shown: what `resampling.heaviest_candidate` gives. every: take all rays near which
     anything lands, ambiguous or not. hypotheses: K, at least 2.
     """
     return describe_rays(rays, find_undecided_rays(rays, candidates, weights, shown, rows, every, hypotheses))
@@ -52,7 +52,7 @@ def find_ambiguous_rays(
 
 def describe_rays(rays: RaySet, undecided: UndecidedRays) -> AmbiguousRays:
     """With the features that T decides by."""
-    offsets, _, surfaces, coverage, _ = rays.arrays
+    arrays = rays.arrays
     around = rays.statistics
     mask = np.arange(undecided.hypotheses) < undecided.number[:, None]
     disparity, share, nearest = (np.zeros(mask.shape, np.float32) for _ in range(3))
@@ -65,8 +65,8 @@ def describe_rays(rays: RaySet, undecided: UndecidedRays) -> AmbiguousRays:
     pixel = np.stack(np.divmod(undecided.pixel.astype(np.int64), rays.size.width), axis=1)
     features = np.zeros((*mask.shape, FEATURES), np.float32)
     _describe_hypotheses(
-        surfaces, coverage, around.low, around.high, around.step, around.softness,
-        np.array(undecided.offset) - offsets, rays.photo_images, max(*map(abs, undecided.offset), 1e-9),
+        arrays.disparity, arrays.coverage, around.low, around.high, around.step, around.softness,
+        rays.to_view(undecided.offset), rays.photo_images, max(*map(abs, undecided.offset), 1e-9),
         pixel, undecided.number, undecided.uncovered, disparity, source, share, nearest, features,
     )  # fmt: skip
     return AmbiguousRays(undecided.offset, pixel, mask, disparity, source, features)

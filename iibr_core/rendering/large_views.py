@@ -105,7 +105,7 @@ class LargePhoto:
         rays = rays_of_photo(*self._rays_of_frame(part), farthest_views, len(fills), should_stop)
         for k in fills:
             assert self.fills is not None
-            rays.add(ViewOffset(*self.fills.arrays[0][k]), *_enlarge(self.fills, k, self.size, part), should_stop)
+            rays.add(ViewOffset(*self.fills.arrays.offsets[k]), *_enlarge(self.fills, k, self.size, part), should_stop)
         return rays
 
     @property
@@ -157,9 +157,10 @@ def _fills_in(fills: RaySet, size: ImageSize, part: Part, offsets: Sequence[View
     side of one of these offsets: from the other side other things are disclosed.
     """
     rows, columns = (slice(low, high) for low, high in _under(part, size, fills))
-    inpainted_from, _, _, coverage, _ = fills.arrays
-    alike = (inpainted_from[:, None] * np.array(offsets).reshape(1, -1, 2) > 0).any(axis=(1, 2))
-    return [k for k in range(fills.photo_images, len(fills)) if alike[k] and coverage[k, rows, columns].any()]
+    alike = (fills.arrays.offsets[:, None] * np.array(offsets).reshape(1, -1, 2) > 0).any(axis=(1, 2))
+    return [
+        k for k in range(fills.photo_images, len(fills)) if alike[k] and fills.arrays.coverage[k, rows, columns].any()
+    ]
 
 
 def _under(part: Part, size: ImageSize, fills: RaySet) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -176,14 +177,13 @@ def _enlarge(fills: RaySet, k: int, size: ImageSize, part: Part) -> tuple[FloatI
     """Colours, disparity and coverage of a part of image k as it is at another (height, width) of the photo:
     interpolated between rays of one surface.
     """
-    _, colors, disparity, coverage, _ = fills.arrays
     found = (
         np.zeros((*part.size, 3), np.float32),
         np.full(part.size, NO_RAY, np.float32),
         np.zeros(part.size, np.float32),
     )
     _enlarge_rays(
-        colors[k], disparity[k], coverage[k], fills.margins.top, fills.margins.left,
+        fills.arrays, k, fills.margins.top, fills.margins.left,
         fills.view_size.height / size.height, fills.view_size.width / size.width, part.top, part.left, *found,
     )  # fmt: skip
     return found
@@ -191,12 +191,12 @@ def _enlarge(fills: RaySet, k: int, size: ImageSize, part: Part) -> tuple[FloatI
 
 @kernel
 def _enlarge_rays(
-    colors, disparity, coverage, margin_top, margin_left, step_y, step_x, top, left,
-    large_colors, large_disparity, large_coverage,
+    fills, k, margin_top, margin_left, step_y, step_x, top, left, large_colors, large_disparity, large_coverage
 ):  # fmt: skip
-    """Fill the last three, a part from (top, left) of a larger image, from the first three, which have margins and of
-    which a larger pixel covers step_y x step_x.
+    """Fill the last three, a part from (top, left) of a larger image, from image k of the fills, which has margins and
+    of which a larger pixel covers step_y x step_x.
     """
+    colors, disparity, coverage = fills.colors[k], fills.disparity[k], fills.coverage[k]
     for row in range(large_disparity.shape[0]):
         # Pixel areas are aligned at the borders of the frame, hence the halves.
         y = (top + row + 0.5) * step_y - 0.5 + margin_top

@@ -7,9 +7,8 @@ may be larger than the views made of them: so rays beyond the photo's frame belo
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +32,24 @@ DOUBTED_PX = 2
 """What was made up within so many pixels of that, each way, is no better: its slivers would fly about as crumbs."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
+class RayArrays(NamedTuple):
+    """The rays of S images, as one argument of kernels.
+
+    offsets (S, 2): the view (t, s) each is seen from. colors (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN where
+    there is no surface. coverage (S, H, W): how much of its pixel a ray fills, 0 = no ray. edge_level (S, H, W): the
+    largest step that a 4x4 look-up may meet, in steps between surfaces, rounded up, 0 below one; see `edge_limits`.
+    photo_images: so many, from the first on, hold what the photo shows; the others are inpainted.
+    """
+
+    offsets: NDArray[np.float64]
+    colors: FloatImage
+    disparity: FloatImage
+    coverage: FloatImage
+    edge_level: NDArray[np.uint8]
+    photo_images: int
+
+
+class Cells(NamedTuple):
     """Rays of S images, summarised by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
     disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. step (M, N): the largest
     step between the photo's pixels there and those beside them, inf where one is unknown or at the border.
@@ -49,10 +64,7 @@ class Cells:
 class RaySet:
     """Source images of one size (height, width), at most `capacity` of them. Views show what lies within their margins.
 
-    All arrays are (S, ...) for the S images added so far. offsets (S, 2): the view (t, s) each is seen from. colors
-    (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN where there is no surface. coverage (S, H, W): how much of
-    its pixel a ray fills, 0 = no ray. edge_level (S, H, W) uint8: the largest step that a 4x4 look-up may meet, in
-    steps between surfaces, rounded up, 0 below one; see `edge_limits`.
+    All arrays are of the images added so far.
     """
 
     def __init__(
@@ -75,15 +87,18 @@ class RaySet:
         self._statistics: DisparityStatistics | None = None
         self._soft_cells = np.zeros((0, 0, 0), np.bool_)
         self._surveying = threading.Lock()
-        self._offsets = np.empty((capacity, 2))
-        self._colors = np.empty((capacity, *size, 3), np.float32)
-        self._disparity = np.empty((capacity, *size), np.float32)
-        self._coverage = np.empty((capacity, *size), np.float32)
-        self._edge_level = np.empty((capacity, *size), np.uint8)
+        self._room = RayArrays(
+            np.empty((capacity, 2)),
+            np.empty((capacity, *size, 3), np.float32),
+            np.empty((capacity, *size), np.float32),
+            np.empty((capacity, *size), np.float32),
+            np.empty((capacity, *size), np.uint8),
+            0,
+        )
         in_cells = -(-size.height // CELL_PX), -(-size.width // CELL_PX)
-        self._low, self._high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
-        self._row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
-        self._step = np.full(in_cells, np.inf, np.float32)
+        low, high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
+        row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
+        self._cells_room = Cells(low, high, row_ranges, np.full(in_cells, np.inf, np.float32))
         self._joined = np.zeros(size, np.uint8)
         self._steep, self._nowhere = np.zeros(in_cells, np.bool_), np.zeros(in_cells, np.bool_)
 
@@ -104,6 +119,7 @@ class RaySet:
                 self._with_margins(part, none) for part, none in ((colors, 0.0), (disparity, np.nan), (coverage, 0.0))
             )
         k, joined = self._count, np.zeros(self.size, np.uint8)
+        room, cells = self._room, self._cells_room
         if k == 0:
             least_edge = EDGE_PARALLAX_PX / max(self._farthest_views, 1e-9)
             self._joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
@@ -111,20 +127,20 @@ class RaySet:
         elif any(offset):
             step = IN_FRONT_PX / max(self._farthest_views, 1e-9)
             coverage = coverage.copy()
-            _leave_out_in_front(disparity, self._disparity[0], self._margins, *offset, step, coverage)
+            _leave_out_in_front(disparity, room.disparity[0], self._margins, *offset, step, coverage)
 
         def band(first: int, last: int) -> None:
             rows = slice(first, last)
-            self._colors[k, rows], self._disparity[k, rows] = colors[rows], disparity[rows]
-            self._coverage[k, rows] = coverage[rows]
-            _edge_level(disparity, joined, self._surface_step, first, last, self._edge_level[k])
-            _sum_up(disparity, coverage, first, last, self._low[k], self._high[k])
+            room.colors[k, rows], room.disparity[k, rows] = colors[rows], disparity[rows]
+            room.coverage[k, rows] = coverage[rows]
+            _edge_level(disparity, joined, self._surface_step, first, last, room.edge_level[k])
+            _sum_up(disparity, coverage, first, last, cells.low[k], cells.high[k])
             if k == 0:
-                _largest_steps(disparity, first, last, self._step)
+                _largest_steps(disparity, first, last, cells.step)
 
         in_bands(band, self.size, should_stop)
-        self._row_ranges[k, :, 0], self._row_ranges[k, :, 1] = self._low[k].min(axis=1), self._high[k].max(axis=1)
-        self._offsets[k] = offset
+        cells.row_ranges[k, :, 0], cells.row_ranges[k, :, 1] = cells.low[k].min(axis=1), cells.high[k].max(axis=1)
+        room.offsets[k] = offset
         self._count += 1
         self._photo_images += not any(offset)
         self._statistics = None
@@ -133,9 +149,8 @@ class RaySet:
         """`statistics`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
         with self._surveying:
             if self._statistics is None:
-                disparity = self._disparity[: self._count]
-                found = measure_disparity(disparity, self._farthest_views, should_stop)
-                self._soft_cells = np.empty(self._low[: self._count].shape, np.bool_)
+                found = measure_disparity(self.arrays.disparity, self._farthest_views, should_stop)
+                self._soft_cells = np.empty(self.cells.low.shape, np.bool_)
                 self._soft_cells[: self.photo_images] = _any_in_cells(found.soft)
                 self._soft_cells[self.photo_images :] = found.softness > SOFT
                 self._statistics = found
@@ -152,12 +167,12 @@ class RaySet:
     @property
     def size(self) -> ImageSize:
         """Of every image."""
-        return image_size(self._disparity[0])
+        return image_size(self._room.disparity[0])
 
     @property
     def view_size(self) -> ImageSize:
         """Of every view."""
-        return image_size(self.in_view(self._disparity[0]))
+        return image_size(self.in_view(self._room.disparity[0]))
 
     @property
     def margins(self) -> Margins:
@@ -170,17 +185,28 @@ class RaySet:
         return image[top : len(image) - bottom, left : image.shape[1] - right]
 
     @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """(offsets, colors, disparity, coverage, edge_level) of the images added so far."""
-        everything = (self._offsets, self._colors, self._disparity, self._coverage, self._edge_level)
-        return tuple(array[: self._count] for array in everything)
+    def arrays(self) -> RayArrays:
+        """The rays themselves."""
+        added, room = slice(self._count), self._room
+        return RayArrays(
+            room.offsets[added],
+            room.colors[added],
+            room.disparity[added],
+            room.coverage[added],
+            room.edge_level[added],
+            self._photo_images,
+        )
+
+    def to_view(self, offset: ViewOffset) -> NDArray[np.float64]:
+        """(S, 2): from where each image is seen to the view at `offset`."""
+        return np.array(offset) - self.arrays.offsets
 
     def edge_limits(self, offset: ViewOffset) -> NDArray[np.uint8]:
         """(S): look-ups for the view at `offset` may meet another surface where a source's edge_level is above this.
 
         Steps between surfaces are those of the farthest view; in a nearer one they are so much larger.
         """
-        from_sources = np.abs(np.array(offset) - self._offsets[: self._count]).max(axis=1)
+        from_sources = np.abs(self.to_view(offset)).max(axis=1)
         larger = self._farthest_views / np.maximum(from_sources, 1e-9)
         return np.asarray(np.clip(larger, 1, HIGHEST_LEVEL - 1), np.uint8)
 
@@ -201,8 +227,8 @@ class RaySet:
     @property
     def cells(self) -> Cells:
         """The rays added so far, summarised."""
-        low, high, row_ranges = (part[: self._count] for part in (self._low, self._high, self._row_ranges))
-        return Cells(low, high, row_ranges, self._step)
+        added, room = slice(self._count), self._cells_room
+        return Cells(room.low[added], room.high[added], room.row_ranges[added], room.step)
 
     @property
     def statistics(self) -> DisparityStatistics:
@@ -225,7 +251,7 @@ class RaySet:
     @property
     def photo_disparity(self) -> FloatImage:
         """(H, W) disparity of the photo, as large as views."""
-        return np.ascontiguousarray(self.in_view(self._disparity[0]))
+        return np.ascontiguousarray(self.in_view(self._room.disparity[0]))
 
     @property
     def photo_detail(self) -> FloatImage:

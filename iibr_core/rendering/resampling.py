@@ -10,6 +10,7 @@ the candidate's own surface count.
 from __future__ import annotations
 
 from math import floor
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,36 +32,32 @@ ONE, TWO = np.uint64(1), np.uint64(2)
 """Unsigned indices need no test for counting from the end."""
 
 
+class ShownRays(NamedTuple):
+    """What target rays show: colors (N, W, 3), sRGB-encoded; disparity (N, W) and source (N, W) of the heaviest
+    candidates.
+    """
+
+    colors: FloatImage
+    disparity: FloatImage
+    source: NDArray[np.uint8]
+
+
 def resample_colors(
     rays: RaySet, candidates: Candidates, weights: FloatImage, wanted: NDArray[np.bool_] | None = None
-) -> tuple[FloatImage, FloatImage, NDArray[np.uint8]]:
-    """Colours (N, W, 3), sRGB-encoded, of target rays; disparity (N, W) and source (N, W) of the heaviest candidates.
-
-    Rays without candidates, or not wanted (N, W), are black; the former at disparity 0 of source 0.
-    """
-    shape = candidates.count.shape
-    colors, disparity = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
-    source = np.zeros(shape, np.uint8)
+) -> ShownRays:
+    """Rays without candidates, or not wanted (N, W), are black; the former at disparity 0 of source 0."""
+    shape = candidates.number.shape
+    shown = ShownRays(np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.uint8))
     remaining = np.ones(shape, np.bool_) if wanted is None else wanted.copy()
-    offsets, images, surfaces, _, edge_level = rays.arrays
-    limits = rays.edge_limits(candidates.offset)
-    from_sources = np.array(candidates.offset) - offsets
-    _gather_plain(
-        images, edge_level, limits, from_sources, candidates.first_row,
-        candidates.count, candidates.disparity[0], candidates.source[0], remaining, colors, disparity, source,
-    )  # fmt: skip
-    _gather(
-        images, surfaces, edge_level, limits, from_sources, rays.photo_images, candidates.first_row,
-        candidates.count, candidates.disparity, candidates.source, weights, remaining, colors, disparity, source,
-    )  # fmt: skip
-    return colors, disparity, source
+    arrays, limits, to_view = rays.arrays, rays.edge_limits(candidates.offset), rays.to_view(candidates.offset)
+    _gather_plain(arrays, limits, to_view, candidates, remaining, shown)
+    _gather(arrays, limits, to_view, candidates, weights, remaining, shown)
+    return shown
 
 
-def heaviest_candidate(
-    rays: RaySet, candidates: Candidates, weights: FloatImage
-) -> tuple[FloatImage, NDArray[np.uint8]]:
-    """Disparity and source of `resample_colors`, without the colours."""
-    return resample_colors(rays, candidates, weights, np.zeros(candidates.count.shape, np.bool_))[1:]
+def heaviest_candidate(rays: RaySet, candidates: Candidates, weights: FloatImage) -> ShownRays:
+    """`resample_colors` without the colours: they are black."""
+    return resample_colors(rays, candidates, weights, np.zeros(candidates.number.shape, np.bool_))
 
 
 @kernel
@@ -177,15 +174,15 @@ def resample_inpainted(images, surfaces, index, x, y, d, parallax):
 
 
 @kernel
-def _gather_plain(
-    images, edge_level, limits, offsets, first_row, count, candidate_disparity, candidate_source, remaining,
-    colors, disparity, source,
-):  # fmt: skip
+def _gather_plain(rays, limits, offsets, candidates, remaining, shown):
     """What `_gather` does, for the rays that are easiest, and most: one candidate, no edge and no border near it.
 
     They are struck off from remaining. This is `cubic` written out, in single precision and without tests. All rays
     with one candidate get their disparity and source.
     """
+    images, edge_level, first_row, count = rays.colors, rays.edge_level, candidates.first_row, candidates.number
+    candidate_disparity, candidate_source = candidates.disparity[0], candidates.source[0]
+    colors, disparity, source = shown.colors, shown.disparity, shown.source
     _, height, width, _ = images.shape
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
@@ -224,11 +221,12 @@ def _gather_plain(
 
 
 @kernel
-def _gather(
-    images, surfaces, edge_level, limits, offsets, photo_images, first_row,
-    count, candidate_disparity, candidate_source, weights, wanted, colors, disparity, source,
-):  # fmt: skip
+def _gather(rays, limits, offsets, candidates, weights, wanted, shown):
     """What `resample_colors` returns. offsets (S, 2): from each source to the target view."""
+    images, surfaces, edge_level, photo_images = rays.colors, rays.disparity, rays.edge_level, rays.photo_images
+    first_row, count = candidates.first_row, candidates.number
+    candidate_disparity, candidate_source = candidates.disparity, candidates.source
+    colors, disparity, source = shown.colors, shown.disparity, shown.source
     _, height, width, _ = images.shape
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):

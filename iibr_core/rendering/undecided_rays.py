@@ -15,6 +15,7 @@ from iibr_core.rendering.ambiguous_rays import HYPOTHESES, LEAST_WEIGHT, PLAIN, 
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.ray_set import CELL_PX, RaySet
+from iibr_core.rendering.resampling import ShownRays
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage
 
@@ -42,7 +43,7 @@ def find_undecided_rays(
     rays: RaySet,
     candidates: Candidates,
     weights: FloatImage,
-    shown: tuple[FloatImage, NDArray[np.uint8]],
+    shown: ShownRays,
     rows: tuple[int, int],
     every: bool = False,
     hypotheses: int = HYPOTHESES,
@@ -55,18 +56,18 @@ def find_undecided_rays(
     """
     if hypotheses < 2:
         raise ValueError(f"{hypotheses} hypotheses a ray: give 2 at least")
-    from_sources = np.array(candidates.offset) - rays.arrays[0]
+    from_sources = rays.to_view(candidates.offset)
     around = rays.statistics
     parallax = max(*map(abs, candidates.offset), 1e-9)
     is_soft = around.softness > SOFT
     looks = len(AROUND) if is_soft else AROUND_SHARP
-    in_band = candidates.first_row, candidates.first_row + len(candidates.count)
+    in_band = candidates.first_row, candidates.first_row + len(candidates.number)
     near_soft = land_marked(rays.cells, from_sources, rays.soft_cells, in_band, REACH_PX)
-    pixel = np.empty(((rows[1] - rows[0]) * candidates.count.shape[1], 2), np.int64)
+    pixel = np.empty(((rows[1] - rows[0]) * candidates.number.shape[1], 2), np.int64)
     if decided is None:
-        decided = np.zeros(candidates.count.shape, np.bool_)
+        decided = np.zeros(candidates.number.shape, np.bool_)
     selected = _select_rays(
-        candidates.smooth & (not every), near_soft, decided, candidates.count, candidates.source, weights, *shown,
+        candidates.smooth & (not every), near_soft, decided, candidates.number, candidates.source, weights, *shown[1:],
         around.soft, is_soft, from_sources, rays.photo_images, parallax, looks, candidates.first_row, *rows, every,
         pixel,
     )  # fmt: skip
@@ -76,11 +77,11 @@ def find_undecided_rays(
     share, nearest = np.empty(shape, np.float32), np.empty(shape, np.float32)
     found = pixel[:selected], number, disparity, source, share, nearest
     _collect_hypotheses(
-        candidates.count, candidates.disparity, candidates.source, weights, *shown, rays.size.height, from_sources,
+        candidates.number, candidates.disparity, candidates.source, weights, *shown[1:], rays.size.height, from_sources,
         rays.photo_images, parallax, looks, candidates.first_row, *found,
     )  # fmt: skip
-    open_rays = _drop_decided(rays.arrays[1], from_sources, parallax, candidates.first_row, every, *found)
-    packed = _pack(candidates.count, weights, candidates.first_row, *(part[:open_rays] for part in found))
+    open_rays = _drop_decided(rays.arrays.colors, from_sources, parallax, candidates.first_row, every, *found)
+    packed = _pack(candidates.number, weights, candidates.first_row, *(part[:open_rays] for part in found))
     return UndecidedRays(candidates.offset, hypotheses, *packed)
 
 

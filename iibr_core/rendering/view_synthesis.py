@@ -265,22 +265,21 @@ class ViewSynthesis:
         wanted[inner] = (
             True if known is None else _changed_pixels(rays, offset, (first, last), known.images)[:, left:right]
         )
-        colors, disparity, source = resample_colors(rays, candidates, weights, wanted)
+        found = resample_colors(rays, candidates, weights, wanted)
         raise_if_stopped(self._should_stop)
         undecided = None
         if self._transformer:
             decided = share < WHOLE
             decided[:, :left] = decided[:, right:] = True
             undecided = find_undecided_rays(
-                rays, candidates, weights, (disparity, source), (above, above + last - first), self._every,
-                self._hypotheses, decided,
-            )  # fmt: skip
+                rays, candidates, weights, found, (above, above + last - first), self._every, self._hypotheses, decided
+            )
         shown = slice(*rows)
-        view.colors[shown], view.disparity[shown] = colors[inner], disparity[inner]
+        view.colors[shown], view.disparity[shown] = found.colors[inner], found.disparity[inner]
         if known is not None:
             np.copyto(view.colors[shown], known.colors[shown], where=~wanted[inner][..., None])
         view.occluded[shown], covered[shown] = occluded[inner], share[inner]
-        view.inpainted[shown] = occluded[inner] | (source[inner] >= rays.photo_images)
+        view.inpainted[shown] = occluded[inner] | (found.source[inner] >= rays.photo_images)
         if any(rays.margins):
             pixel = np.arange(rows[0] * rays.view_size.width, rows[1] * rays.view_size.width)
             beyond = _beyond_frame(pixel, view.disparity[shown].reshape(-1), *offset, *rays.view_size)
@@ -295,7 +294,7 @@ def _changed_pixels(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], kno
     cells = rays.cells
     later = np.zeros(cells.low.shape, np.bool_)
     later[known:] = True
-    landed = land_marked(cells, np.array(offset) - rays.arrays[0], later, rows, 0)
+    landed = land_marked(cells, rays.to_view(offset), later, rows, 0)
     pixels = landed.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
     above = rows[0] % CELL_PX
     return np.asarray(pixels[above : above + rows[1] - rows[0], : rays.size.width])

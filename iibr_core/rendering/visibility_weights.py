@@ -16,12 +16,13 @@ from iibr_core.types import FloatImage
 def visibility_weights(candidates: Candidates) -> FloatImage:
     """Weights (K, N, W) in [0, 1], 0 in unused slots; their sum over K is the covered share of the pixel."""
     weights = np.zeros_like(candidates.coverage)
-    _composite_front_to_back(candidates.count, candidates.coverage, candidates.disparity, weights)
+    _composite_front_to_back(candidates, weights)
     return weights
 
 
 @kernel
-def _composite_front_to_back(count, coverage, disparity, weights):
+def _composite_front_to_back(candidates, weights):
+    count, coverage, disparity = candidates.number, candidates.coverage, candidates.disparity
     rows, width = count.shape
     for row in range(rows):
         for x in range(width):

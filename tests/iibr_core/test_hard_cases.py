@@ -219,8 +219,8 @@ def test_k_larger_than_the_number_of_rays(size):
     rays = rays_of_photo(photo.pixels, np.full(size, 0.25, np.float32), 1.0, 0)
     offset = ViewOffset(0.5, -1.0)
     found = find_candidates(rays, offset, (0, size[0]), most=40)
-    assert found.count.max() <= size[0] * size[1]
-    assert (visibility_weights(found)[found.count.max() :] == 0).all()
+    assert found.number.max() <= size[0] * size[1]
+    assert (visibility_weights(found)[found.number.max() :] == 0).all()
     shown = []
     for slots in (5, 40):
         with ViewSynthesis(slots=slots, keeps_entropy=True) as synthesis:

@@ -130,11 +130,11 @@ def test_weights_sum_to_one(seed, offset):
     rays = rays_of_photo(pixels, disparity, 2.0, 0)
     found = find_candidates(rays, offset, (0, HEIGHT))
     weights = visibility_weights(found)
-    used = np.arange(5)[:, None, None] < found.count
+    used = np.arange(5)[:, None, None] < found.number
     covered = np.minimum(np.where(used, found.coverage, 0).sum(axis=0, dtype=np.float64), 1)
     assert np.abs(weights.sum(axis=0) - covered).max() <= 1e-5
     assert weights.min() >= 0
-    shown = resample_colors(rays, found, weights)[1:]
+    shown = resample_colors(rays, found, weights)
     ambiguous = find_ambiguous_rays(rays, found, weights, shown, (0, HEIGHT), every=True)
     decided = transformer_for("balanced")(ambiguous)
     assert np.abs(decided.sum(axis=1) - 1).max(initial=0) <= 1e-5

@@ -143,15 +143,11 @@ def shown(value):
 
 
 def contest(value):
-    weights, (_, disparity, origin) = shown(value)
-    return hypothesis_features.find_ambiguous_rays(
-        rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]), every=True
-    )
+    return hypothesis_features.find_ambiguous_rays(rays(value), found(value), *shown(value), (0, SIZE[0]), every=True)
 
 
 def undecided(value):
-    weights, (_, disparity, origin) = shown(value)
-    return undecided_rays.find_undecided_rays(rays(value), found(value), weights, (disparity, origin), (0, SIZE[0]))
+    return undecided_rays.find_undecided_rays(rays(value), found(value), *shown(value), (0, SIZE[0]))
 
 
 def in_use(asked):

@@ -156,7 +156,7 @@ def test_a_ray_takes_what_is_counted_for_it():
     rays = RaySet(3, ImageSize(64, 80), 0.1)
     image = np.zeros((64, 80), np.float32)
     rays.add(ViewOffset(0.0, 0.0), np.zeros((64, 80, 3), np.float32), image, np.ones_like(image))
-    assert sum(part.nbytes for part in rays.arrays if part.ndim > 2) == 5120 * RAY_BYTES
+    assert sum(part.nbytes for part in rays.arrays if np.ndim(part) > 2) == 5120 * RAY_BYTES
     more = making_bytes(Making(5120, 5120, 3, 0, 0, "balanced")) - making_bytes(Making(5120, 5120, 2, 0, 0, "balanced"))
     assert more == 5120 * (RAY_BYTES + STATISTICS_BYTES)
 

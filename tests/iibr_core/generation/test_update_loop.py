@@ -47,7 +47,7 @@ def test_what_a_view_disocclused_has_joined_the_rays_when_it_is_yielded():
         assert len(seen) == photo_images + count
         if offset == LEFT:
             np.testing.assert_array_equal(view.colors, expected.colors)
-            _, colors, disparity, coverage, _ = seen.arrays
+            _, colors, disparity, coverage, *_ = seen.arrays
             for added, filled in zip((colors[-1], disparity[-1], coverage[-1]), view.filled_rays()):
                 np.testing.assert_array_equal(added, filled)
             assert (coverage[-1] > 0)[view.occluded].all()
@@ -99,7 +99,7 @@ def test_the_inpainter_decides_what_joins():
         assert (filled[view.occluded] == 1).all()
         assert (colors[filled == 1] == (1, 0, 0)).all()
         assert (disparity[filled == 1] == -9).all()
-    np.testing.assert_array_equal(seen.arrays[2][-1] == -9, filled)
+    np.testing.assert_array_equal(seen.arrays.disparity[-1] == -9, filled)
 
 
 def test_a_stop_is_heard_and_adds_nothing():

@@ -62,8 +62,8 @@ def squared_errors(seed, spoil):
     for offset in OFFSETS:
         candidates = find_candidates(rays, offset, (0, SIZE.height))
         weights = visibility_weights(candidates)
-        closed, *shown = resample_colors(rays, candidates, weights)
-        ambiguous = find_ambiguous_rays(rays, candidates, weights, tuple(shown), (0, SIZE.height))
+        shown = resample_colors(rays, candidates, weights)
+        ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, (0, SIZE.height))
         # Where less is covered, T is not asked: what was filled behind shows there, too.
         asked = covered_share(weights)[tuple(ambiguous.pixel.T)] >= WHOLE
         ambiguous = replace(ambiguous, **{name: getattr(ambiguous, name)[asked] for name in ARRAYS})
@@ -78,7 +78,7 @@ def squared_errors(seed, spoil):
             ["covered in part", "beside what is inpainted", "between surfaces"],
             "soft edge",
         )
-        found.append((kind, np.square(closed[y, x] - truth).sum(axis=1), np.square(chosen - truth).sum(axis=1)))
+        found.append((kind, np.square(shown.colors[y, x] - truth).sum(axis=1), np.square(chosen - truth).sum(axis=1)))
     return [np.concatenate(part) for part in zip(*found)]
 
 

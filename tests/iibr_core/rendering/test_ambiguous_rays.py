@@ -45,7 +45,7 @@ def ambiguous_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
     height = photo.size[0]
     candidates = find_candidates(rays, offset, (0, height))
     weights = visibility_weights(candidates)
-    shown = resample_colors(rays, candidates, weights)[1:]
+    shown = resample_colors(rays, candidates, weights)
     return find_ambiguous_rays(rays, candidates, weights, shown, (0, height), every), weights, rays
 
 

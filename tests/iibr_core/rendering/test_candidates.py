@@ -55,7 +55,7 @@ def total_coverage_slowly(disparity, offset):
 def used(candidates, values):
     """Values of used slots, 0 elsewhere."""
     slots = np.arange(values.shape[0])[:, None, None]
-    return np.where(slots < candidates.count, values, 0)
+    return np.where(slots < candidates.number, values, 0)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_coverage_agrees_with_a_slow_twin(offset):
 def test_a_constant_surface_covers_every_pixel_once():
     found = find_candidates(ray_set(np.full((8, 9), 0.37)), ViewOffset(1.1, -2.3), (0, 8))
     inside = np.s_[2:6, 2:7]
-    assert (found.count[inside] == 1).all()
+    assert (found.number[inside] == 1).all()
     assert found.coverage[0][inside] == pytest.approx(1, abs=1e-5)
     assert found.disparity[0][inside] == pytest.approx(0.37, abs=1e-6)
 
@@ -89,13 +89,13 @@ def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them
     # The nearer one's last ray lands at 4 - 2 s, the other's first at 5 - s.
     assert used(closed, closed.coverage).sum(axis=0)[:, :7] == pytest.approx(1, abs=1e-5)
     assert (closed.disparity[0, :, 3] == 1.0).all()
-    assert (opened.count[:, 1:3] == 0).all()
+    assert (opened.number[:, 1:3] == 0).all()
 
 
 def test_two_surfaces_make_two_candidates_however_many_rays_land():
     front, back = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
     found = find_candidates(ray_set(back, front), ViewOffset(0.0, 1.0), (0, 6))
-    assert (found.count[:, :7] == 2).all()
+    assert (found.number[:, :7] == 2).all()
     assert {*found.source[:2, 3, 3]} == {0, 1}
 
 
@@ -103,7 +103,7 @@ def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
     front, back = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
     found = find_candidates(ray_set(front, back), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.source[0, :, :7] == 0).all()
-    assert (found.count[:, :7] == 1).all()
+    assert (found.number[:, :7] == 1).all()
     assert (found.source[0, :, 8] == 1).all(), "the front has moved away"
 
 
@@ -111,11 +111,11 @@ def test_surfaces_closer_than_the_tolerance_are_one():
     near = np.full((4, 8), 1.0)
     near[:, ::2] += 0.9 * SAME_SURFACE_PX / 2
     found = find_candidates(ray_set(near), ViewOffset(0.0, 2.0), (0, 4))
-    assert (found.count[:, :5] == 1).all()
+    assert (found.number[:, :5] == 1).all()
     two_surfaces_1e_minus_4_apart = np.full((4, 8), 1.0)
     two_surfaces_1e_minus_4_apart[:, 4:] += 1e-4
     found = find_candidates(ray_set(two_surfaces_1e_minus_4_apart), ViewOffset(0.0, 2.0), (0, 4))
-    assert (found.count[:, :5] == 1).all()
+    assert (found.number[:, :5] == 1).all()
 
 
 def test_the_rearmost_gives_way_where_slots_run_out():
@@ -132,7 +132,7 @@ def test_bands_do_not_change_what_is_found(incoherence):
     whole = find_candidates(rays, offset, (0, 20))
     for first, last in ((0, 7), (7, 20), *((row, row + 1) for row in range(20))):
         band = find_candidates(rays, offset, (first, last))
-        assert (band.count == whole.count[first:last]).all()
+        assert (band.number == whole.number[first:last]).all()
         assert (used(band, band.coverage) == used(whole, whole.coverage)[:, first:last]).all()
         assert (used(band, band.disparity) == used(whole, whole.disparity)[:, first:last]).all()
 
@@ -152,5 +152,5 @@ def test_rays_without_coverage_do_not_land():
     coverage = np.zeros((5, 5), np.float32)
     coverage[2, 2] = 0.25
     found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage), ViewOffset(0.0, 1.0), (0, 5))
-    assert found.count.sum() == 1
+    assert found.number.sum() == 1
     assert found.coverage[0, 2, 2] == pytest.approx(0.25)

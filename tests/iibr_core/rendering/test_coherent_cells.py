@@ -58,7 +58,7 @@ def test_on_a_plane_every_ray_is_followed_to_its_exact_disparity(offset):
     exact = SLOPE / (1 - 0.02 * offset.s + 0.01 * offset.t)
     assert smooth.mean() > 0.4  # the border takes the rest of so small a picture
     assert candidates.disparity[0][smooth] == pytest.approx(exact[smooth], abs=2 * SETTLED_PX)
-    assert (candidates.count[smooth] == 1).all()
+    assert (candidates.number[smooth] == 1).all()
     assert (candidates.coverage[0][smooth] == 1).all()
 
 
@@ -69,11 +69,11 @@ def test_following_back_gives_what_landing_gives(disparity, offset, monkeypatch)
     smooth = by_pixel(own.smooth, (0, SIZE[0]))
     assert smooth.any()
     assert not landed.smooth.any()
-    assert (landed.count[smooth] == 1).all()
+    assert (landed.number[smooth] == 1).all()
     assert landed.coverage[0][smooth] == pytest.approx(np.ones(smooth.sum()), abs=0.1)
     # Landing takes the mean over a pixel's area, following back the value at its centre.
     assert own.disparity[0][smooth] == pytest.approx(landed.disparity[0][smooth], abs=0.02)
-    assert (own.count[~smooth] == landed.count[~smooth]).all()
+    assert (own.number[~smooth] == landed.number[~smooth]).all()
     assert np.abs(colors - expected).max() < 2 / 255
 
 
@@ -83,7 +83,7 @@ def test_no_cell_is_smooth_where_two_surfaces_or_none_show(offset):
     smooth = by_pixel(candidates.smooth, (0, SIZE[0]))
     left, right = 30 - 2.5 * max(offset.s, 0), 30 - 2.5 * min(offset.s, 0)
     assert not smooth[:, int(left) - 2 : int(right) + 3].any()
-    assert not smooth[candidates.count != 1].any()
+    assert not smooth[candidates.number != 1].any()
 
 
 @pytest.mark.parametrize(("disparity", "is_smooth"), [(12.0, False), (-12.0, True)], ids=["in front", "behind"])
@@ -105,7 +105,7 @@ def test_bands_do_not_change_what_is_followed(rows):
     whole, band = find_candidates(rays, offset, (0, SIZE[0])), find_candidates(rays, offset, rows)
     inner = slice(*rows)
     assert (by_pixel(band.smooth, rows) == by_pixel(whole.smooth, (0, SIZE[0]))[inner]).all()
-    assert (band.disparity[0] == whole.disparity[0][inner])[band.count > 0].all()
+    assert (band.disparity[0] == whole.disparity[0][inner])[band.number > 0].all()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1), (5, 7), (9, 9)])
@@ -113,7 +113,7 @@ def test_pictures_of_any_size(size):
     rays = ray_set(np.full(size, 0.3, np.float32))
     candidates = find_candidates(rays, ViewOffset(1.0, 1.0), (0, size[0]))
     assert candidates.smooth.shape == (-(-size[0] // CELL_PX), -(-size[1] // CELL_PX))
-    assert candidates.disparity[0][candidates.count > 0] == pytest.approx(0.3)
+    assert candidates.disparity[0][candidates.number > 0] == pytest.approx(0.3)
 
 
 def test_unknown_disparity_is_never_smooth():

@@ -102,7 +102,7 @@ def test_samples_see_what_a_slow_twin_sees(turn, rounding):
     flat = tuple(map(float, matrix.ravel()))
     landing = [free_view._landing(rays, 0, flat, lambda: False)]
     nearest, source = free_view._draw(rays, [flat], landing, 0.5, rounding, (0, 4), 5)
-    slow = drawn_slowly(rays.arrays[2][0], matrix, target.size, rounding)
+    slow = drawn_slowly(rays.arrays.disparity[0], matrix, target.size, rounding)
     # Samples on the very side of a triangle belong to either.
     differ = ~np.isclose(nearest, slow, atol=1e-4)
     assert differ.mean() < 0.01

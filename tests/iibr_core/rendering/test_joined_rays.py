@@ -78,7 +78,7 @@ def test_a_steep_plane_is_one_closed_surface_of_exact_disparity(slope, along):
     source = x + exact
     inside = (source > 4) & (source < 55) & (x > 2) & (x < 57)
     assert inside.sum() > 8
-    count, disparities = turn(found.count), turn(found.disparity[0])
+    count, disparities = turn(found.number), turn(found.disparity[0])
     weights = turn(visibility_weights(found).sum(axis=0))
     assert (count[20:40, inside] == 1).all()
     assert weights[20:40, inside] == pytest.approx(1, abs=1e-3)
@@ -98,4 +98,4 @@ def test_a_steep_surface_is_torn_where_it_ends():
 
 def test_look_ups_on_a_steep_surface_meet_no_edge():
     rays = ray_set(np.tile(0.8 * np.arange(60, dtype=np.float32), (30, 1)))
-    assert not rays.arrays[4].any()
+    assert not rays.arrays.edge_level.any()

@@ -60,7 +60,7 @@ def test_holes_show_what_the_smaller_light_field_shows() -> None:
     rays, outer = ray_set(photo, disparity, plan)
     views = dict(outer)
     # Every inpainted ray is made red: so the larger photo's holes are.
-    rays._colors[rays.photo_images : len(rays)] = red.pixels
+    rays.arrays.colors[rays.photo_images : len(rays)] = red.pixels
     large_photo = LargePhoto(*(np.repeat(np.repeat(a, 2, 0), 2, 1) for a in (photo.pixels, 2 * disparity.values)), rays)
     offset = ViewOffset(-1.0, -1.0)
     with ViewSynthesis() as synthesis:

@@ -47,9 +47,8 @@ def test_edges_and_cells(size, unknown):
     coverage = np.where(np.isnan(disparity), 0, random.random(size) > 0.8).astype(np.float32)
     rays = RaySet(1, ImageSize(*size), SURFACE_STEP)
     rays.add(ViewOffset(0.0, 0.0), np.zeros((*size, 3), np.float32), disparity, coverage)
-    _, _, _, _, edge_level = rays.arrays
     for level in (1, 2):
-        assert ((edge_level[0] > level) == slow_near_edge(disparity, level * SURFACE_STEP)).all()
+        assert ((rays.arrays.edge_level[0] > level) == slow_near_edge(disparity, level * SURFACE_STEP)).all()
     assert (rays.cells.low[0] == slow_cells(np.where(coverage > 0, disparity, np.inf), np.min)).all()
     assert (rays.cells.high[0] == slow_cells(np.where(coverage > 0, disparity, -np.inf), np.max)).all()
     assert rays.cells.step == pytest.approx(slow_steps(disparity))
@@ -83,7 +82,7 @@ def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_
         is_shown = v in range(margins.top, 20 - margins.bottom) and u in range(margins.left, 24 - margins.right)
         if is_shown and d > photo[v, u] + IN_FRONT_PX / 2.0:
             expected[max(y - DOUBTED_PX, 0) : y + DOUBTED_PX + 1, max(x - DOUBTED_PX, 0) : x + DOUBTED_PX + 1] = 0
-    np.testing.assert_array_equal(rays.arrays[3], [np.ones(size), coverage, expected])
+    np.testing.assert_array_equal(rays.arrays.coverage, [np.ones(size), coverage, expected])
     np.testing.assert_array_equal(
         rays.cells.high[2], slow_cells(np.where(expected > 0, made_up, np.float32(-np.inf)), np.max)
     )

@@ -46,7 +46,7 @@ def test_a_rim_beside_a_gap_is_the_front_over_what_was_filled(share, offset):
 def test_rays_join_without_what_comes_over_them():
     rays = bar(0.3)
     list(render_outer_views(rays, [RIGHT], inpainter=paint_red))
-    _, colors, _, coverage, _ = rays.arrays
+    _, colors, _, coverage, *_ = rays.arrays
     assert (colors[-1][coverage[-1] > 0] == (1, 0, 0)).all()
 
 

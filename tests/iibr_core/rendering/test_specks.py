@@ -36,7 +36,7 @@ def slowly(
     height, width = disparity.shape
     for y, x in np.ndindex(height, width):
         v, u = np.clip(np.array([y, x]) + disparity[y, x] * np.array(OFFSET), 0, [height - 1, width - 1])
-        level = rays.arrays[4][0][int(v + 0.5), int(u + 0.5)]
+        level = rays.arrays.edge_level[0][int(v + 0.5), int(u + 0.5)]
         is_torn = level * OWN_SURFACE_PX > GAP_PX * rays.edge_limits(OFFSET)[0]
         own = ndimage.map_coordinates(detail.astype(float), [[v], [u]], order=1, mode="nearest")[0]
         stands_out = np.abs(colors[y, x] - medians[y, x]).max()
