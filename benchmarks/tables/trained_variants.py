@@ -22,8 +22,8 @@ from benchmarks import plucker
 from iibr_core.formats.weights import save_weights
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import FEATURES, PLAIN, SHARE, AmbiguousRays, UndecidedRays
-from iibr_core.rendering.hypothesis_features import describe_rays
+from iibr_core.rendering.ambiguous_rays import PLAIN, UndecidedRays
+from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays, describe_rays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.training.batches import AS_RENDERED, RayChoice, training_batch
 from iibr_core.training.losses import LossWeights
@@ -36,7 +36,7 @@ STEPS, SEED, LEARNING_RATE = 2500, 0, 3e-3
 CHECKPOINT_EVERY = 250
 LAMBDAS = LossWeights(entropy=ENTROPY_WEIGHT)
 COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
-"""The features of `hypothesis_features._describe_hypotheses` that know nothing of disparity."""
+"""The features of `hypotheses._describe` that know nothing of disparity."""
 
 
 def with_raw_coordinates(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:

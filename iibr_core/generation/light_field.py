@@ -20,7 +20,7 @@ from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_inpainter, require_inpainter
-from iibr_core.rendering.ambiguous_rays import AmbiguousRays
+from iibr_core.rendering.hypotheses import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo

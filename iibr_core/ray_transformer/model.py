@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from iibr_core.ray_transformer.inference import LEAST_PRIOR, WIDTH
-from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE
+from iibr_core.rendering.hypotheses import FEATURES, SHARE
 
 
 class RayTransformer(nn.Module):

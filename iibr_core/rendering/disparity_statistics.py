@@ -28,6 +28,8 @@ SHARP_SHARE = 0.5
 """An edge whose largest step makes up this share of its steps is sharp."""
 SOFT_AROUND_PX = 8
 """Rays this close to the middle of a soft edge are marked."""
+SOFT = 0.5
+"""Where depth edges are softer than this, surfaces are looked for farther around a ray."""
 EDGE_PARALLAX_PX = 2.0
 """Least parallax, in the outermost view, of the edges whose softness is measured."""
 

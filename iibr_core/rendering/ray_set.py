@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ambiguity import SOFT
-from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, DisparityStatistics, measure_disparity
+from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, SOFT, DisparityStatistics, measure_disparity
 from iibr_core.rendering.joined_rays import BELOW, RIGHT, join_rays, joined_either_way
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never

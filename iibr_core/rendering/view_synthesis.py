@@ -17,18 +17,16 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background, goes_on_in_front
 from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, AmbiguousRays, UndecidedRays
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
-from iibr_core.rendering.hypothesis_colors import blend_hypotheses, bound_weights
-from iibr_core.rendering.hypothesis_features import describe_rays
+from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
 from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, RaySet
 from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
 from iibr_core.rendering.resampling import OWN_SURFACE_PX, resample_colors
 from iibr_core.rendering.specks import measure_detail, without_specks
-from iibr_core.rendering.undecided_rays import find_undecided_rays
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel

@@ -16,10 +16,9 @@ from torch import Tensor
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, SHARE, AmbiguousRays
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypothesis_colors import hypothesis_colors
-from iibr_core.rendering.hypothesis_features import find_ambiguous_rays
+from iibr_core.rendering.hypotheses import SHARE, AmbiguousRays, find_ambiguous_rays, hypothesis_colors
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import heaviest_candidate
 from iibr_core.rendering.view_synthesis import rays_of_photo

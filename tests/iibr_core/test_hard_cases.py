@@ -21,8 +21,8 @@ from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.exemplars import MOST_FINE
 from iibr_core.ray_transformer.inference import SHAPES, TrainedWeights
-from iibr_core.rendering.ambiguous_rays import FEATURES, SHARE, AmbiguousRays
 from iibr_core.rendering.candidates import find_candidates
+from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import Disparity, GridShape, ImageSize, ViewOffset

@@ -9,7 +9,7 @@ from hypothesis.extra import numpy as stn
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.generation.light_field import transformer_for
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypothesis_features import find_ambiguous_rays
+from iibr_core.rendering.hypotheses import find_ambiguous_rays
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import entropy
 from iibr_core.rendering.resampling import KEYS_A, resample_colors

@@ -36,12 +36,12 @@ from iibr_core.generation import cost_model, dense_field, free_views, outer_view
 from iibr_core.generation import light_field as generating
 from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes
 from iibr_core.rendering import (
+    ambiguous_rays,
     candidates,
     coherent_cells,
     disparity_statistics,
     free_view,
-    hypothesis_colors,
-    hypothesis_features,
+    hypotheses,
     joined_rays,
     large_views,
     lens_light,
@@ -49,7 +49,6 @@ from iibr_core.rendering import (
     occlusion,
     resampling,
     specks,
-    undecided_rays,
 )
 from iibr_core.rendering.gloss import environment, geometry, shading, surface
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface, of_maps
@@ -143,11 +142,11 @@ def shown(value):
 
 
 def contest(value):
-    return hypothesis_features.find_ambiguous_rays(rays(value), found(value), *shown(value), (0, SIZE[0]), every=True)
+    return hypotheses.find_ambiguous_rays(rays(value), found(value), *shown(value), (0, SIZE[0]), every=True)
 
 
 def undecided(value):
-    return undecided_rays.find_undecided_rays(rays(value), found(value), *shown(value), (0, SIZE[0]))
+    return ambiguous_rays.find_undecided_rays(rays(value), found(value), *shown(value), (0, SIZE[0]))
 
 
 def in_use(asked):
@@ -156,7 +155,7 @@ def in_use(asked):
 
 
 def decided(value):
-    return hypothesis_colors.blend_hypotheses(
+    return hypotheses.blend_hypotheses(
         rays(value), contest(value), generating.transformer_for("balanced")(contest(value))
     )
 
@@ -264,18 +263,14 @@ FINITE = {
         GlossSurface(color=(0.5, 0.5, 0.5)), image(0.5), Disparity(depths(v), "wild").values
     ),
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
-    "rendering.hypothesis_colors.blend_hypotheses": lambda v, _: decided(v),
-    "rendering.hypothesis_colors.bound_weights": lambda v, _: hypothesis_colors.bound_weights(
+    "rendering.hypotheses.blend_hypotheses": lambda v, _: decided(v),
+    "rendering.hypotheses.bound_weights": lambda v, _: hypotheses.bound_weights(
         contest(v), generating.transformer_for("balanced")(contest(v))
     ),
-    "rendering.hypothesis_features.describe_rays": lambda v, _: hypothesis_features.describe_rays(
-        rays(v), undecided(v)
-    ),
-    "rendering.hypothesis_features.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
-    "rendering.undecided_rays.find_undecided_rays": lambda v, _: undecided(v),
-    "rendering.hypothesis_colors.hypothesis_colors": lambda v, _: hypothesis_colors.hypothesis_colors(
-        rays(v), contest(v)
-    ),
+    "rendering.hypotheses.describe_rays": lambda v, _: hypotheses.describe_rays(rays(v), undecided(v)),
+    "rendering.hypotheses.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
+    "rendering.ambiguous_rays.find_undecided_rays": lambda v, _: undecided(v),
+    "rendering.hypotheses.hypothesis_colors": lambda v, _: hypotheses.hypothesis_colors(rays(v), contest(v)),
     "generation.cost_model.estimate_costs": lambda v, _: [
         cost_model.estimate_costs(cost_model.measure_parallax(depths(values), 4.0), GRID) for values in (1.0, v)
     ],
@@ -673,7 +668,12 @@ READS_OR_TELLS = {
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands pieces_of",
     "depth.embedded.picture": "photo_in_focus rotate_estimate",
     "depth.search": "ask_model estimator_of read_shown_photo",
+    "rendering.ambiguous_rays": "UndecidedRays",
+    "rendering.candidates": "Candidates",
+    "rendering.disparity_statistics": "DisparityStatistics",
     "rendering.large_views": "Part tiles_of whole",
+    "rendering.ray_set": "Cells RayArrays",
+    "rendering.resampling": "ShownRays",
     "rendering.view_synthesis": "ViewSynthesis",
     "types": "Camera ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",
 }

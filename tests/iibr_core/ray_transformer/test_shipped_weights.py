@@ -11,8 +11,7 @@ from iibr_core.generation.outer_views import outer_views
 from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.rendering.ambiguous_rays import LEAST_WEIGHT
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypothesis_colors import blend_hypotheses
-from iibr_core.rendering.hypothesis_features import find_ambiguous_rays
+from iibr_core.rendering.hypotheses import blend_hypotheses, find_ambiguous_rays
 from iibr_core.rendering.occlusion import WHOLE, covered_share
 from iibr_core.rendering.resampling import resample_colors
 from iibr_core.rendering.view_synthesis import rays_of_photo

@@ -8,25 +8,26 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.weights import save_weights
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import (
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, LEAST_WEIGHT, PLAIN, VISIBLE
+from iibr_core.rendering.candidates import find_candidates
+from iibr_core.rendering.disparity_statistics import SOFT_AROUND_PX
+from iibr_core.rendering.hypotheses import (
     FEATURES,
-    HYPOTHESES,
     INPAINTED,
-    LEAST_WEIGHT,
-    PLAIN,
+    LEAST_VOTE,
     PROFILE_PX,
+    SAY,
     SHARE,
     SOFTNESS,
     UNCOVERED,
     AmbiguousRays,
+    blend_hypotheses,
+    bound_weights,
+    find_ambiguous_rays,
+    hypothesis_colors,
 )
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.disparity_statistics import SOFT_AROUND_PX
-from iibr_core.rendering.hypothesis_colors import LEAST_VOTE, SAY, blend_hypotheses, bound_weights, hypothesis_colors
-from iibr_core.rendering.hypothesis_features import find_ambiguous_rays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.undecided_rays import VISIBLE
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training.degradation import blur

@@ -4,7 +4,8 @@ import torch
 
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import FEATURES, HYPOTHESES
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.hypotheses import FEATURES
 from iibr_core.training import batches
 from iibr_core.training.batches import RayChoice, training_batch
 from iibr_core.training.losses import LossWeights, color_loss, to_perceptual
