@@ -25,8 +25,9 @@ from iibr_core.generation.stored_views import encode_for_storage
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.renderer import Renderer, open_renderer
 from iibr_core.rendering.resampling import OWN_SURFACE_PX
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import (
     FloatImage,
@@ -121,8 +122,8 @@ def _generate_views(
     places = {(view.row * steps, view.column * steps): view for view in given}
     remaining = [dense.offset(*at) for at in np.ndindex(*dense) if at not in places]
     completing = [offset for offset in _completing_views(sparse, dense, steps) if offset in remaining]
-    with ViewSynthesis(should_stop) as synthesis:
-        views = _ViewsBetween(synthesis, given, steps, dense, should_stop, inpainter)
+    with open_renderer(should_stop) as renderer:
+        views = _ViewsBetween(renderer, given, steps, dense, should_stop, inpainter)
 
         def update(offset: ViewOffset, view: _Merged) -> ViewUpdate:
             (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, should_stop, 1)
@@ -139,7 +140,7 @@ def _generate_views(
             done += OUTER_WORK / total
             yield replace(update(offset, views.complete(offset)), share=done)
         remaining = [offset for offset in remaining if offset not in completing]
-        for made in synthesis.side_by_side(
+        for made in renderer.side_by_side(
             lambda offset: update(offset, views.make(offset)), nearest_first(remaining, nearest_to)
         ):
             done += 1 / total
@@ -163,14 +164,14 @@ class _ViewsBetween:
 
     def __init__(
         self,
-        synthesis: ViewSynthesis,
+        renderer: Renderer,
         given: Sequence[GivenView],
         steps: int,
         dense: GridShape,
         should_stop: ShouldStop,
         inpainter: Inpainter,
     ) -> None:
-        self._synthesis, self._steps, self._inpainter, self._should_stop = synthesis, steps, inpainter, should_stop
+        self._renderer, self._steps, self._inpainter, self._should_stop = renderer, steps, inpainter, should_stop
         self._sources: list[tuple[ViewOffset, RaySet]] = [
             (
                 dense.offset(view.row * steps, view.column * steps),
@@ -202,7 +203,7 @@ class _ViewsBetween:
         inpainted = hole.copy()
         if hole.any() and self._inpainted is not None:
             origin, rays = self._inpainted
-            filled, _ = self._synthesis.render_seen(rays, _between(origin, offset))
+            filled, _ = self._renderer.seen(rays, _between(origin, offset))
             np.copyto(colors, filled.colors, where=(hole & ~filled.occluded)[..., None])
             np.copyto(disparity, filled.disparity, where=hole & ~filled.occluded)
             hole &= filled.occluded
@@ -221,7 +222,7 @@ class _ViewsBetween:
             away = _between(at, offset)
             if max(map(abs, away)) > self._steps:
                 continue
-            view, covered = self._synthesis.render_seen(rays, away)
+            view, covered = self._renderer.seen(rays, away)
             near = (1 - abs(away.t) / self._steps) * (1 - abs(away.s) / self._steps) + BESIDE_WEIGHT
             weight = np.where(view.occluded, np.float32(0), np.float32(near) * covered**COVERED_POWER)
             # Encoded, as one surface's colours are interpolated: these are several looks at the same light.

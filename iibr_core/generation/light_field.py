@@ -23,7 +23,8 @@ from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_in
 from iibr_core.rendering.hypotheses import AmbiguousRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.renderer import open_renderer
+from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import (
@@ -95,8 +96,8 @@ def _generate_views(
         return
     transformer, inpainter = transformer_for(work.quality), load()
     rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter)
-    with ViewSynthesis(should_stop, transformer, inpainter=inpainter) as synthesis:
-        views = StoredViews(synthesis, rays, grid, photo.is_hdr, should_stop)
+    with open_renderer(should_stop, transformer, inpainter=inpainter) as renderer:
+        views = StoredViews(renderer, rays, grid, photo.is_hdr, should_stop)
         inner = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
         # What is left to be done for views that are there, or in the ray set.
         unfinished: dict[ViewOffset, Callable[[], ViewUpdate]] = {}
@@ -119,14 +120,14 @@ def _generate_views(
             made = views.make(offset)
             return Draft(made, made.colors, [])
 
-        for draft in synthesis.side_by_side(start, nearest_first(inner, nearest_to)):
+        for draft in renderer.side_by_side(start, nearest_first(inner, nearest_to)):
             if draft.undecided:
                 room -= draft.nbytes
                 v, u = draft.update.row, draft.update.column
                 unfinished[grid.offset(v, u)] = partial(views.finish, draft)
             left = work.finish_inner if draft.undecided else 0.0
             yield replace(draft.update, share=work.add(work.inner - left))
-        for update in synthesis.side_by_side(
+        for update in renderer.side_by_side(
             lambda offset: unfinished.pop(offset)(), nearest_first(list(unfinished), nearest_to)
         ):
             was_outer = grid.offset(update.row, update.column) in outer_offsets

@@ -15,15 +15,15 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
+from iibr_core.rendering.renderer import Renderer
 from iibr_core.rendering.specks import without_specks
-from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
 
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A view in closed form, and its rays that the transformer is still to be asked for: see `ViewSynthesis`.
+    """A view in closed form, and its rays that the transformer is still to be asked for: see `Renderer`.
 
     with_specks: its colours, stored, before its specks were taken out.
     """
@@ -43,19 +43,19 @@ class StoredViews:
     """Makes views of one ray set as they are handed over, each in the thread that asks."""
 
     def __init__(
-        self, synthesis: ViewSynthesis, rays: RaySet, grid: GridShape, is_hdr: bool, should_stop: ShouldStop
+        self, renderer: Renderer, rays: RaySet, grid: GridShape, is_hdr: bool, should_stop: ShouldStop
     ) -> None:
         """should_stop: once it is true, all raise Cancelled."""
-        self._synthesis, self._rays, self._grid = synthesis, rays, grid
+        self._renderer, self._rays, self._grid = renderer, rays, grid
         self._is_hdr, self._should_stop = is_hdr, should_stop
 
     def make(self, offset: ViewOffset, known: ShownBefore | None = None) -> ViewUpdate:
-        """A final view. known: see `ViewSynthesis.render_alone`."""
-        return self.update(offset, self._synthesis.render_alone(self._rays, offset, known))
+        """A final view. known: see `Renderer.render`."""
+        return self.update(offset, self._renderer.render(self._rays, offset, alone=True, known=known))
 
     def draft(self, offset: ViewOffset) -> Draft:
         """A view in closed form, final where nothing is left to be decided."""
-        view, undecided = self._synthesis.render_draft(self._rays, offset)
+        view, undecided = self._renderer.draft(self._rays, offset)
         stored = encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
         colors = self._without_specks(offset, stored, view.disparity, view.inpainted)
         update = self._update(offset, colors, view.disparity, view.inpainted, not undecided)
@@ -68,7 +68,7 @@ class StoredViews:
         stored, disparity = draft.with_specks.copy(), draft.update.disparity.copy()
         inpainted = draft.update.inpainted.copy()
         for part in draft.undecided:
-            decided = self._synthesis.decide(self._rays, part)
+            decided = self._renderer.decide(self._rays, part)
             at = np.unravel_index(decided.pixel, self._rays.view_size)
             stored[at] = stored_from_encoded(decided.colors, self._is_hdr)
             disparity[at], inpainted[at] = decided.disparity, decided.inpainted

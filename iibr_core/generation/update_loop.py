@@ -12,7 +12,7 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.rendering.renderer import open_renderer
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import ViewOffset
 
@@ -29,11 +29,10 @@ def render_outer_views(
     Weights are the closed form's in every quality: its disparity is smoother, and so is what is inpainted.
     inpainter, slots: see `ViewSynthesis`. Taking a view raises Cancelled once should_stop is true.
     """
-    with ViewSynthesis(should_stop, slots=slots, inpainter=inpainter, reopens_holes=True) as synthesis:
+    with open_renderer(should_stop, slots=slots, inpainter=inpainter, reopens_holes=True) as renderer:
         for offset in outer:
-            view = synthesis.render(rays, offset)
-            if view.has_filled_rays:
-                rays.add(offset, *view.filled_rays(), should_stop)
+            view = renderer.render(rays, offset)
+            renderer.add_rays(rays, offset, view)
             yield offset, view
 
 

@@ -12,7 +12,8 @@ from iibr_core.generation.outer_views import farthest_views, margins_beyond_fram
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.rendered_view import RenderedView
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo, settled_view
+from iibr_core.rendering.renderer import Renderer, open_renderer
+from iibr_core.rendering.view_synthesis import rays_of_photo, settled_view
 from iibr_core.types import FloatImage, Quality, ViewOffset
 
 
@@ -42,8 +43,8 @@ class ViewMaker:
         margins = margins_beyond_frame(disparity, self.outer)
         self._rays = rays_of_photo(photo, disparity, farthest_views(self.outer), len(self.outer), should_stop, margins)
         self._first: dict[ViewOffset, tuple[RenderedView, float]] = {}
-        self._syntheses = {
-            quality: ViewSynthesis(should_stop, transformer_for(quality), every, slots, hypotheses=hypotheses)
+        self._renderers: dict[Quality, Renderer] = {
+            quality: open_renderer(should_stop, transformer_for(quality), every, slots, hypotheses=hypotheses)
             for quality in qualities
         }
 
@@ -62,8 +63,8 @@ class ViewMaker:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for synthesis in self._syntheses.values():
-            synthesis.__exit__(kind, error, trace)
+        for renderer in self._renderers.values():
+            renderer.__exit__(kind, error, trace)
 
     def view(self, quality: Quality, offset: ViewOffset) -> RenderedView:
         """The view at an offset; of fast quality the outer ones are those that completed the ray set."""
@@ -74,14 +75,14 @@ class ViewMaker:
         if quality == "fast" and offset in self._first:
             return self._first[offset]
         start = time.perf_counter()
-        view = self._settled(offset, self._syntheses[quality].render(self._rays, offset))
+        view = self._settled(offset, self._renderers[quality].render(self._rays, offset))
         return view, 1e3 * (time.perf_counter() - start)
 
     def views(self, quality: Quality, offsets: Iterable[ViewOffset]) -> Iterator[RenderedView]:
         """Views at these offsets, in their order, several at a time, as `generate` makes them."""
-        synthesis = self._syntheses[quality]
-        return synthesis.side_by_side(
-            lambda offset: self._settled(offset, synthesis.render_alone(self._rays, offset), 1), offsets
+        renderer = self._renderers[quality]
+        return renderer.side_by_side(
+            lambda offset: self._settled(offset, renderer.render(self._rays, offset, alone=True), 1), offsets
         )
 
     def _settled(self, offset: ViewOffset, view: RenderedView, threads: int | None = None) -> RenderedView:

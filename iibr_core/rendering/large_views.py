@@ -15,8 +15,9 @@ import numpy as np
 
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
+from iibr_core.rendering.renderer import Renderer
 from iibr_core.rendering.resampling import OWN_SURFACE_PX
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo, settled_view
+from iibr_core.rendering.view_synthesis import rays_of_photo, settled_view
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
@@ -131,7 +132,7 @@ class LargePhoto:
 
 
 def views_of_tile(
-    photo: LargePhoto, tile: Part, offsets: list[ViewOffset], synthesis: ViewSynthesis, should_stop: ShouldStop = never
+    photo: LargePhoto, tile: Part, offsets: list[ViewOffset], renderer: Renderer, should_stop: ShouldStop = never
 ) -> Iterator[RenderedView]:
     """What a tile of the photo shows from these offsets, one view after the other.
 
@@ -142,7 +143,7 @@ def views_of_tile(
     around = tile.grown(AROUND_PX + math.ceil(min(parallax_px, max(photo.size))), photo.bounds)
     rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
     for offset in offsets:
-        view = settled_view(rays, offset, synthesis.render(rays, offset), should_stop)
+        view = settled_view(rays, offset, renderer.render(rays, offset), should_stop)
         # Copies: a part is laid out like a whole view, and kernels need no second kind.
         yield RenderedView(
             view.colors[shown].copy(),

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from iibr_core.rendering.large_views import AROUND_PX, TILE_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
+from iibr_core.rendering.renderer import Renderer
 from iibr_core.rendering.resampling import keys_weights
-from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.jit import kernel, linear_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, ReportProgress, ViewOffset, ignore_progress, image_size
@@ -95,7 +95,7 @@ def draw_large(
     photo: LargePhoto,
     lens: LargeLens,
     part: Part,
-    synthesis: ViewSynthesis,
+    renderer: Renderer,
     smaller: FloatImage | None = None,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
@@ -112,7 +112,7 @@ def draw_large(
     views = [(lens.share < 1) + is_sharp * len(lens.samples) for is_sharp in sharp]
     done, total = 0, sum(pixels * count for pixels, count in zip(read, views))
     for tile, is_sharp, pixels in zip(tiles, sharp, read):
-        for _ in _draw_tile(photo, lens, tile, is_sharp, synthesis, should_stop, light[tile.inside(part).slices]):
+        for _ in _draw_tile(photo, lens, tile, is_sharp, renderer, should_stop, light[tile.inside(part).slices]):
             done += pixels
             report_progress(done, total, DRAWING)
     if smaller is not None:
@@ -125,20 +125,20 @@ def _draw_tile(
     lens: LargeLens,
     tile: Part,
     is_sharp: bool,
-    synthesis: ViewSynthesis,
+    renderer: Renderer,
     should_stop: ShouldStop,
     light: FloatImage,
 ) -> Iterator[None]:
     """Add what a tile shows in focus to its light, one view of the lens after the other. is_sharp: whether any is."""
     if lens.share < 1:
-        (view,) = views_of_tile(photo, tile, [lens.eye], synthesis, should_stop)
+        (view,) = views_of_tile(photo, tile, [lens.eye], renderer, should_stop)
         light += np.float32(1 - lens.share) * _linear(view.colors, lens, should_stop)
         yield
     if not is_sharp:
         return
     in_focus, weights = np.zeros_like(light), np.zeros(tile.size, np.float32)
     around = tile.grown(math.ceil(min(_moved_px(lens), max(photo.size))) + TAPS, whole(photo.size))
-    views = views_of_tile(photo, around, lens.offsets[lens.share < 1 :], synthesis, should_stop)
+    views = views_of_tile(photo, around, lens.offsets[lens.share < 1 :], renderer, should_stop)
     for sample, view in zip(lens.samples, views):
         shown = _linear(view.colors, lens, should_stop)
         _add_in_bands(shown, view.disparity, around, lens, sample, tile, photo.size, in_focus, weights, should_stop)

@@ -102,46 +102,38 @@ class ViewSynthesis:
         self._is_over = True
         self._threads.shutdown(cancel_futures=True)
 
-    def render(self, rays: RaySet, offset: ViewOffset) -> RenderedView:
-        """The view at an offset, its holes filled; row bands run side by side.
+    def add_rays(self, rays: RaySet, offset: ViewOffset, view: RenderedView) -> None:
+        """See `Renderer`, as for all that follow."""
+        if view.has_filled_rays:
+            rays.add(offset, *view.filled_rays(), self._should_stop)
 
-        Raises Cancelled once should_stop is true, ValueError for an offset that is not finite.
-        """
-        return self._view(rays, offset, tiling.THREADS, None)
+    def render(
+        self, rays: RaySet, offset: ViewOffset, alone: bool = False, known: ShownBefore | None = None
+    ) -> RenderedView:
+        """Row bands run side by side; alone, one after the other: the way for many views."""
 
-    def render_alone(self, rays: RaySet, offset: ViewOffset, known: ShownBefore | None = None) -> RenderedView:
-        """The same view, its row bands one after the other in the calling thread: the way for many views.
+        def decide(undecided: UndecidedRays) -> DecidedRays:
+            return self.decide(rays, undecided)
 
-        known: what this view showed before others joined the ray set. Only what those change is looked up anew; the
-        view is the same.
-        """
-        return self._view(rays, offset, 1, known)
+        threads = 1 if alone else tiling.THREADS
+        view, covered, decided = self._closed_form(rays, offset, decide, threads, known)
+        view = self._fill(rays, offset, view, covered, threads)
+        for part in decided:
+            at = np.unravel_index(part.pixel, rays.view_size)
+            view.colors[at], view.disparity[at], view.inpainted[at] = part.colors, part.disparity, part.inpainted
+        return view
 
-    def render_draft(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, list[UndecidedRays]]:
-        """The view in closed form, alone; and the rays that are the transformer's, none where there is nothing to
-        decide. Written over with what `decide` says of them, it is the view of `render`.
-        """
-        view, covered = self._begin_view(rays, offset)
-        undecided = in_bands(
-            lambda first, last: self._render_rows(rays, offset, (first, last), view, covered),
-            rays.view_size, self._should_stop, 1, self._most_band_pixels,
-        )  # fmt: skip
-        view = self._fill(rays, offset, view, covered, 1)
-        return view, [part for part in undecided if part is not None and len(part.pixel)]
+    def draft(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, list[UndecidedRays]]:
+        """Of the undecided rays each band makes a part."""
+        view, covered, undecided = self._closed_form(rays, offset, lambda part: part)
+        return self._fill(rays, offset, view, covered, 1), [part for part in undecided if len(part.pixel)]
 
-    def render_seen(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, FloatImage]:
-        """What the set itself shows, in closed form and alone, its holes left open (`occluded`); and how much of each
-        ray is covered (H, W).
-        """
-        view, covered = self._begin_view(rays, offset)
-        in_bands(
-            lambda first, last: self._render_rows(rays, offset, (first, last), view, covered),
-            rays.view_size, self._should_stop, 1, self._most_band_pixels,
-        )  # fmt: skip
-        return view, covered
+    def seen(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, FloatImage]:
+        """Nothing is filled or decided."""
+        return self._closed_form(rays, offset, lambda part: part)[:2]
 
     def decide(self, rays: RaySet, undecided: UndecidedRays) -> DecidedRays:
-        """What undecided rays show is the transformer's choice. Raises Cancelled once should_stop is true."""
+        """The closed form, too, has some say: see `bound_weights`."""
         assert self._transformer is not None
         raise_if_stopped(self._should_stop)
         ambiguous = describe_rays(rays, undecided)
@@ -158,7 +150,7 @@ class ViewSynthesis:
         return DecidedRays(pixel, colors, disparity, inpainted)
 
     def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """The results of work on all items, in their order. An item is only taken when a thread is free for it."""
+        """As many at a time as there are threads."""
         items, running = iter(items), deque[Future[Result]]()
         while True:
             running.extend(self._threads.submit(work, item) for item in islice(items, tiling.THREADS - len(running)))
@@ -170,26 +162,29 @@ class ViewSynthesis:
     def _should_stop(self) -> bool:
         return self._is_over or self._asked_to_stop()
 
-    def _view(self, rays: RaySet, offset: ViewOffset, threads: int, known: ShownBefore | None) -> RenderedView:
-        def band(first: int, last: int) -> DecidedRays | None:
-            undecided = self._render_rows(rays, offset, (first, last), view, covered, known)
-            return self.decide(rays, undecided) if undecided is not None else None
-
-        view, covered = self._begin_view(rays, offset)
-        decided = in_bands(band, rays.view_size, self._should_stop, threads, self._most_band_pixels)
-        view = self._fill(rays, offset, view, covered, threads)
-        for part in filter(None, decided):
-            at = np.unravel_index(part.pixel, rays.view_size)
-            view.colors[at], view.disparity[at], view.inpainted[at] = part.colors, part.disparity, part.inpainted
-        return view
-
-    def _begin_view(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, FloatImage]:
-        """A view to be written to, and as large an image for how much of each ray is covered."""
+    def _closed_form(
+        self,
+        rays: RaySet,
+        offset: ViewOffset,
+        use: Callable[[UndecidedRays], Result],
+        threads: int = 1,
+        known: ShownBefore | None = None,
+    ) -> tuple[RenderedView, FloatImage, list[Result]]:
+        """The view in closed form, its holes open; how much of each ray is covered (H, W); and of what bands leave to
+        the transformer, what `use` makes in its band.
+        """
         if not np.isfinite(offset).all():
             raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
         if self._transformer:
             rays.survey(self._should_stop)
-        return RenderedView.blank(rays.view_size, self._keeps_entropy), np.empty(rays.view_size, np.float32)
+        view, covered = RenderedView.blank(rays.view_size, self._keeps_entropy), np.empty(rays.view_size, np.float32)
+
+        def band(first: int, last: int) -> list[Result]:
+            undecided = self._render_rows(rays, offset, (first, last), view, covered, known)
+            return [use(undecided)] if undecided is not None else []
+
+        made = in_bands(band, rays.view_size, self._should_stop, threads, self._most_band_pixels)
+        return view, covered, [part for parts in made for part in parts]
 
     def _fill(
         self, rays: RaySet, offset: ViewOffset, view: RenderedView, covered: FloatImage, threads: int

@@ -673,6 +673,7 @@ READS_OR_TELLS = {
     "rendering.disparity_statistics": "DisparityStatistics",
     "rendering.large_views": "Part tiles_of whole",
     "rendering.ray_set": "Cells RayArrays",
+    "rendering.renderer": "Renderer",
     "rendering.resampling": "ShownRays",
     "rendering.view_synthesis": "ViewSynthesis",
     "types": "Camera ColorSpace ViewOffset GridShape ImageSize Margins image_size ignore_progress InputError",

@@ -16,7 +16,8 @@ from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.agreement import reconcile
 from iibr_core.depth.multi_view.estimate import FINDING, estimate_disparity, map_work, refine_disparity, sweep_steps
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.renderer import open_renderer
+from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress, image_size
 
@@ -95,12 +96,12 @@ def _carry(
         return ViewOffset(at.t - offsets[other].t, at.s - offsets[other].s)
 
     nearest = sorted(maps, key=lambda other: hypot(*away(other)))[:CARRIED_FROM]
-    with ViewSynthesis(should_stop) as synthesis:
+    with open_renderer(should_stop) as renderer:
         for other in nearest:
             rays = rays_of_photo(
                 encoded_from_stored(views[other]), maps[other], max(map(abs, away(other))), 0, should_stop
             )
-            seen, _ = synthesis.render_seen(rays, away(other))
+            seen, _ = renderer.seen(rays, away(other))
             np.copyto(carried, seen.disparity, where=np.isnan(carried) & ~seen.occluded)
     if np.isnan(carried).all():
         return maps[nearest[0]]

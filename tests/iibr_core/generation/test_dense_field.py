@@ -66,7 +66,7 @@ def test_a_view_is_the_mean_of_what_the_views_around_show_by_nearness_and_covera
             if max(abs(away.t), abs(away.s)) > 3:
                 continue
             rays = rays_of_photo(encoded_from_stored(colors), 2 * disparity / np.float32(3), 3, 0)
-            view, covered = synthesis.render_seen(rays, away)
+            view, covered = synthesis.seen(rays, away)
             for y, x in np.ndindex(*SIZE):
                 if not view.occluded[y, x]:
                     near = (1 - abs(away.t) / 3) * (1 - abs(away.s) / 3) + BESIDE_WEIGHT

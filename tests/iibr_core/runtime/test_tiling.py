@@ -186,7 +186,7 @@ def test_views_under_way_end_with_their_synthesis():
         began.set()
         while True:
             try:
-                synthesis.render_alone(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5))
+                synthesis.render(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5), alone=True)
             except Cancelled:
                 ended.append(True)
                 return
