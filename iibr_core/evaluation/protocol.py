@@ -31,6 +31,7 @@ from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Trial, Tria
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.generation.view_maker import quantise_as_stored
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import (
     DEFAULT_QUALITY,
     Disparity,
@@ -58,7 +59,10 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Options:
-    """source: where disparity comes from. choice: how it is estimated and refined. most_views: judged in one trial."""
+    """source: where disparity comes from. choice: how it is estimated and refined. most_views: judged in one trial.
+
+    stages: that are on, between map and view.
+    """
 
     source: DisparityFrom | Path = "auto"
     choice: DepthChoice = field(default_factory=DepthChoice)
@@ -68,6 +72,7 @@ class Options:
     lpips: Path | None = None
     with_consistency: bool = True
     with_refocus: bool = True
+    stages: Stages = ALL_STAGES
 
 
 @dataclass(frozen=True)
@@ -178,7 +183,8 @@ class _Evaluator:
         self.lpips, self.report_progress, self.should_stop = lpips, report_progress, should_stop
         self.refined = disparity.values
         if options.choice.refine > 0:
-            self.refined = refine(given.photo, disparity.values, options.choice.refine, disparity.unknown)
+            strength, unknown = options.choice.refine, disparity.unknown
+            self.refined = refine(given.photo, disparity.values, strength, unknown, should_stop, options.stages)
         self.figures: dict[str, dict[str, Figures]] = {}
         self.hole_shares: list[float] = []
         self.lines: list[LineView] = []
@@ -195,7 +201,13 @@ class _Evaluator:
         options = self.options
         with (
             trial_views(
-                trial, self.given.photo, self.refined, options.qualities, options.max_pixels, self.should_stop
+                trial,
+                self.given.photo,
+                self.refined,
+                options.qualities,
+                options.max_pixels,
+                self.should_stop,
+                options.stages,
             ) as views,
             ThreadPoolExecutor(2, thread_name_prefix="iibr-metrics") as pool,
         ):

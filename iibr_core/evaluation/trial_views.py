@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -17,8 +18,10 @@ from iibr_core.evaluation.reference_warp import WarpedView, reference_warp, refe
 from iibr_core.evaluation.trials import Trial
 from iibr_core.generation.free_views import FreeViews
 from iibr_core.generation.view_maker import ViewMaker
+from iibr_core.inpainting.background import fill_background
 from iibr_core.rendering.free_view import target_from_photo
 from iibr_core.rendering.rendered_view import RenderedView
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import Camera, FloatImage, Quality, image_size
 
 LEAST_SHARE = 0.1
@@ -62,10 +65,11 @@ class PlaneViews:
         qualities: tuple[Quality, ...],
         max_pixels: int,
         should_stop: Callable[[], bool],
+        stages: Stages,
     ) -> None:
         self.qualities, self._trial, self._photo, self._max_pixels = qualities, trial, photo, max_pixels
         self.offsets = [trial.offset(index) for index in trial.judged]
-        self.maker = ViewMaker(photo, disparity, self.offsets, qualities, should_stop)
+        self.maker = ViewMaker(photo, disparity, self.offsets, qualities, should_stop, stages=stages)
 
     def __enter__(self) -> Self:
         """Complete the ray set."""
@@ -102,6 +106,7 @@ class FreeCameraViews:
         disparity: FloatImage,
         max_pixels: int,
         should_stop: Callable[[], bool],
+        stages: Stages,
     ) -> None:
         self._trial, self._photo, self._max_pixels = trial, photo, max_pixels
         self._given = self._camera(trial.given).resized(image_size(photo))
@@ -110,7 +115,15 @@ class FreeCameraViews:
         self._least_px = LEAST_SHARE * self._scale_px / (self._given.depth_range or (1.0, 1.0))[1]
         cameras = [self._as_large_as_photo(self._camera(index)) for index in trial.judged]
         inverse_depth = np.maximum(disparity, np.float32(self._least_px)) / np.float32(self._scale_px)
-        self._views = FreeViews(photo, inverse_depth.astype(np.float32), self._given, cameras, should_stop)
+        self._views = FreeViews(
+            photo,
+            inverse_depth.astype(np.float32),
+            self._given,
+            cameras,
+            should_stop,
+            partial(fill_background, stages=stages),
+            stages=stages,
+        )
 
     def __enter__(self) -> Self:
         """Everything is there."""
@@ -155,8 +168,9 @@ def trial_views(
     qualities: Sequence[Quality],
     max_pixels: int,
     should_stop: Callable[[], bool],
+    stages: Stages = ALL_STAGES,
 ) -> TrialViews:
-    """Of the trial's scene. photo: (H, W, 3), the given view; disparity: (H, W), px per view step."""
+    """Of the trial's scene. photo: (H, W, 3), the given view; disparity: (H, W), px per view step. stages: on."""
     if trial.scene.views[trial.given].camera is None:
-        return PlaneViews(trial, photo, disparity, tuple(qualities), max_pixels, should_stop)
-    return FreeCameraViews(trial, photo, disparity, max_pixels, should_stop)
+        return PlaneViews(trial, photo, disparity, tuple(qualities), max_pixels, should_stop, stages)
+    return FreeCameraViews(trial, photo, disparity, max_pixels, should_stop, stages)

@@ -21,9 +21,11 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.free_view import render_free_view, target_from_photo
+from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import (
     Camera,
     FloatImage,
@@ -116,25 +118,27 @@ class FreeViews:
         should_stop: ShouldStop = never,
         inpainter: Inpainter | None = fill_background,
         report_progress: ReportProgress = ignore_progress,
+        stages: Stages = ALL_STAGES,
     ) -> None:
         """photo: (H, W, 3) sRGB-encoded, taken by `camera`, which is of its size. inverse_depth: (H, W), positive, 1 /
         distance from the camera's plane. cameras: all that will be asked for. inpainter: fills what they disocclude,
-        for all views alike; None leaves that to each view, which is a draft then.
+        for all views alike; None leaves that to each view, which is a draft then. stages: that are on.
 
         Raises InputError for a camera that sees nothing of the photo, Cancelled once should_stop is true.
         """
         reach = reach_of(camera, cameras, depths_of(inverse_depth))
-        self._should_stop, self._margins = should_stop, reach.margins
+        margins = reach.margins if stages.extrapolate_beyond_frame else NO_MARGINS
+        self._should_stop, self._margins = should_stop, margins
         self.scale_px = camera.focal_px[0] * reach.step
         disparity = inverse_depth * np.float32(self.scale_px)
         self._step = rounding_step(disparity)
         farthest = farthest_views(reach.outer)
-        colors, disparity = extend_beyond_frame(photo, disparity, reach.margins, should_stop)
+        colors, disparity = extend_beyond_frame(photo, disparity, margins, should_stop, stages)
         x, y = camera.centre_px
-        centre_px = x + reach.margins.left, y + reach.margins.top
+        centre_px = x + margins.left, y + margins.top
         self._camera = replace(camera, size=image_size(disparity), centre_px=centre_px)
-        outer = reach.outer if inpainter is not None else ()
-        self._rays = rays_of_photo(colors, disparity, farthest, len(outer), should_stop)
+        outer = reach.outer if inpainter is not None and stages.share_inpainted else ()
+        self._rays = rays_of_photo(colors, disparity, farthest, len(outer), should_stop, stages=stages)
         completing = render_outer_views(self._rays, outer, should_stop, inpainter or fill_background)
         for done, _ in enumerate(completing, 1):
             report_progress(done, len(outer), "what cameras may see beside the photo's surfaces")

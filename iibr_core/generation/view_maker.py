@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from types import TracebackType
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.generation.light_field import transformer_for
 from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views
 from iibr_core.generation.update_loop import render_outer_views
+from iibr_core.inpainting.background import fill_background
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer, open_renderer
 from iibr_core.rendering.view_synthesis import rays_of_photo, settled_view
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, Quality, ViewOffset
 
 
@@ -33,18 +37,28 @@ class ViewMaker:
         slots: int = 5,
         hypotheses: int = HYPOTHESES,
         every: bool = False,
+        stages: Stages = ALL_STAGES,
     ) -> None:
         """photo: (H, W, 3) sRGB-encoded. disparity: (H, W), px per view step. offsets: all that will be asked for.
 
-        slots, hypotheses, every: see ViewSynthesis.
+        slots, hypotheses, every: see ViewSynthesis. stages: that are on.
         """
         self._should_stop, self._slots = should_stop, slots
         self.outer = outer_views(offsets)
-        margins = margins_beyond_frame(disparity, self.outer)
-        self._rays = rays_of_photo(photo, disparity, farthest_views(self.outer), len(self.outer), should_stop, margins)
+        margins = margins_beyond_frame(disparity, self.outer) if stages.extrapolate_beyond_frame else NO_MARGINS
+        farthest = farthest_views(self.outer)
+        self._rays = rays_of_photo(photo, disparity, farthest, len(self.outer), should_stop, margins, stages)
+        self._inpainter = partial(fill_background, stages=stages)
         self._first: dict[ViewOffset, tuple[RenderedView, float]] = {}
         self._renderers: dict[Quality, Renderer] = {
-            quality: open_renderer(should_stop, transformer_for(quality), every, slots, hypotheses=hypotheses)
+            quality: open_renderer(
+                should_stop,
+                transformer_for(quality) if stages.ray_transformer else None,
+                every,
+                slots,
+                hypotheses=hypotheses,
+                inpainter=self._inpainter,
+            )
             for quality in qualities
         }
 
@@ -52,7 +66,8 @@ class ViewMaker:
         """Complete the ray set by what the outer views disocclude."""
         try:
             start = time.perf_counter()
-            for offset, view in render_outer_views(self._rays, self.outer, self._should_stop, slots=self._slots):
+            shared = self.outer if self._rays.stages.share_inpainted else ()
+            for offset, view in render_outer_views(self._rays, shared, self._should_stop, self._inpainter, self._slots):
                 self._first[offset] = self._settled(offset, view), 1e3 * (time.perf_counter() - start)
                 start = time.perf_counter()
         except BaseException:

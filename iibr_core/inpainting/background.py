@@ -25,6 +25,7 @@ from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.inpainting.rim_lines import find_lines, line_weight, mixed_beside
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
@@ -47,16 +48,17 @@ def fill_background(
     offset: ViewOffset,
     should_stop: ShouldStop = never,
     threads: int = 1,
+    stages: Stages = ALL_STAGES,
 ) -> None:
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
     photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
     there, weighted by 1 / distance, more along the lines that run there. The colour is their mean, smoother the farther
     away they are, and gets their surface's fine texture. The disparity is that of one surface, the one with the most
-    weight: a mean of several would lie on none. A view that is all hole stays as it is. Raises Cancelled once
-    should_stop is true.
+    weight: a mean of several would lie on none. A view that is all hole stays as it is. stages: that are on. Raises
+    Cancelled once should_stop is true.
     """
-    _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), should_stop, threads)
+    _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), should_stop, threads, stages)
 
 
 def continue_farthest(
@@ -65,13 +67,14 @@ def continue_farthest(
     hole: NDArray[np.bool_],
     farthest_views: float,
     should_stop: ShouldStop = never,
+    stages: Stages = ALL_STAGES,
 ) -> None:
     """The same in a picture of which nobody knows what the photo hides there: the farthest surface around goes on.
 
-    farthest_views: surfaces are one that part by less than SURFACE_PX so many view steps away.
+    farthest_views: surfaces are one that part by less than SURFACE_PX so many view steps away. stages: that are on.
     """
     nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
-    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, threads=1)
+    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, 1, stages)
 
 
 def goes_on_in_front(
@@ -106,6 +109,7 @@ def _fill_view(
     parallax: float,
     should_stop: ShouldStop,
     threads: int,
+    stages: Stages,
 ) -> None:
     """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
     one_surface = SURFACE_PX / max(parallax, 1e-9)
@@ -113,7 +117,7 @@ def _fill_view(
     known = nearest_known(hole, pixels, should_stop, threads)
     rims, number = rims_of_holes(known, image_size(hole), should_stop, threads)
     pure = np.where(mixed_beside(hole), np.float32(np.nan), disparity)
-    lines = np.empty((len(rims), 2), np.float32)
+    lines = np.zeros((len(rims), 2), np.float32)
     reach = np.empty(len(pixels), np.float32)
     changed = np.empty((len(pixels), 3), np.float32)
 
@@ -132,15 +136,21 @@ def _fill_view(
             colors, disparity, pixels[part], known[part], number, lines,
             photo_disparity, offset.s, offset.t, one_surface, reach[part],
         ),
-        lambda part: _agree(disparity, hole, pixels[part], changed[part]),
-        lambda part: _write_disparity(changed[part], pixels[part], disparity),
-        *chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX),
     ]  # fmt: skip
-    run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
+    if stages.median_in_gaps:
+        steps += [
+            lambda part: _agree(disparity, hole, pixels[part], changed[part]),
+            lambda part: _write_disparity(changed[part], pixels[part], disparity),
+        ]
+    if stages.smooth_gaps:
+        steps += chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX)
+    if stages.lines_into_gaps:
+        run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
     for step in steps:
         run(step, len(pixels))
-    number_pixels(pixels, number)
-    copy_exemplars(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
+    if stages.synthesise_patches:
+        number_pixels(pixels, number)
+        copy_exemplars(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
 
 
 def background_inpainter() -> Inpainter:

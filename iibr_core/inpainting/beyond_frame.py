@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.rim_lines import find_lines, line_weight
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, ImageSize, Margins, image_size
 
 BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
@@ -36,10 +37,11 @@ def extend_beyond_frame(
     disparity: FloatImage,
     margins: Margins,
     should_stop: ShouldStop = never,
+    stages: Stages = ALL_STAGES,
 ) -> tuple[FloatImage, FloatImage]:
     """The photo's colors (H, W, 3) and disparity (H, W) in the middle of larger ones, which are filled around it.
 
-    margins: so many pixels on each side. Raises Cancelled once should_stop is true.
+    margins: so many pixels on each side. stages: that are on. Raises Cancelled once should_stop is true.
     """
     size = image_size(disparity)
     if not any(margins):
@@ -53,7 +55,8 @@ def extend_beyond_frame(
 
     def band(first: int, last: int) -> None:
         _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
-        _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
+        if stages.lines_beyond_frame:
+            _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
 
     in_bands(band, larger, should_stop)
     return grown, surfaces

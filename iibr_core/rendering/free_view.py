@@ -93,7 +93,7 @@ def render_free_view(
 
     in_bands(band, size, should_stop, most_pixels=MOST_BAND_PIXELS // SAMPLES**2)
     if view.occluded.any():
-        continue_farthest(view.colors, view.disparity, view.occluded, rays.farthest_views, should_stop)
+        continue_farthest(view.colors, view.disparity, view.occluded, rays.farthest_views, should_stop, rays.stages)
     return view
 
 

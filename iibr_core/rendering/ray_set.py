@@ -17,6 +17,7 @@ from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, SOFT, Dis
 from iibr_core.rendering.joined_rays import BELOW, RIGHT, join_rays, joined_either_way
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
 CELL_PX = 4
@@ -74,12 +75,14 @@ class RaySet:
         farthest_views: float = 1.0,
         margins: Margins = NO_MARGINS,
         photo_detail: FloatImage | None = None,
+        stages: Stages = ALL_STAGES,
     ) -> None:
         """size: of the images, margins: of them around every view. surface_step: disparities closer than this are one
         surface for look-ups. farthest_views: the largest view offset that will be rendered. photo_detail: see there.
+        stages: that are on, for all who make views of the set.
         """
         self._count, self._photo_images = 0, 0
-        self._margins = margins
+        self._margins, self.stages = margins, stages
         self._surface_step = surface_step
         self._farthest_views = farthest_views
         self._photo_detail = photo_detail
@@ -119,11 +122,11 @@ class RaySet:
             )
         k, joined = self._count, np.zeros(self.size, np.uint8)
         room, cells = self._room, self._cells_room
-        if k == 0:
+        if k == 0 and self.stages.connect_slopes:
             least_edge = EDGE_PARALLAX_PX / max(self._farthest_views, 1e-9)
             self._joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
             self._steep = _any_in_cells(joined_either_way(joined))
-        elif any(offset):
+        if k > 0 and any(offset) and self.stages.leave_out_in_front:
             step = IN_FRONT_PX / max(self._farthest_views, 1e-9)
             coverage = coverage.copy()
             _leave_out_in_front(disparity, room.disparity[0], self._margins, *offset, step, coverage)

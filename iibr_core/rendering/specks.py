@@ -55,6 +55,8 @@ def without_specks(
 
     disparity, inpainted (H, W): as in `RenderedView`. threads: None for all. Raises Cancelled once should_stop is true.
     """
+    if not rays.stages.remove_flying_pixels:
+        return colors
     detail, edge_level = rays.photo_detail, rays.arrays.edge_level[0]
     limit = min(round(GAP_PX / OWN_SURFACE_PX) * int(rays.edge_limits(offset)[0]), HIGHEST_LEVEL - 1)
     # Kernels know no half precision.

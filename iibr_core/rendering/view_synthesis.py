@@ -31,6 +31,7 @@ from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
 
 EDGE_PX = 1.0
@@ -49,18 +50,25 @@ def rays_of_photo(
     more: int,
     should_stop: ShouldStop = never,
     margins: Margins = NO_MARGINS,
+    stages: Stages = ALL_STAGES,
 ) -> RaySet:
     """The ray set of a photo: its own rays, and the fringe of its mixed pixels, with room for `more` images.
 
     farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
-    margins: so far beyond its frame the photo is continued. Raises Cancelled once should_stop is true.
+    margins: so far beyond its frame the photo is continued. stages: that are on, here and in all views of these rays.
+    Raises Cancelled once should_stop is true.
     """
-    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop)
+    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop, stages)
     centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
-    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
     detail = measure_detail(colors, should_stop)
-    rays = RaySet(2 + more, image_size(disparity), OWN_SURFACE_PX / farthest_views, farthest_views, margins, detail)
-    rays.add(centre, own, disparity, np.ones_like(disparity), should_stop)
+    size, surface_step = image_size(disparity), OWN_SURFACE_PX / farthest_views
+    rays = RaySet(2 + more, size, surface_step, farthest_views, margins, detail, stages)
+    everywhere = np.ones_like(disparity)
+    if not stages.split_mixed_pixels:
+        rays.add(centre, colors, disparity, everywhere, should_stop)
+        return rays
+    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
+    rays.add(centre, own, disparity, everywhere, should_stop)
     if coverage.any():
         rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
     return rays
@@ -193,11 +201,11 @@ class ViewSynthesis:
         comes over what was filled there. So no rim that two surfaces share is a seed for what is filled, either.
         """
         colors, disparity = view.colors.reshape(-1, 3), view.disparity.reshape(-1)
-        part = np.flatnonzero((covered < WHOLE) & (covered > 0))
+        part = np.flatnonzero((covered < _whole(rays)) & (covered > 0))
         part = part[_is_within_margins(rays, part, disparity[part], offset) | view.occluded.reshape(-1)[part]]
         hole = view.occluded.copy()
         hole.reshape(-1)[part] = True
-        if self._reopens_holes:
+        if self._reopens_holes and rays.stages.reopen_holes:
             hole |= self._reopened(rays, offset, view, hole, threads)
         if not hole.any():
             return view
@@ -262,7 +270,7 @@ class ViewSynthesis:
         raise_if_stopped(self._should_stop)
         undecided = None
         if self._transformer:
-            decided = share < WHOLE
+            decided = share < _whole(rays)
             decided[:, :left] = decided[:, right:] = True
             undecided = find_undecided_rays(
                 rays, candidates, weights, found, (above, above + last - first), self._every, self._hypotheses, decided
@@ -280,6 +288,11 @@ class ViewSynthesis:
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
         return undecided
+
+
+def _whole(rays: RaySet) -> float:
+    """Rays covered less show in part what lies behind them."""
+    return WHOLE if rays.stages.composite_partial_coverage else 0.0
 
 
 def _changed_pixels(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], known: int) -> NDArray[np.bool_]:

@@ -19,6 +19,7 @@ from iibr_core.depth.edges.rims import settle_rims
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, InputError, image_size
 
 LEAST_EDGE = 0.03
@@ -63,12 +64,13 @@ def refine(
     strength: float = 1.0,
     unknown: NDArray[np.bool_] | None = None,
     should_stop: ShouldStop = never,
+    stages: Stages = ALL_STAGES,
 ) -> FloatImage:
     """The disparity with its soft edges snapped to the photo's edges; no values between foreground and background.
 
     photo: (H, W, 3), sRGB-encoded. disparity: (H, W), any unit in which larger is closer; what is not finite is filled
     by what looks like it beside it. strength: 0 changes nothing, 1 makes steps, between them the slopes are shortened.
-    unknown: (H, W), what was filled like that before; None: nothing.
+    unknown: (H, W), what was filled like that before; None: nothing. stages: that are on.
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
     gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
     in the rims of depth edges (`settle_rims`).
@@ -84,21 +86,28 @@ def refine(
     if strength == 0:
         return values
     least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
-    sharp, soft = _sharpen(colors, values, least_edge, softness, should_stop)
+    sharp, soft = _sharpen(colors, values, least_edge, softness, should_stop, stages)
     if not least_edge > 0:
         return sharp
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
-    settled = settle_rims(colors, sharp, least_edge, filled, soft, should_stop)
+    settled = settle_rims(colors, sharp, least_edge, filled, soft, should_stop, stages)
     # Rims, too, go so far only.
     return settled if strength == 1 else sharp + np.float32(strength) * (settled - sharp)
 
 
 def _sharpen(
-    colors: FloatImage, values: FloatImage, least_edge: float, softness: float, should_stop: ShouldStop
+    colors: FloatImage,
+    values: FloatImage,
+    least_edge: float,
+    softness: float,
+    should_stop: ShouldStop,
+    stages: Stages,
 ) -> tuple[FloatImage, NDArray[np.bool_] | None]:
     """The map with its soft edges snapped to the photo's, its bits where nothing says that it is blurred; and where
     that is said (H, W), None: nowhere.
     """
+    if not stages.sharpen_soft_edges:
+        return values, None
     blur = measure_edge_blur(colors, values, should_stop)
     if not blur.sigma_px.any():
         return values, None
@@ -109,7 +118,7 @@ def _sharpen(
 
     in_bands(band, image_size(values), should_stop)
     # Slopes that are only shortened give no map that this could be the blur of.
-    if softness == FINE_STRENGTH:
+    if stages.fit_to_blur and softness == FINE_STRENGTH:
         refined = fit_to_blur(colors, values, refined, blur, least_edge, should_stop)
     return refined, blur.at_pixels(blur.sigma_px > 0, image_size(values))
 

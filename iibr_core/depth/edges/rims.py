@@ -14,6 +14,7 @@ from iibr_core.depth.edges.soft_outlines import widen_fronts
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, image_size
 
 PLATEAU_SHARE = 0.15
@@ -46,11 +47,12 @@ def settle_rims(
     unknown: NDArray[np.bool_],
     soft: NDArray[np.bool_] | None = None,
     should_stop: ShouldStop = never,
+    stages: Stages = ALL_STAGES,
 ) -> FloatImage:
     """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
-    soft: (H, W), where the map was soft before it was sharpened; None: nowhere.
+    soft: (H, W), where the map was soft before it was sharpened; None: nowhere. stages: that are on.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
     all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then pixels of
     rims change sides where the colours say so, and fronts grow over outlines that are soft in the photo. An exact map,
@@ -66,12 +68,14 @@ def settle_rims(
     if is_exact and not is_left:
         return values
     settled = values
-    if clear > least or is_left:
+    if stages.refill_between_surfaces and (clear > least or is_left):
         between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
         known = np.where(between | unknown, np.float32(np.nan), values)
         settled = fill_disparity_by_color(colors, known, should_stop)
-    settled = choose_sides(colors, settled, between | unknown, least_edge, should_stop)
-    settled = widen_fronts(colors, settled, OUTLINE_EDGES * least_edge, should_stop)
+    if stages.label_edge_bands:
+        settled = choose_sides(colors, settled, between | unknown, least_edge, should_stop)
+    if stages.dilate_foreground:
+        settled = widen_fronts(colors, settled, OUTLINE_EDGES * least_edge, should_stop)
     # Where the map was not soft, it is exact.
     return settled if soft is None or not is_exact else np.where(soft, settled, values)
 
