@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from iibr_core.interface.judging import Comparison, compare, evaluate
     from iibr_core.interface.scenes import Scene, estimate_depth, from_arrays, open
     from iibr_core.runtime.tiling import Cancelled
+    from iibr_core.stages import Stages
     from iibr_core.types import InputError
 else:
     __getattr__ = offered_by(__file__)
 
 __all__ = [
-    "FORMATS", "Cancelled", "Comparison", "InputError", "LightField", "Scene", "View", "compare", "estimate_depth",
-    "evaluate", "from_arrays", "open",
+    "FORMATS", "Cancelled", "Comparison", "InputError", "LightField", "Scene", "Stages", "View", "compare",
+    "estimate_depth", "evaluate", "from_arrays", "open",
 ]  # fmt: skip
 
 

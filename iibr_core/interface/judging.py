@@ -14,6 +14,7 @@ from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.interface.pictures import encoded
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import InputError, ReportProgress, ignore_progress
 
 
@@ -42,13 +43,14 @@ def evaluate(
     folder: str | Path,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
+    stages: Stages = ALL_STAGES,
     **options: Any,
 ) -> list[protocol.EvaluationResult]:
     """Judge views against those of a data set: a folder of one scene, or of several, as `iibr evaluate` takes it.
 
-    options: fields of `iibr_core.evaluation.protocol.Options`. Raises InputError, and Cancelled once should_stop is
-    true.
+    stages: between map and view, that are on. options: other fields of `iibr_core.evaluation.protocol.Options`. Raises
+    InputError, and Cancelled once should_stop is true.
     """
-    wanted = protocol.Options(**options)
+    wanted = protocol.Options(stages=stages, **options)
     scenes = find_scenes(Path(folder))
     return [one for scene in scenes for one in protocol.evaluate(scene, wanted, report_progress, should_stop)]

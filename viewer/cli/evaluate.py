@@ -13,12 +13,14 @@ import typer
 from iibr_core.depth import DepthChoice
 from iibr_core.formats import is_file
 from iibr_core.runtime import require_extra
+from iibr_core.stages import STAGE_NAMES, stages_without
 from iibr_core.types import InputError, Quality, ReportProgress
 from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, inputs_of_command, quality_from_text, require_model
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
     from iibr_core.evaluation import DisparityFrom
+    from iibr_core.stages import Stages
 
 
 def evaluate(
@@ -62,12 +64,21 @@ def evaluate(
             metavar="DIR", help="LPIPS too: its alex.pth and torchvision's alexnet-*.pth.", show_default=False
         ),
     ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="STAGE",
+            help=f"Leave out a stage between map and view; may be given several times: {', '.join(STAGE_NAMES)}.",
+            show_default=False,
+        ),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Judge views against data sets whose true views are known, beside a plain warp and beside doing nothing.
 
     Example: iibr evaluate hci/dino hci/cotton --out report
     """
+    stages = _stages_without(without or [])
     require_extra("evaluate", "scipy", "skimage", "jinja2", "flip_evaluator")
     if lpips is not None:
         require_extra("train", "torch")
@@ -84,7 +95,9 @@ def evaluate(
     chosen: tuple[Quality, ...] = tuple(dict.fromkeys(quality)) if quality else QUALITIES
     choice = DepthChoice(model=depth_model, refine=refine)
     require_model(choice)
-    options = Options(_disparity_source(disparity), choice, chosen, max_pixels or DEFAULT_MAX_PIXELS, views, lpips)
+    options = Options(
+        _disparity_source(disparity), choice, chosen, max_pixels or DEFAULT_MAX_PIXELS, views, lpips, stages=stages
+    )
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
     results = []
     with show_progress("reading") as show:
@@ -101,6 +114,14 @@ def evaluate(
 def _part_of(show: ReportProgress, before: int, total: int) -> ReportProgress:
     """Reports the work on a scene as what it is of that on all."""
     return lambda done, of_scene, doing: show(before + done / of_scene, total, doing)
+
+
+def _stages_without(names: list[str]) -> Stages:
+    """Raises InputError, which names the option."""
+    try:
+        return stages_without(names)
+    except InputError as error:
+        raise InputError(f"--without {error}") from None
 
 
 def _disparity_source(text: str) -> DisparityFrom | Path:

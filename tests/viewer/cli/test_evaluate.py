@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.stages import STAGE_NAMES
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, write_grid, write_hci
 from tests.viewer.cli.test_cli import run, run_apart
 
@@ -41,6 +42,27 @@ def test_evaluate_judges_all_scenes_of_a_folder(
     assert all(re.search(r"identity [\d.]+, reference warp [\d.]+, fast [\d.]+ dB$", line) for line in lines)
     assert sorted(path.name for path in out.iterdir()) == REPORT
     assert f"iibr evaluate {data}" in (out / "report.md").read_text()
+
+
+def test_stages_are_left_out(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path
+) -> None:
+    words = ("evaluate", data / "square", "--views", 1, "--quality", "fast", "--refine", "off", "--out")
+    without = ("--without", "smooth-gaps", "--without", "synthesise-patches", "--without", "split-mixed-pixels")
+    told = []
+    for number, more in enumerate(((), without)):
+        assert run(monkeypatch, *words, tmp_path / str(number), *more) == 0
+        told.append(re.search(r"fast ([\d.]+) dB", capsys.readouterr().out))
+    assert all(told)
+    assert (tmp_path / "0" / "report.json").read_text() != (tmp_path / "1" / "report.json").read_text()
+    assert "--without smooth-gaps" in (tmp_path / "1" / "report.md").read_text()
+
+
+def test_help_lists_the_stages(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert run(monkeypatch, "evaluate", "--help") == 0
+    text = re.sub(r"[\s│]+", "", capsys.readouterr().out)
+    assert all(name in text for name in STAGE_NAMES)
 
 
 def test_a_report_that_is_there_is_replaced_only_by_force(
@@ -79,6 +101,7 @@ def test_several_qualities_and_a_disparity_of_ones_own(
         (("evaluate", "{data}", "--out", "{dir}/o", "--disparity", "{dir}/file"), "file"),
         (("evaluate", "{data}", "--out", "{dir}/o", "--quality", "best"), "--quality"),
         (("evaluate", "{data}", "--out", "{dir}/o", "--views", "0"), "--views"),
+        (("evaluate", "{data}", "--out", "{dir}/o", "--without", "gaps"), "smooth-gaps"),
         (("evaluate", "{data}", "--out", "{dir}/o", "--lpips", "{dir}/empty"), "alexnet"),
         (("evaluate", "{dir}/broken", "--out", "{dir}/o"), "v00_u01.png"),
         (("evaluate", "{data}"), "--out"),
