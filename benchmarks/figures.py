@@ -67,12 +67,6 @@ FIGURES = (
     Figure(("speed.md", "speed.svg"), "benchmarks.speed --data DATA --repeats 2 --out OUT", 15, ("DATA",)),
     Figure(("depth.md",), "benchmarks.depth --data DATA", 4, ("DATA",)),
     Figure(("stages.md",), "benchmarks.stages --data DATA", 20, ("DATA",)),
-    Figure(
-        ("tables/ablations.md",),
-        "benchmarks.tables.ablations --data DATA --scenes 2 --out OUT/ablations.md",
-        5,
-        ("DATA",),
-    ),
     Figure(("free_views.md#poses",), "benchmarks.free_views --scenes 8 --size 384x288 --seed 7", 2),
     Figure(("figures.md#against-warp",), "benchmarks.against_warp --data DATA --repeats 2", 2, ("DATA",)),
     Figure(("figures.md#window",), "benchmarks.window", 1, ("X",)),

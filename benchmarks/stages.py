@@ -16,7 +16,7 @@ import functools
 import math
 import multiprocessing
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -35,6 +35,7 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.trials import trial_input, trials_of
 from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur, quantise
 from iibr_core.training.scenes.random_scene import random_scene, render
@@ -51,34 +52,44 @@ LEAST_WHOLE_DB, LEAST_EDGE_DB, MOST_LOST_DB = 0.05, 0.1, 0.05
 
 Mask = NDArray[np.bool_]
 Views = dict[ViewOffset, FloatImage]
+Way = Callable[[FloatImage, FloatImage, Mask | None, Views, Sequence[ViewOffset]], Views]
+"""As `make_views`."""
+Judged = tuple[str, dict[str, NDArray[np.float64]]]
+"""A kind of map; by what was left out, the figures of a cell."""
 
 
 def main() -> None:
     parser = parser_of(__doc__, "out", "only", data={"required": True})
     parser.add_argument("--drawn", type=int, default=10)
     options = parser.parse_args()
-    emit(
-        report(options.data, options.drawn, [name for name in STAGE_NAMES if is_wanted(name, options.only)]),
-        options.out,
-    )
+    names = [name for name in STAGE_NAMES if is_wanted(name, options.only)]
+    ways = {name: functools.partial(make_views, stages=stages_without([name])) for name in names}
+    emit(report("What each stage is worth", "benchmarks.stages", judge(options.data, options.drawn, ways)), options.out)
 
 
-def report(data: Path, drawn_scenes: int, stages: Sequence[str]) -> Iterator[str]:
-    """One row a stage: what changes when it is left out, the mean of each kind."""
-    jobs = [functools.partial(_judge_drawn, seed, stages) for seed in range(FIRST_SEED, FIRST_SEED + drawn_scenes)]
-    jobs += [functools.partial(_judge_real, data, place, stages) for place in range(len(list(find_scenes(data))))]
+def judge(data: Path, drawn_scenes: int, ways: Mapping[str, Way]) -> list[Judged]:
+    """Every map of every scene, by the default ("nothing") and by other ways of making views."""
+    every = {"nothing": make_views, **ways}
+    jobs = [functools.partial(_judge_drawn, seed, every) for seed in range(FIRST_SEED, FIRST_SEED + drawn_scenes)]
+    jobs += [functools.partial(_judge_real, data, place, every) for place in range(len(list(find_scenes(data))))]
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
-        found = [of_map for of_scene in pool.map(_call, jobs) for of_map in of_scene]
+        return [of_map for of_scene in pool.map(_call, jobs) for of_map in of_scene]
+
+
+def report(words: str, module: str, found: Sequence[Judged], has_verdict: bool = True) -> Iterator[str]:
+    """One row a way of making views: what changes against the default, the mean of each kind."""
     counts = {kind: sum(one[0] == kind for one in found) for kind in KINDS}
     maps = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    yield title("What each stage is worth", "benchmarks.stages", f"Maps: {maps}.")
+    yield title(words, module, f"Maps: {maps}.")
     yield (__doc__ or "").split("\n\n")[2]
     yield "Each cell: whole views, edges, gaps (dB); flying pixels; texture; processor time, as a share. Negative"
-    yield "decibels: the stage gains so much. The first row holds the figures themselves, seconds last.\n"
-    yield head("left out", *(kind for kind in KINDS if counts[kind]), "earns its place")
-    for stage in ("nothing", *stages):
-        means = {kind: _mean_change(found, kind, stage) for kind in KINDS if counts[kind]}
-        yield row(stage, *map(_cell, means.values()), "" if stage == "nothing" else holds(earns(means.values())))
+    yield "decibels: what is left out gains so much. The first row holds the figures themselves, seconds last.\n"
+    verdict = ("earns its place",) if has_verdict else ()
+    yield head("left out", *(kind for kind in KINDS if counts[kind]), *verdict)
+    for name in found[0][1]:
+        means = {kind: _mean_change(found, kind, name) for kind in KINDS if counts[kind]}
+        stays = "" if name == "nothing" else holds(earns(means.values()))
+        yield row(name, *map(_cell, means.values()), *([stays] if has_verdict else []))
 
 
 def earns(means: Iterable[NDArray[np.float64]]) -> bool:
@@ -86,10 +97,6 @@ def earns(means: Iterable[NDArray[np.float64]]) -> bool:
     of_kinds = list(means)
     gains = any(mean[0] <= -LEAST_WHOLE_DB or mean[1] <= -LEAST_EDGE_DB for mean in of_kinds)
     return gains and not any(mean[0] > MOST_LOST_DB for mean in of_kinds)
-
-
-Judged = tuple[str, dict[str, NDArray[np.float64]]]
-"""A kind of map; by what was left out, the figures of a cell."""
 
 
 def _call(job: Callable[[], list[Judged]]) -> list[Judged]:
@@ -116,7 +123,7 @@ def _cell(mean: NDArray[np.float64]) -> str:
     return f"{whole:+.2f}, {edges:+.2f}, {gaps:+.2f}; {flying:+.1f}; {texture:+.2f}; {seconds:+.2f}"
 
 
-def _judge_drawn(seed: int, stages: Sequence[str]) -> list[Judged]:
+def _judge_drawn(seed: int, ways: Mapping[str, Way]) -> list[Judged]:
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, SIZE, float(np.exp(rng.uniform(*np.log(DISPARITIES_PX)))))
     photo, exact = render(scene, SIZE, ViewOffset(0, 0))
@@ -126,10 +133,10 @@ def _judge_drawn(seed: int, stages: Sequence[str]) -> list[Judged]:
     measured = estimate_disparity(views, offsets, 0, (float(exact.min()) - 0.2, float(exact.max()) + 0.2))
     maps = {"exact": exact, "measured": measured.astype(np.float32), **_worse(exact, seed)}
     field = [FIELD.offset(row, column) for row, column in np.ndindex(*FIELD)]
-    return [(kind, _figures(photo, exact, values, None, truth, field, stages)) for kind, values in maps.items()]
+    return [(kind, _figures(photo, exact, values, None, truth, field, ways)) for kind, values in maps.items()]
 
 
-def _judge_real(data: Path, place: int, stages: Sequence[str]) -> list[Judged]:
+def _judge_real(data: Path, place: int, ways: Mapping[str, Way]) -> list[Judged]:
     scene = list(find_scenes(data))[place]
     trial = trials_of(scene, "auto", MOST_JUDGED)[0]
     given = trial_input(trial, "auto", DepthChoice(), MOST_PIXELS)
@@ -137,7 +144,7 @@ def _judge_real(data: Path, place: int, stages: Sequence[str]) -> list[Judged]:
     own, known = given.maps[0], "exact" if given.maps[0].unknown is None else "measured"
     maps = {known: (own.values, own.unknown), **{kind: (v, None) for kind, v in _worse(own.values, place).items()}}
     return [
-        (kind, _figures(given.photo, own.values, values, unknown, truth, list(truth), stages))
+        (kind, _figures(given.photo, own.values, values, unknown, truth, list(truth), ways))
         for kind, (values, unknown) in maps.items()
     ]
 
@@ -174,30 +181,32 @@ def _figures(
     unknown: Mask | None,
     truth: Views,
     field: Sequence[ViewOffset],
-    stages: Sequence[str],
+    ways: Mapping[str, Way],
 ) -> dict[str, NDArray[np.float64]]:
     """By what is left out. better: the map that tells where gaps are, whatever was given."""
     holes = {offset: reference_warp(photo, better, offset).hole for offset in truth}
-    _make(photo, given, unknown, truth, field, ALL_STAGES)  # compiles
+    make_views(photo, given, unknown, truth, field)  # compiles
     found = {}
-    for stage in ("nothing", *stages):
+    for name, make in ways.items():
         begun = time.process_time()
-        made = _make(photo, given, unknown, truth, field, stages_without([stage] if stage in STAGE_NAMES else []))
+        made = make(photo, given, unknown, truth, field)
         seconds = time.process_time() - begun
-        found[stage] = np.append(_mean_known([_judge(made[at], truth[at], holes[at]) for at in truth]), seconds)
+        found[name] = np.append(_mean_known([_judge(made[at], truth[at], holes[at]) for at in truth]), seconds)
     return found
 
 
-def _make(
+def make_views(
     photo: FloatImage,
     given: FloatImage,
     unknown: Mask | None,
     truth: Views,
     field: Sequence[ViewOffset],
-    stages: Stages,
+    stages: Stages = ALL_STAGES,
+    hypotheses: int = HYPOTHESES,
 ) -> Views:
+    """Those that are judged, at balanced quality, as they are stored. field: all views of it."""
     disparity = refine(photo, given, 1.0, unknown, stages=stages)
-    with ViewMaker(photo, disparity, field, ("balanced",), stages=stages) as maker:
+    with ViewMaker(photo, disparity, field, ("balanced",), hypotheses=hypotheses, stages=stages) as maker:
         colors = {offset: maker.view("balanced", offset).colors for offset in truth}
         return {offset: quantise_as_stored(made) for offset, made in colors.items()}
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import pickle
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
-from benchmarks import plucker
-from benchmarks.speed.variants import BenchScene, evaluated_views
-from benchmarks.tables import trained_variants
-from benchmarks.tables.ablations import DEFAULT, trained_switch
-from benchmarks.tables.trained_variants import (
+from benchmarks import plucker, trained_variants
+from benchmarks.harness.scenes import BenchScene
+from benchmarks.stages import make_views
+from benchmarks.trained_variants import (
     COORDINATES_ONLY,
     TRAINED_VARIANTS,
     all_features,
@@ -50,13 +51,12 @@ def scene() -> BenchScene:
 
 
 def test_every_variant_is_trained_and_asked_in_its_own_way(weights: Path, scene: BenchScene) -> None:
-    default = evaluated_views(DEFAULT.variant, scene)
-    seen = []
+    judged = scene.photo, scene.disparity, None, scene.truth, scene.field
+    default, seen = make_views(*judged), []
     for variant in TRAINED_VARIANTS:
-        switch = trained_switch(variant, weights)
-        with switch.applied():
-            seen += evaluated_views(switch.variant, scene).values()
-    after = evaluated_views(DEFAULT.variant, scene)
+        make = pickle.loads(pickle.dumps(partial(variant.make, weights)))
+        seen += make(*judged).values()
+    after = make_views(*judged)
     assert all(np.isfinite(view).all() for view in seen)
     assert all(not np.array_equal(one, next(iter(default.values()))) for one in seen)
     np.testing.assert_array_equal(next(iter(after.values())), next(iter(default.values())))

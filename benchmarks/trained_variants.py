@@ -1,30 +1,35 @@
 """Ray transformers that lack one thing each, trained as long as the shipped one: 20 minutes of one core in all.
 
-    python -m benchmarks.tables.trained_variants FOLDER [--steps 2500]
+    python -m benchmarks.trained_variants FOLDER --data DATA [--out docs/trained.md] [--drawn 4] [--steps 2500]
 
-Weights that FOLDER has are left alone, a training that was stopped goes on. What a variant leaves out of its batches is
-left out where it is judged, too: `benchmarks.tables.ablations --weights FOLDER`.
+Weights that FOLDER has are left alone, a training that was stopped goes on. All are judged as `benchmarks.stages`
+judges, beside the shipped one; what a variant leaves out of its batches is left out there, too.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import torch
 
 from benchmarks import plucker
+from benchmarks.harness.report import emit, parser_of, start
+from benchmarks.stages import Views, judge, make_views, report
 from iibr_core.formats.weights import save_weights
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
 from iibr_core.rendering.ambiguous_rays import PLAIN, UndecidedRays
 from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays, describe_rays
 from iibr_core.rendering.ray_set import RaySet
+from iibr_core.stages import Stages
 from iibr_core.training.batches import AS_RENDERED, RayChoice, training_batch
 from iibr_core.training.losses import LossWeights
 from iibr_core.training.run_files import checkpoint_path
@@ -105,6 +110,14 @@ class TrainedVariant:
             "rendering.view_synthesis.describe_rays": describe,
         }
 
+    def make(self, folder: Path, *scene: Any) -> Views:
+        """Views by this T, asked in its own way. scene: as `benchmarks.stages.make_views` takes it."""
+        stages = Stages(share_inpainted=self.choice.inpainted)
+        with ExitStack() as until_done:
+            for name, part in self.swaps(folder).items():
+                until_done.enter_context(patch(f"iibr_core.{name}", part))
+            return make_views(*scene, stages=stages, hypotheses=self.choice.hypotheses)
+
 
 TRAINED_VARIANTS = (
     TrainedVariant("T trained again"),
@@ -154,12 +167,16 @@ def _train_together(choice: RayChoice, variants: Sequence[TrainedVariant], folde
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "out", data={"required": True})
     parser.add_argument("folder", type=Path)
     parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument("--drawn", type=int, default=4)
     options = parser.parse_args()
     train_missing(options.folder, options.steps)
+    ways = {variant.name: partial(variant.make, options.folder) for variant in TRAINED_VARIANTS}
+    words, found = "What each part of the ray transformer is worth", judge(options.data, options.drawn, ways)
+    emit(report(words, "benchmarks.trained_variants", found, has_verdict=False), options.out)
 
 
 if __name__ == "__main__":
-    main()
+    start("benchmarks.trained_variants", main)
