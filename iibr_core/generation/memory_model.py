@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from iibr_core.generation.outer_views import outer_views_of_grid
-from iibr_core.rendering.ambiguous_rays import FEATURES, HYPOTHESES
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.hypotheses import FEATURES
 from iibr_core.runtime.machine import (
     MAPPED_BYTES,
     MOST_USUAL_SHARE,
