@@ -36,7 +36,7 @@ from viewer.model.state.depth_editing import Paint
 from viewer.model.state.exporting import ExportTask
 from viewer.model.state.folder import ShowFilmstrip, StepPhoto
 from viewer.model.state.inspection import OVERLAYS, Compare, KeepState, SetOverlay, ShowEpis, ShowGrid
-from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture, SetGloss
+from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture, SetOptics
 from viewer.model.state.tasks import SaveTask
 from viewer.model.zoom import SetZoom, Zoom
 
@@ -156,7 +156,7 @@ ASKED: dict[str, Callable[[User], Sequence[Action]]] = {
     "epis": lambda u: [ShowEpis(not u.app.state.inspection.shows_epis)],
     "all views": lambda u: [ShowGrid(not u.app.state.inspection.shows_grid)],
     "compare": lambda u: (KeepState(), Compare(u.random.choice((None, "photo", "quality", "kept", "difference")))),
-    "gloss": lambda u: [SetGloss(u.random.choice((None, Gloss(roughness=u.between(0.1, 0.6)))))],
+    "gloss": lambda u: [SetOptics("gloss", u.random.choice((None, Gloss(roughness=u.between(0.1, 0.6)))))],
 }
 """What is one frame."""
 DONE = {f.__name__: f for f in (drag, brush, turn_camera, save, export, switch, change_grid)}
@@ -170,7 +170,7 @@ def go_back(user: User) -> None:
     assert source is not None
     first = replace(source, path=str(Path(source.path).with_name("photo0.png")), grid=None)
     user.do(SetOverlay(None), Compare(None), ShowEpis(False), ShowGrid(False), SetZoom(None))
-    user.open(ResetOptics(), SetGloss(None), OpenPath(first))
+    user.open(ResetOptics(), SetOptics("gloss", None), OpenPath(first))
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import DismissNotices, SetHover
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetOverlay, ShowEpis, ShowValues
-from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetApertureShape, SetFocus
+from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.preferences import Section
 
 SIZE = 1200, 760
@@ -44,7 +44,9 @@ def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
     viewer.do(MoveEye(ViewOffset(0.5, -1.5)))
     pointed = hover_at(viewer, *TANK)
     assert pointed.disparity is not None
-    viewer.do(SetFocus(pointed.disparity), SetAperture(6.0), SetApertureShape(ApertureShape("polygon", blades=7)))
+    viewer.do(
+        SetFocus(pointed.disparity), SetAperture(6.0), SetOptics("aperture_shape", ApertureShape("polygon", blades=7))
+    )
     viewer.do(DismissNotices(), SetHover(pointed))
     return viewer.screen(SIZE)
 

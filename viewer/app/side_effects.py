@@ -43,7 +43,7 @@ from viewer.model.state.model_download import (
     ModelsListed,
 )
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import SetApertureShape
+from viewer.model.state.optics import SetOptics
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.tasks import (
@@ -202,7 +202,7 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
         return [Notify(Notice(result.message, is_error=True))]
     match result.value:
         case ApertureMask() as mask:
-            return [SetApertureShape(replace(state.optics.aperture_shape, kind="mask", mask=mask))]
+            return [SetOptics("aperture_shape", replace(state.optics.aperture_shape, kind="mask", mask=mask))]
         case FolderListed() | FactsRead() | Sway() | Touch() | ModelsListed() as found:
             return [found]
         case Pasted(path):

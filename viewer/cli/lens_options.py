@@ -87,12 +87,12 @@ class LensOptions:
 
     def actions(self) -> list[Action]:
         """What sets the lens so."""
-        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss
+        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetOptics
 
         actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
         actions += [] if self.focus is None else [SetFocus(self.focus)]
         actions += [] if self.aperture is None else [SetAperture(self.aperture)]
-        return actions + ([] if self.gloss is None else [SetGloss(self.gloss.gloss)])
+        return actions + ([] if self.gloss is None else [SetOptics("gloss", self.gloss.gloss)])
 
     def require_within(self, scene: Scene) -> None:
         """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.

@@ -59,7 +59,7 @@ from viewer.model.state.inspection import (
 )
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetGloss
+from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetOptics
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
@@ -281,7 +281,7 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
         case "mask":
             return DoTask(ReadMaskTask(path))
         case "surroundings":
-            return SetGloss(replace(state.optics.gloss or FIRST_GLOSS, environment=path))
+            return SetOptics("gloss", replace(state.optics.gloss or FIRST_GLOSS, environment=path))
         case "truth":
             return DoTask(ReadTruthTask(path))
         case "map" if state.source is not None:

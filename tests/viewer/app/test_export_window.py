@@ -38,7 +38,7 @@ from viewer.model.actions import (
 from viewer.model.state.depth_editing import Paint, SetTone
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, CancelJobTask
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss, SetTilt
+from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.tasks import SaveTask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)
@@ -107,8 +107,8 @@ def ten_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
     return [
         (MoveEye(ViewOffset(0.7, -0.4)),),
         (SetFocus(1.5), SetAperture(1.2)),
-        (SetTilt((0.5, 0.2)),),
-        (SetGloss(Gloss()),),
+        (SetOptics("focus_tilt", (0.5, 0.2)),),
+        (SetOptics("gloss", Gloss()),),
         (SetDepthStrength(0.6, is_finished=True),),
         (Paint((0.5, 0.5)), Paint((0.7, 0.5)), EndGesture()),
         (SetTone(DepthEdits(gamma=1.7), is_finished=True),),

@@ -14,7 +14,7 @@ from tests.viewer.conftest import Driver, Opener
 from viewer.app.save_places import inputs_of_scene
 from viewer.model.actions import ShowPrompt
 from viewer.model.commands import action_for_path
-from viewer.model.state.optics import SetGloss
+from viewer.model.state.optics import SetOptics
 from viewer.model.state.prompts import PathPrompt
 
 
@@ -65,7 +65,9 @@ def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer: 
 def test_dragging_the_light_finds_nothing_out_anew(viewer: Driver) -> None:
     make_glossy(viewer)
     asked, gloss = viewer.app.gloss_finder.asked, shown_gloss(viewer)
-    viewer.app.do(SetGloss(replace(gloss, roughness=0.1, light=replace(gloss.light, direction=(0.5, 0.1, -1)))))
+    viewer.app.do(
+        SetOptics("gloss", replace(gloss, roughness=0.1, light=replace(gloss.light, direction=(0.5, 0.1, -1))))
+    )
     viewer.until_idle()
     assert viewer.app.gloss_finder.asked is asked
 
@@ -90,9 +92,9 @@ def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer: Driver) 
 
 
 def test_surroundings_that_are_not_there_are_told_and_nothing_is_lost(viewer: Driver) -> None:
-    viewer.app.do(SetGloss(Gloss(environment="/nowhere/room.exr")))
+    viewer.app.do(SetOptics("gloss", Gloss(environment="/nowhere/room.exr")))
     viewer.until(lambda app: any("room.exr" in notice.text for notice in app.state.notices))
-    viewer.app.do(SetGloss(None))
+    viewer.app.do(SetOptics("gloss", None))
     viewer.until_idle()
 
 

@@ -26,7 +26,7 @@ from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
 from viewer.model.reducers.root import EDITS_KEPT
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetGloss
+from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.saving import SavedSettings, WriteSidecarTask
 
 ONE = GridShape(1, 1)
@@ -164,7 +164,7 @@ def test_a_picture_beside_the_photo_goes_with_its_sidecar(
     room = write_scene(photo_path.parent, "room")
     first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
     first.until_idle()
-    first.app.do(SetGloss(Gloss(reflectance=0.5, environment=str(room))))
+    first.app.do(SetOptics("gloss", Gloss(reflectance=0.5, environment=str(room))))
     first.app.do(DoTask(WriteSidecarTask()))
     first.until(lambda app: sidecar_of(photo_path).is_file())
     first.app.close()

@@ -14,16 +14,7 @@ from viewer.model.actions import Action, Notify, SetDepthStrength, SetFontScale,
 from viewer.model.lens.focal_plane import handle_points, sharp_disparity
 from viewer.model.state.app_state import TiltHandles
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import (
-    ApplyPreset,
-    MoveEye,
-    SetApertureShape,
-    SetDolly,
-    SetFocusRange,
-    SetGloss,
-    SetHighlightRecovery,
-    SetTilt,
-)
+from viewer.model.state.optics import ApplyPreset, MoveEye, SetOptics
 
 
 @pytest.fixture
@@ -148,13 +139,13 @@ def test_the_reticle_follows_the_pointer_and_costs_no_picture(viewer: Driver) ->
 
 
 DRAWS = (
-    SetDolly(0.5),
-    SetFocusRange(0.3),
-    SetTilt((0.2, 0.1)),
-    SetApertureShape(ApertureShape("polygon", blades=5)),
-    SetHighlightRecovery(0.5),
+    SetOptics("dolly", 0.5),
+    SetOptics("focus_range", 0.3),
+    SetOptics("focus_tilt", (0.2, 0.1)),
+    SetOptics("aperture_shape", ApertureShape("polygon", blades=5)),
+    SetOptics("highlight_recovery", 0.5),
     MoveEye(ViewOffset(0.5, 0.5)),
-    SetGloss(Gloss()),
+    SetOptics("gloss", Gloss()),
     ApplyPreset("portrait"),
 )
 ONLY_PANELS = (

@@ -12,7 +12,7 @@ from viewer.display.inspection_view import ROUNDING
 from viewer.model.actions import DismissNotices
 from viewer.model.inspection_request import DIFFERENCE_GAIN
 from viewer.model.state.inspection import Compare, KeepState
-from viewer.model.state.optics import MoveEye, SetAperture, SetExposure
+from viewer.model.state.optics import MoveEye, SetAperture, SetOptics
 from viewer.ui.overlays.reticle import pointer_text
 
 
@@ -42,7 +42,7 @@ def test_tab_gives_the_panels_room_to_the_picture(viewer: Driver) -> None:
 
 def test_before_is_the_photo_until_the_key_or_an_edit_ends_it(viewer: Driver) -> None:
     photo = viewer.image()
-    viewer.app.do(SetAperture(3.0), SetExposure(1.0), MoveEye(ViewOffset(0, 1)))
+    viewer.app.do(SetAperture(3.0), SetOptics("exposure_stops", 1.0), MoveEye(ViewOffset(0, 1)))
     viewer.until_idle()
     edited = viewer.image()
     viewer.send("key", "backslash")
@@ -69,7 +69,7 @@ def test_a_kept_state_is_compared_side_by_side_and_as_a_difference(viewer: Drive
     viewer.app.do(KeepState(), Compare("difference"))
     viewer.until_idle()
     assert not shown(viewer, "difference").any(), "nothing differs yet"
-    viewer.app.do(SetExposure(-0.5))
+    viewer.app.do(SetOptics("exposure_stops", -0.5))
     viewer.until_idle()
     expected = np.abs(viewer.image().astype(int) - kept) * DIFFERENCE_GAIN
     np.testing.assert_allclose(shown(viewer, "difference"), np.minimum(expected, 255), atol=2 * DIFFERENCE_GAIN)

@@ -17,7 +17,7 @@ from viewer.model.actions import PauseMotion, ReturnHome, SetLoop, SetSpeed, Tic
 from viewer.model.reducers.camera_motion import HOME_S, LONGEST_STEP_S, ease
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import MoveEye, ResetOptics, SetDolly
+from viewer.model.state.optics import MoveEye, ResetOptics, SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))
@@ -64,7 +64,7 @@ def test_a_loop_begins_where_the_eye_is_and_goes_without_leaps(kind: LoopKind) -
 
 
 def test_the_glide_home_is_short_monotone_and_ends_exactly_there() -> None:
-    start = reduce(reduce(state_with(scene_of()), MoveEye(ViewOffset(2, -3))), SetDolly(1.5))
+    start = reduce(reduce(state_with(scene_of()), MoveEye(ViewOffset(2, -3))), SetOptics("dolly", 1.5))
     states = ticked(reduce(start, ReturnHome()), HOME_S + 0.1)
     distances = [math.hypot(*state.optics.eye) for state in states]
     assert distances[0] == math.hypot(2, 3)
@@ -92,7 +92,7 @@ def test_pause_and_speed_leave_the_eye_where_it_is() -> None:
     assert reduce(running, SetSpeed(math.inf)) == running
 
 
-@pytest.mark.parametrize("action", [MoveEye(ViewOffset(1, 1)), SetDolly(1.0), ResetOptics(), SetLoop(None)])
+@pytest.mark.parametrize("action", [MoveEye(ViewOffset(1, 1)), SetOptics("dolly", 1.0), ResetOptics(), SetLoop(None)])
 def test_a_hand_on_the_viewpoint_stops_the_motion_and_keeps_its_speed(action: object) -> None:
     running = reduce(reduce(state_with(scene_of()), SetSpeed(0.5)), SetLoop("circle"))
     state = reduce(running, action)  # type: ignore[arg-type]

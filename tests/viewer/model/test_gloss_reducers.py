@@ -12,26 +12,26 @@ from viewer.model.actions import EndGesture, Undo
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, SetBrush
-from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, PaintGloss, ResetOptics, SetGloss, SetGlossBrush
+from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, PaintGloss, ResetOptics, SetGlossBrush, SetOptics
 
 BRUSH = GlossBrush(radius=0.1, is_on=True)
 
 
 def glossy() -> AppState:
-    return reduce(state_with(scene_of()), SetGloss(FIRST_GLOSS))
+    return reduce(state_with(scene_of()), SetOptics("gloss", FIRST_GLOSS))
 
 
 def test_gloss_comes_and_goes_and_outlasts_a_reset_of_the_lens() -> None:
     state = reduce(glossy(), ResetOptics())
     assert state.optics.gloss == FIRST_GLOSS
-    assert reduce(state, SetGloss(None)).optics.gloss is None
+    assert reduce(state, SetOptics("gloss", None)).optics.gloss is None
     assert reduce(glossy(), Undo()).optics.gloss is None
 
 
 def test_what_makes_no_sense_changes_nothing() -> None:
     state = glossy()
     for gloss in (Gloss(roughness=math.nan), Gloss(light=GlossLight((0, 0, 0))), Gloss(reflectance=7)):
-        assert reduce(state, SetGloss(gloss)) is state
+        assert reduce(state, SetOptics("gloss", gloss)) is state
     assert reduce(state, PaintGloss((math.nan, 0.5), BRUSH, True)).optics == state.optics
     assert reduce(state, SetGlossBrush(GlossBrush(radius=math.inf))) is state
 

@@ -33,17 +33,15 @@ from viewer.model.state.optics import (
     MoveEye,
     ResetOptics,
     SetAperture,
-    SetExposure,
     SetFocus,
-    SetFocusRange,
-    SetTilt,
+    SetOptics,
 )
 
 values = st.floats(0, 3)
 edits = st.one_of(
     st.builds(SetFocus, values),
     st.builds(SetAperture, values),
-    st.builds(SetExposure, values),
+    st.builds(SetOptics, st.just("exposure_stops"), values),
     st.builds(lambda t, s: MoveEye(ViewOffset(t, s)), values, values),
 )
 
@@ -140,7 +138,13 @@ def test_a_double_click_takes_back_what_its_first_click_said_too() -> None:
 
 
 def test_reset_takes_all_of_the_lens_back_in_one_step() -> None:
-    edits = (SetFocus(1.0), SetAperture(2.0), SetFocusRange(0.2), ShowTiltHandles(True), SetTilt((0.5, -0.25)))
+    edits = (
+        SetFocus(1.0),
+        SetAperture(2.0),
+        SetOptics("focus_range", 0.2),
+        ShowTiltHandles(True),
+        SetOptics("focus_tilt", (0.5, -0.25)),
+    )
     state = after(state_with(scene_of()), *(action for edit in edits for action in (edit, EndGesture())))
     reset = after(state, ResetOptics())
     assert reset.optics == Optics()
@@ -149,7 +153,9 @@ def test_reset_takes_all_of_the_lens_back_in_one_step() -> None:
 
 
 def test_a_preset_without_tilt_has_no_handles() -> None:
-    state = after(state_with(scene_of()), ShowTiltHandles(True), SetTilt((0.5, 0.0)), ApplyPreset("macro"))
+    state = after(
+        state_with(scene_of()), ShowTiltHandles(True), SetOptics("focus_tilt", (0.5, 0.0)), ApplyPreset("macro")
+    )
     assert state.optics.focus_tilt == (0.0, 0.0)
     assert state.tilt_handles is None
 

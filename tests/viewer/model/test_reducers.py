@@ -55,13 +55,8 @@ from viewer.model.state.optics import (
     MoveEye,
     ResetOptics,
     SetAperture,
-    SetApertureShape,
-    SetDolly,
-    SetExposure,
     SetFocus,
-    SetFocusRange,
-    SetHighlightRecovery,
-    SetTilt,
+    SetOptics,
 )
 from viewer.model.state.saving import SavedSettings
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
@@ -112,7 +107,7 @@ def test_the_aperture_lies_between_pinhole_and_grid(grid: GridShape, diameter: f
 def test_focus_exposure_and_depth_stay_finite_and_in_range(value: float) -> None:
     scene = scene_of()
     state = state_with(scene)
-    for action in (SetFocus(value), SetExposure(value), SetDepthStrength(value, is_finished=False)):
+    for action in (SetFocus(value), SetOptics("exposure_stops", value), SetDepthStrength(value, is_finished=False)):
         state = reduce(state, action)
     low, high = focus_limits(scene)
     assert low <= state.optics.focus_disparity <= high
@@ -131,8 +126,13 @@ def test_every_optic_stays_finite_and_within_its_limits(
 ) -> None:
     scene = scene_of(grid)
     state = state_with(scene)
-    edits = (SetDolly(dolly), SetFocusRange(spread), SetTilt(tilt), SetApertureShape(shape))
-    for action in (*edits, SetHighlightRecovery(highlights)):
+    edits = (
+        SetOptics("dolly", dolly),
+        SetOptics("focus_range", spread),
+        SetOptics("focus_tilt", tilt),
+        SetOptics("aperture_shape", shape),
+    )
+    for action in (*edits, SetOptics("highlight_recovery", highlights)):
         state = reduce(state, action)
     optics, span = state.optics, focus_span(scene)
     assert is_finite(optics)
@@ -150,16 +150,22 @@ def test_every_optic_stays_finite_and_within_its_limits(
 
 def test_a_mask_is_kept_while_another_shape_is_tried() -> None:
     mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255]))
-    state = reduce(state_with(scene_of()), SetApertureShape(ApertureShape("mask", mask=mask)))
+    state = reduce(state_with(scene_of()), SetOptics("aperture_shape", ApertureShape("mask", mask=mask)))
     assert state.optics.aperture_shape.kind == "mask"
-    state = reduce(state, SetApertureShape(replace(state.optics.aperture_shape, kind="ring")))
+    state = reduce(state, SetOptics("aperture_shape", replace(state.optics.aperture_shape, kind="ring")))
     assert state.optics.aperture_shape.mask == mask
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_presets_keep_viewpoint_and_light_and_can_be_taken_back(name: str) -> None:
     before = state_with(scene_of(subject_disparity_px=1.5))
-    for action in (MoveEye(ViewOffset(1, 2)), SetDolly(1), SetExposure(1), SetTilt((1, 1)), SetAperture(2)):
+    for action in (
+        MoveEye(ViewOffset(1, 2)),
+        SetOptics("dolly", 1),
+        SetOptics("exposure_stops", 1),
+        SetOptics("focus_tilt", (1, 1)),
+        SetAperture(2),
+    ):
         before = reduce(before, action)
     after = reduce(before, ApplyPreset(name))  # type: ignore[arg-type]
     kept = [(o.eye, o.dolly, o.exposure_stops) for o in (before.optics, after.optics)]
@@ -179,7 +185,7 @@ def test_what_the_presets_are_for() -> None:
 
 
 def test_a_portrait_keeps_what_the_user_made_sharp_and_lets_the_light_be() -> None:
-    state = reduce(state_with(scene_of(subject_disparity_px=1.5)), SetHighlightRecovery(0.2))
+    state = reduce(state_with(scene_of(subject_disparity_px=1.5)), SetOptics("highlight_recovery", 0.2))
     chosen = reduce(reduce(state, FocusOn((0.1, -0.2), 2.5)), ApplyPreset("portrait")).optics
     assert chosen.focus_disparity == 2.5
     assert chosen.highlight_recovery == 0.2
@@ -354,8 +360,8 @@ def test_focus_can_be_set_in_a_flat_scene() -> None:
         MoveEye(ViewOffset(1, 1)),
         SetFocus(1),
         SetAperture(1),
-        SetDolly(1),
-        SetTilt((1, 1)),
+        SetOptics("dolly", 1),
+        SetOptics("focus_tilt", (1, 1)),
         FocusOn((0, 0), 1),
         ApplyPreset("macro"),
         ResetOptics(),
@@ -369,7 +375,7 @@ def test_optics_do_not_change_before_a_scene_is_open(action: object) -> None:
 
 def test_reset_brings_the_first_optics_back() -> None:
     state = state_with(scene_of())
-    for action in (MoveEye(ViewOffset(1, 2)), SetFocus(1), SetAperture(3), SetExposure(1)):
+    for action in (MoveEye(ViewOffset(1, 2)), SetFocus(1), SetAperture(3), SetOptics("exposure_stops", 1)):
         state = reduce(state, action)
     assert state.optics == Optics(eye=ViewOffset(1, 2), focus_disparity=1, aperture_diameter=3, exposure_stops=1)
     assert reduce(state, ResetOptics()).optics == Optics()
@@ -381,19 +387,19 @@ def test_reset_brings_the_first_optics_back() -> None:
         (MoveEye(ViewOffset(0.0, 1.0)), True, False),
         (SetFocus(1.0), True, False),
         (SetAperture(2.0), True, False),
-        (SetExposure(1.0), True, False),
-        (SetDolly(1.0), True, False),
-        (SetFocusRange(0.5), True, False),
-        (SetTilt((0.5, 0.0)), True, False),
-        (SetApertureShape(ApertureShape("polygon")), True, False),
-        (SetHighlightRecovery(0.5), True, False),
+        (SetOptics("exposure_stops", 1.0), True, False),
+        (SetOptics("dolly", 1.0), True, False),
+        (SetOptics("focus_range", 0.5), True, False),
+        (SetOptics("focus_tilt", (0.5, 0.0)), True, False),
+        (SetOptics("aperture_shape", ApertureShape("polygon")), True, False),
+        (SetOptics("highlight_recovery", 0.5), True, False),
         (FocusOn((0.0, 0.0), 1.0), True, False),
         (ApplyPreset("macro"), True, False),
         (SetHover(Hover(3.0, 4.0, 1.0)), False, False),
         (SetTheme("light"), False, False),
         (StopWork(), False, False),
         (Undo(), False, False),
-        (SetTilt((math.inf, 0.0)), False, False),
+        (SetOptics("focus_tilt", (math.inf, 0.0)), False, False),
         (SetFocus(0.0), False, False),
         (MoveEye(ViewOffset(math.nan, 0.0)), False, False),
         (SetDepthStrength(2.0, is_finished=False), False, False),
@@ -441,7 +447,12 @@ def test_another_depth_strength_keeps_the_surface_in_focus_and_the_place_in_the_
     new = plan_of(GridShape(9, 9), scale=0.25, zero=12.0)
     state = state_with(scene_of(GridShape(5, 5), plan=old))
     given = 13.0  # the surface in focus, in the disparity file's units
-    for action in (MoveEye(ViewOffset(1, -2)), SetFocus((given - 10.0) * 0.5), SetAperture(2.0), SetExposure(1.0)):
+    for action in (
+        MoveEye(ViewOffset(1, -2)),
+        SetFocus((given - 10.0) * 0.5),
+        SetAperture(2.0),
+        SetOptics("exposure_stops", 1.0),
+    ):
         state = reduce(state, action)
     state = reduce(state, SetDepthStrength(1.5, is_finished=True))
     optics = reduce(state, SceneOpened(state.generation, scene_of(GridShape(9, 9), plan=new))).optics

@@ -25,7 +25,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import ModelsPrompt
-from viewer.model.state.optics import SetAperture, SetApertureShape, SetFocusRange, SetTilt
+from viewer.model.state.optics import SetAperture, SetOptics
 from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS
@@ -104,9 +104,9 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]
 def test_no_widget_is_cut_and_none_lies_over_another(
     viewer: HeadlessViewer, items: list[Item], scale: float, units: Units
 ) -> None:
-    lens = (SetAperture(2.3), SetFocusRange(0.7), SetTilt((0.3, -0.2)))
+    lens = (SetAperture(2.3), SetOptics("focus_range", 0.7), SetOptics("focus_tilt", (0.3, -0.2)))
     kind = APERTURE_KINDS[SCALES.index(scale) % (len(APERTURE_KINDS) - 1)]
-    viewer.do(SetFontScale(scale), SetUnits(units), SetApertureShape(ApertureShape(kind)), *lens)
+    viewer.do(SetFontScale(scale), SetUnits(units), SetOptics("aperture_shape", ApertureShape(kind)), *lens)
     left = 120  # room for a small picture: it is not what is looked at
     right = left + PANEL_WIDTH * scale
     viewer.screen(ScreenSize(round(right), 2600))

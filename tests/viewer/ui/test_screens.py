@@ -36,7 +36,7 @@ from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import SetAperture, SetApertureShape
+from viewer.model.state.optics import SetAperture, SetOptics
 from viewer.model.state.preferences import SECTIONS, Section
 from viewer.model.state.prompts import PalettePrompt
 from viewer.model.state.saving import SavedSettings
@@ -99,8 +99,8 @@ def test_what_lies_over_the_picture_is_seen_and_stays_beside_the_panel(viewer: H
 def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind: ApertureKind) -> None:
     mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255])) if kind == "mask" else None
     other: ApertureKind = "ring" if kind == "disc" else "disc"
-    viewer.do(SetApertureShape(ApertureShape(other)))
-    changed = changed_after(viewer, SetApertureShape(ApertureShape(kind, mask=mask)))
+    viewer.do(SetOptics("aperture_shape", ApertureShape(other)))
+    changed = changed_after(viewer, SetOptics("aperture_shape", ApertureShape(kind, mask=mask)))
     assert in_panel(changed).sum() > 10 * ENOUGH_PIXELS
 
 

@@ -16,20 +16,24 @@ from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import Action, SetLoop, ShowTiltHandles
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
 from viewer.model.state.inspection import Compare, KeepState, SetOverlay, ShowEpis
-from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetApertureShape, SetGloss, SetGlossBrush
+from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
 from viewer.model.state.preferences import SECTIONS
 
 MASK = ApertureMask("star.png", 1, 1, b"\xff")
-GLOSSY = SetGloss(FIRST_GLOSS)
+GLOSSY = SetOptics("gloss", FIRST_GLOSS)
 TALL = ScreenSize(900, 2600)
 SWITCHES: dict[str, tuple[Action, ...]] = {
     "loop": (SetLoop("circle"),),
     "tilt": (ShowTiltHandles(True),),
-    **{kind: (SetApertureShape(ApertureShape(kind, mask=MASK)),) for kind in APERTURE_KINDS},
+    **{kind: (SetOptics("aperture_shape", ApertureShape(kind, mask=MASK)),) for kind in APERTURE_KINDS},
     "gloss": (GLOSSY,),
-    "gloss of strokes": (SetGloss(replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, strokes_only=True))),),
-    "gloss of a colour": (SetGloss(replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),),
-    "surroundings": (SetGloss(replace(FIRST_GLOSS, environment="")), SetGlossBrush(GlossBrush(is_on=True))),
+    "gloss of strokes": (
+        SetOptics("gloss", replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, strokes_only=True))),
+    ),
+    "gloss of a colour": (
+        SetOptics("gloss", replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),
+    ),
+    "surroundings": (SetOptics("gloss", replace(FIRST_GLOSS, environment="")), SetGlossBrush(GlossBrush(is_on=True))),
     "brush": (SetBrush(Brush("nearer", is_on=True)),),
     "bucket": (SetBrush(Brush("fill", is_on=True)), PickDepth(DepthSample((0.5, 0.5), 1.0))),
     "EPIs": (ShowEpis(True),),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from math import hypot
+from typing import Any
 
 from iibr_core.rendering import Optics
 from iibr_core.rendering.gloss import MOST_POINTS, Gloss, GlossStroke
@@ -36,14 +37,8 @@ from viewer.model.state.optics import (
     PaintGloss,
     ResetOptics,
     SetAperture,
-    SetApertureShape,
-    SetDolly,
-    SetExposure,
     SetFocus,
-    SetFocusRange,
-    SetGloss,
-    SetHighlightRecovery,
-    SetTilt,
+    SetOptics,
 )
 
 POINT_SPACING = 1 / 6
@@ -115,26 +110,15 @@ def _edit_optics(state: AppState, scene: Scene, action: LensAction) -> Optics:
     match action:
         case MoveEye(eye):
             return replace(optics, eye=eye)
-        case SetDolly(dolly):
-            return replace(optics, dolly=dolly)
+        case SetOptics(field, value):
+            change: dict[str, Any] = {field: value}
+            return replace(optics, **change)
         case SetFocus(disparity):
             return replace(optics, focus_disparity=disparity)
         case FocusOn(place, disparity):
             return focus_on(optics, place, disparity)
-        case SetFocusRange(disparity):
-            return replace(optics, focus_range=disparity)
-        case SetTilt(tilt):
-            return replace(optics, focus_tilt=tilt)
         case SetAperture(diameter):
             return replace(optics, aperture_diameter=diameter)
-        case SetApertureShape(shape):
-            return replace(optics, aperture_shape=shape)
-        case SetHighlightRecovery(amount):
-            return replace(optics, highlight_recovery=amount)
-        case SetExposure(stops):
-            return replace(optics, exposure_stops=stops)
-        case SetGloss(gloss):
-            return replace(optics, gloss=gloss)
         case PaintGloss(place, brush, begins) if optics.gloss is not None:
             return replace(optics, gloss=_painted(optics.gloss, place, brush, begins, scene))
         case ApplyPreset(name):

@@ -77,7 +77,7 @@ from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetDolly, SetGlossBrush
+from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetGlossBrush, SetOptics
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import SECTIONS, Preferences
 from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
@@ -97,12 +97,13 @@ def reduce(state: AppState, action: Action) -> AppState:
         state = _touch(state) if state.awaits_touch else state
         state = replace(state, shows_before=False) if state.shows_before else state
         state = replace(state, free_camera=None) if isinstance(action, ResetOptics) else state
-        moves = isinstance(action, MoveEye | SetDolly | ResetOptics)
+        field = action.field if isinstance(action, SetOptics) else ""
+        moves = isinstance(action, MoveEye | ResetOptics) or field == "dolly"
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
         edited = reduce_lens(still, action)
         # ReturnHome takes the click back that it began with: so a click is remembered even where it changed nothing
         is_click = isinstance(action, FocusOn) and state.scene is not None
-        return record_edit(state, edited, type(action).__name__, always=is_click)
+        return record_edit(state, edited, field or type(action).__name__, always=is_click)
     if isinstance(action, MotionAction):
         return _reduce_motion(state, action)
     if isinstance(action, FreeCameraAction):

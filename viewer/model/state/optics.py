@@ -43,10 +43,13 @@ class MoveEye:
 
 
 @dataclass(frozen=True)
-class SetDolly:
-    """Step forward (positive) or back; see `Optics.dolly`."""
+class SetOptics:
+    """Give one field of `Optics` this value; fields that more depends on have actions of their own."""
 
-    dolly: float
+    field: Literal[
+        "dolly", "focus_range", "focus_tilt", "aperture_shape", "highlight_recovery", "exposure_stops", "gloss"
+    ]
+    value: float | tuple[float, float] | ApertureShape | Gloss | None
 
 
 @dataclass(frozen=True)
@@ -65,20 +68,6 @@ class FocusOn:
 
 
 @dataclass(frozen=True)
-class SetFocusRange:
-    """Everything within this much disparity around the focus is sharp."""
-
-    disparity: float
-
-
-@dataclass(frozen=True)
-class SetTilt:
-    """Tilt the plane of focus; see `Optics.focus_tilt`."""
-
-    tilt: tuple[float, float]
-
-
-@dataclass(frozen=True)
 class MoveTiltHandle:
     """Drag a handle (0 or 1) to this place, over this disparity; None where nothing is known there."""
 
@@ -92,34 +81,6 @@ class SetAperture:
     """Open the aperture to this diameter in view steps."""
 
     diameter: float
-
-
-@dataclass(frozen=True)
-class SetApertureShape:
-    """Give the opening this shape."""
-
-    shape: ApertureShape
-
-
-@dataclass(frozen=True)
-class SetHighlightRecovery:
-    """Let clipped pixels count for more: 0..1."""
-
-    amount: float
-
-
-@dataclass(frozen=True)
-class SetExposure:
-    """Brighten the picture by this many stops."""
-
-    stops: float
-
-
-@dataclass(frozen=True)
-class SetGloss:
-    """Make a surface glossy, or leave all as they are."""
-
-    gloss: Gloss | None
 
 
 @dataclass(frozen=True)
@@ -146,20 +107,6 @@ class ResetOptics:
 
 
 LensAction = (
-    MoveEye
-    | SetDolly
-    | SetFocus
-    | FocusOn
-    | SetFocusRange
-    | SetTilt
-    | MoveTiltHandle
-    | SetAperture
-    | SetApertureShape
-    | SetHighlightRecovery
-    | SetExposure
-    | SetGloss
-    | PaintGloss
-    | ApplyPreset
-    | ResetOptics
+    MoveEye | SetOptics | SetFocus | FocusOn | MoveTiltHandle | SetAperture | PaintGloss | ApplyPreset | ResetOptics
 )
 """Edits of the optics alone."""

@@ -20,7 +20,7 @@ from iibr_core.rendering.gloss import (
 from viewer.model.actions import Action, DoTask
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGloss, SetGlossBrush
+from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.style import Palette, pack_color
 from viewer.ui.widgets import button, checkbox, choice, gap, quiet, slider, tooltip
@@ -55,11 +55,11 @@ def gloss_section(state: AppState, layout: Layout, palette: Palette) -> list[Act
     edited = _reflection(replace(gloss, light=_light(gloss.light, layout, palette)), layout)
     actions = _surroundings(gloss, layout)
     edited = replace(edited, surface=_surface(gloss.surface, layout))
-    actions += [] if edited == gloss else [SetGloss(edited)]
+    actions += [] if edited == gloss else [SetOptics("gloss", edited)]
     actions += _brush(state.gloss_brush, gloss, layout)
     imgui.end_disabled()
     if is_on is not None:
-        return [SetGloss(FIRST_GLOSS if is_on else None)]
+        return [SetOptics("gloss", FIRST_GLOSS if is_on else None)]
     return actions if is_glossy else []
 
 
@@ -134,7 +134,7 @@ def _surroundings(gloss: Gloss, layout: Layout) -> list[Action]:
     quiet(PurePath(gloss.environment).name or "Nothing around it")
     if is_asked:
         return [DoTask(ChooseTask("surroundings"))]
-    return [SetGloss(replace(gloss, environment=""))] if is_dropped else []
+    return [SetOptics("gloss", replace(gloss, environment=""))] if is_dropped else []
 
 
 def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface:
@@ -178,7 +178,7 @@ def _brush(brush: GlossBrush, gloss: Gloss, layout: Layout) -> list[Action]:
             actions.append(SetGlossBrush(replace(brush, erases=erases, is_on=not is_in_hand)))
         imgui.same_line(0, spacing)
     if button("Wipe", layout, "Take all strokes away.", bool(gloss.surface.strokes), width):
-        actions.append(SetGloss(replace(gloss, surface=replace(gloss.surface, strokes=()))))
+        actions.append(SetOptics("gloss", replace(gloss, surface=replace(gloss.surface, strokes=()))))
     limits = (100 * STROKE_RADIUS_LIMITS[0], 100 * STROKE_RADIUS_LIMITS[1])
     tip = "Radius, of the photo's width (wheel over the picture)."
     size = slider("Brush size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)

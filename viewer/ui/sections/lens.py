@@ -28,12 +28,8 @@ from viewer.model.lens.photographic_units import (
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import (
     SetAperture,
-    SetApertureShape,
-    SetExposure,
     SetFocus,
-    SetFocusRange,
-    SetHighlightRecovery,
-    SetTilt,
+    SetOptics,
 )
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.aperture_icons import draw_shape
@@ -67,18 +63,18 @@ def focus_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     span, unit = focus_span(scene), _unit_of_focus(state, scene)
     form = f"± {unit.form}" if optics.focus_range else "none"
     new = slider("Range", optics.focus_range / unit.size, (0.0, span / unit.size), form, layout, RANGE_TIP)
-    _add(actions, lambda value: SetFocusRange(value * unit.size), new)
+    _add(actions, lambda value: SetOptics("focus_range", value * unit.size), new)
     shown = checkbox("Tilt", state.tilt_handles is not None or any(optics.focus_tilt), layout, TILT_TIP)
     if shown is not None:
-        actions += [ShowTiltHandles(shown)] if shown else [ShowTiltHandles(False), SetTilt((0.0, 0.0))]
+        actions += [ShowTiltHandles(shown)] if shown else [ShowTiltHandles(False), SetOptics("focus_tilt", (0.0, 0.0))]
     is_tilted = state.tilt_handles is not None or any(optics.focus_tilt)
     right, down = optics.focus_tilt
     limits = (-span / unit.size, span / unit.size)
     form = unit.form.replace("%", "%+", 1)
     new = slider("to the right", right / unit.size, limits, form, layout, is_enabled=is_tilted)
-    _add(actions, lambda value: SetTilt((value * unit.size, down)), new)
+    _add(actions, lambda value: SetOptics("focus_tilt", (value * unit.size, down)), new)
     new = slider("downward", down / unit.size, limits, form, layout, is_enabled=is_tilted)
-    _add(actions, lambda value: SetTilt((right, value * unit.size)), new)
+    _add(actions, lambda value: SetOptics("focus_tilt", (right, value * unit.size)), new)
     return actions
 
 
@@ -140,7 +136,7 @@ def aperture_section(state: AppState, scene: Scene, layout: Layout, palette: Pal
     actions += _kinds(shape, layout, palette)
     if shape.kind == "mask":
         actions += _mask_row(shape, layout)
-    return actions + [SetApertureShape(new) for new in _shape_edits(shape, layout)]
+    return actions + [SetOptics("aperture_shape", new) for new in _shape_edits(shape, layout)]
 
 
 def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str) -> list[Action]:
@@ -162,7 +158,9 @@ def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Actio
         corner = imgui.get_cursor_screen_pos()
         if choice(f"##{kind}", shape.kind == kind, layout, (width, height), KIND_TIPS[kind]):
             needs_image = kind == "mask" and shape.mask is None
-            actions.append(DoTask(ChooseTask("mask")) if needs_image else SetApertureShape(replace(shape, kind=kind)))
+            actions.append(
+                DoTask(ChooseTask("mask")) if needs_image else SetOptics("aperture_shape", replace(shape, kind=kind))
+            )
         middle = corner.x + width / 2, corner.y + height / 2
         draw_shape(replace(shape, kind=kind), middle, 0.32 * height, palette)
         imgui.same_line()
@@ -204,9 +202,10 @@ def light_section(state: AppState, layout: Layout) -> list[Action]:
     optics = state.optics
     actions: list[Action] = []
     limits = (-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS)
-    _add(actions, SetExposure, slider("Exposure", optics.exposure_stops, limits, "%+.1f stops", layout))
+    new = slider("Exposure", optics.exposure_stops, limits, "%+.1f stops", layout)
+    _add(actions, lambda stops: SetOptics("exposure_stops", stops), new)
     new = slider("Highlights", 100 * optics.highlight_recovery, (0.0, 100.0), "%.0f %%", layout, HIGHLIGHT_TIP)
-    _add(actions, lambda percent: SetHighlightRecovery(percent / 100), new)
+    _add(actions, lambda percent: SetOptics("highlight_recovery", percent / 100), new)
     return actions
 
 

@@ -10,7 +10,7 @@ from viewer.model.actions import Action, PauseMotion, ReturnHome, SetLoop, SetSp
 from viewer.model.commands import LOOP_WORDS
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import SetDolly
+from viewer.model.state.optics import SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
 from viewer.ui.style import Palette, pack_color
@@ -33,7 +33,7 @@ def view_section(state: AppState, scene: Scene, layout: Layout, palette: Palette
     if farthest := dolly_limit(scene.grid):
         tip = "Step into the picture or back out of it, as far as the views allow."
         dolly = slider("Dolly", state.optics.dolly, (-farthest, farthest), "%+.2f views", layout, tip)
-        actions += [] if dolly is None else [SetDolly(dolly)]
+        actions += [] if dolly is None else [SetOptics("dolly", dolly)]
     return actions
 
 
