@@ -34,9 +34,10 @@ from viewer.model.actions import Action, DismissNotices, DoTask, EndGesture, Ope
 from viewer.model.free_camera import LeaveCamera, MoveCamera
 from viewer.model.state.depth_editing import Paint
 from viewer.model.state.exporting import ExportTask
-from viewer.model.state.folder import ShowFilmstrip, StepPhoto
-from viewer.model.state.inspection import OVERLAYS, Compare, KeepState, SetOverlay, ShowEpis, ShowGrid
+from viewer.model.state.folder import StepPhoto
+from viewer.model.state.inspection import OVERLAYS, Compare, KeepState, SetInspection, SetOverlay
 from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture, SetOptics
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import SaveTask
 from viewer.model.zoom import SetZoom, Zoom
 
@@ -153,8 +154,8 @@ ASKED: dict[str, Callable[[User], Sequence[Action]]] = {
         SetZoom(u.random.choice((None, Zoom(u.between(1, 3), (u.between(0.2, 0.8), u.between(0.2, 0.8))))))
     ],
     "overlay": lambda u: [SetOverlay(u.random.choice((None, *OVERLAYS)))],
-    "epis": lambda u: [ShowEpis(not u.app.state.inspection.shows_epis)],
-    "all views": lambda u: [ShowGrid(not u.app.state.inspection.shows_grid)],
+    "epis": lambda u: [SetInspection("shows_epis", not u.app.state.inspection.shows_epis)],
+    "all views": lambda u: [SetInspection("shows_grid", not u.app.state.inspection.shows_grid)],
     "compare": lambda u: (KeepState(), Compare(u.random.choice((None, "photo", "quality", "kept", "difference")))),
     "gloss": lambda u: [SetOptics("gloss", u.random.choice((None, Gloss(roughness=u.between(0.1, 0.6)))))],
 }
@@ -169,7 +170,13 @@ def go_back(user: User) -> None:
     source = user.app.state.source
     assert source is not None
     first = replace(source, path=str(Path(source.path).with_name("photo0.png")), grid=None)
-    user.do(SetOverlay(None), Compare(None), ShowEpis(False), ShowGrid(False), SetZoom(None))
+    user.do(
+        SetOverlay(None),
+        Compare(None),
+        SetInspection("shows_epis", False),
+        SetInspection("shows_grid", False),
+        SetZoom(None),
+    )
     user.open(ResetOptics(), SetOptics("gloss", None), OpenPath(first))
 
 
@@ -197,7 +204,7 @@ def report(steps: int, seed: int) -> Iterator[str]:
 
 def open_first(user: User) -> None:
     user.until(lambda: user.is_open() and user.app.state.folder is not None)
-    user.do(ShowFilmstrip(True))
+    user.do(SetPreference("shows_filmstrip", True))
 
 
 def memory_of_fresh_window(path: str, grid: GridShape) -> float:

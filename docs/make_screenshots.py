@@ -19,7 +19,7 @@ from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import DismissNotices, SetHover
 from viewer.model.state.app_state import Hover
-from viewer.model.state.inspection import SetOverlay, ShowEpis, ShowValues
+from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.preferences import Section
 
@@ -54,7 +54,12 @@ def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
 def inspection(viewer: HeadlessViewer) -> NDArray[np.uint8]:
     """Disparity over the picture, EPIs through the pointer, values under it."""
     open_sections(viewer, "view", "inspect")
-    viewer.do(SetAperture(0.0), ShowEpis(True), ShowValues(True), SetOverlay("disparity"))
+    viewer.do(
+        SetAperture(0.0),
+        SetInspection("shows_epis", True),
+        SetInspection("shows_values", True),
+        SetOverlay("disparity"),
+    )
     viewer.do(SetHover(hover_at(viewer, *TANK)))
     return viewer.screen(SIZE)
 

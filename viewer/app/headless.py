@@ -41,7 +41,7 @@ from viewer.model.inspection_request import (
 from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterbox
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import Probed
+from viewer.model.state.inspection import SetInspection
 
 LAYOUT_FRAMES = 3
 """ImGui knows the size of a text only after it was built once."""
@@ -242,5 +242,5 @@ class HeadlessViewer:
         if request is not None and inputs is not None:
             for result in self._comparison_job.results_of(request, inputs, lambda: False):
                 self.do(*self._inspection_view.take(result))
-        self.do(Probed(self._inspection_view.probe(self.state)))
+        self.do(SetInspection("probe", self._inspection_view.probe(self.state)))
         return self._inspection_view.draw(self.state, layout)

@@ -10,12 +10,12 @@ from typing import Any
 from iibr_core.rendering import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model.actions import Action, SetFullscreen, ShowBefore, ShowPrompt
+from viewer.model.actions import Action, SetState, ShowBefore, ShowPrompt
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command
 from viewer.model.free_camera import LeaveCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke, SetBrush
-from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
+from viewer.model.state.inspection import Compare, SetInspection, SetOverlay
 from viewer.model.state.optics import MoveEye, SetGlossBrush
 
 ARROW_STEP_VIEWS = 0.5
@@ -63,7 +63,7 @@ def _escape_actions(state: AppState) -> list[Action]:
     if state.stroke is not None:
         return [DropStroke()]
     if state.inspection.shows_grid:
-        return [ShowGrid(False)]
+        return [SetInspection("shows_grid", False)]
     if is_marking_gloss(state):
         return [SetGlossBrush(replace(state.gloss_brush, is_on=False))]
     if state.shows_before:
@@ -74,7 +74,7 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [Compare(None)]
     if state.inspection.overlay is not None:
         return [SetOverlay(None)]
-    return [SetFullscreen(False)] if state.is_fullscreen else []
+    return [SetState("is_fullscreen", False)] if state.is_fullscreen else []
 
 
 def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys:

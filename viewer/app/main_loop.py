@@ -41,9 +41,9 @@ from viewer.model.actions import (
     Action,
     DoTask,
     OpenPath,
-    PictureDrawn,
     PlaceWindow,
     Quit,
+    SetState,
     Tick,
     Touch,
     WorkerLost,
@@ -58,7 +58,7 @@ from viewer.model.inspection_request import (
 from viewer.model.layout import Layout, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
-from viewer.model.state.inspection import Probed
+from viewer.model.state.inspection import SetInspection
 from viewer.model.state.tasks import ReadTruthTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
@@ -141,7 +141,7 @@ class App:
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
         if picture and self.scene_view.report != self.state.report:
-            self.do(PictureDrawn(self.scene_view.report))
+            self.do(SetState("report", self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
         self._ui.begin(layout, look, sum(self._pace.took_s))
         self._pointer = pointer = read_pointer(self._pointer)
@@ -269,7 +269,7 @@ class App:
         """Tell what is under the pointer, and have worked out what else is looked at."""
         probe = self.inspection_view.probe(self.state)
         if probe != self.state.inspection.probe:
-            self.do(Probed(probe))
+            self.do(SetInspection("probe", probe))
         before = self._comparisons.wanted
         request = make_inspection_request(self.state, is_moving, before)
         if request != before:

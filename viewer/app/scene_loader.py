@@ -33,8 +33,8 @@ from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_de
 from viewer.model.reducers.folder import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke
-from viewer.model.state.folder import ShowFilmstrip
 from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import SetPreference
 
 SKETCHES_FIRST = 3
 """A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work.
@@ -132,7 +132,7 @@ class SceneLoader:
             case Failed():
                 return [OpenFailed(result.id, result.message)]
             case PhotosFound():
-                return [OpenPath(source_beside(state.source, result.path)), ShowFilmstrip(True)]
+                return [OpenPath(source_beside(state.source, result.path)), SetPreference("shows_filmstrip", True)]
         try:
             return self._take_views(result, state)
         except InputError as error:  # no room on the graphics card: there is no use in more views

@@ -20,11 +20,13 @@ from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.jobs import Failed
-from viewer.model.actions import Action, Notify, RestoreSession, SessionsKept, TellSessions
+from viewer.model.actions import Action, Notify, RestoreSession, SetState
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.saving import SavedSettings
 
+EDITS_KEPT = "Depth edits are kept: the photo opens as you leave it. Save the depth map for other programs."
 FOLDER = "sessions"
 SIDECAR_ENDING = ".iibr"
 QUIET_S = 2.0
@@ -79,9 +81,11 @@ class SessionStore:
         """Whether closing loses nothing, where that changed; once, that it does not."""
         are_kept = self._is_known and self._can_write and not self._has_failed
         if are_kept != state.keeps_sessions:
-            return [SessionsKept(are_kept)]
+            return [SetState("keeps_sessions", are_kept)]
         is_edited = state.depth.edits not in (UNEDITED, state.saved_edits)
-        return [TellSessions()] if are_kept and is_edited and not state.preferences.told_sessions else []
+        if not (are_kept and is_edited) or state.preferences.told_sessions:
+            return []
+        return [SetPreference("told_sessions", True), Notify(Notice(EDITS_KEPT))]
 
     def close(self, state: AppState) -> None:
         """Keep what is there now, and wait until it is written."""

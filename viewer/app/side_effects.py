@@ -26,7 +26,7 @@ from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.background.model_download import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, AskForPath, Notify, OpenPath, ShowPrompt, Sway, TaskTaken, Touch
+from viewer.model.actions import Action, Notify, OpenPath, ShowPrompt, Sway, TaskTaken, Touch
 from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportTask
@@ -45,6 +45,7 @@ from viewer.model.state.model_download import (
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import SetOptics
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
+from viewer.model.state.prompts import PathPrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.tasks import (
     ChoosePlaceTask,
@@ -106,7 +107,7 @@ class SideEffects:
         match task:
             case ChooseTask(what):
                 if not has_dialogs():
-                    return [AskForPath(what)]
+                    return [ShowPrompt(PathPrompt(what))]
                 self._dialog = self._dialog or Dialog(what, state.source.path if state.source else "")
             case ChoosePlaceTask(prompt):
                 self._dialog = self._dialog or SaveDialog(prompt)

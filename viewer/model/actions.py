@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from iibr_core.depth.editing import DepthEdits
 from iibr_core.exports import LoopKind
@@ -19,8 +20,8 @@ from viewer.model.state.model_download import ModelAction
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import LensAction, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
-from viewer.model.state.preferences import Section, Theme, Units
-from viewer.model.state.prompts import ChoiceOf, Prompt, Saved
+from viewer.model.state.preferences import Section, SetPreference
+from viewer.model.state.prompts import Prompt, Saved
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.tasks import Task
 from viewer.model.zoom import SetZoom
@@ -187,6 +188,14 @@ class WorkerLost:
 
 
 @dataclass(frozen=True)
+class SetState:
+    """Give one field of `AppState` this value; most have actions of their own, for more depends on them."""
+
+    field: Literal["is_fullscreen", "hides_panel", "keeps_sessions", "report"]
+    value: bool | DrawReport
+
+
+@dataclass(frozen=True)
 class DoTask:
     """Ask this of the outside world."""
 
@@ -200,13 +209,6 @@ class TaskTaken:
     task: Task
 
 
-@dataclass(frozen=True)
-class PictureDrawn:
-    """The picture was drawn, and this is known of it."""
-
-    report: DrawReport
-
-
 # Prompts, notices, preferences
 
 
@@ -215,13 +217,6 @@ class ShowPrompt:
     """Show this prompt in place of any other, or as the user has edited it; None closes it."""
 
     prompt: Prompt | None
-
-
-@dataclass(frozen=True)
-class AskForPath:
-    """Ask for a file in the window, for the system has no dialog."""
-
-    what: ChoiceOf
 
 
 @dataclass(frozen=True)
@@ -258,27 +253,6 @@ class DismissNotices:
 
 
 @dataclass(frozen=True)
-class SetTheme:
-    """Light or dark."""
-
-    theme: Theme
-
-
-@dataclass(frozen=True)
-class SetFontScale:
-    """Size of text and widgets, 1 = usual."""
-
-    scale: float
-
-
-@dataclass(frozen=True)
-class SetUnits:
-    """Show focus and aperture in these."""
-
-    units: Units
-
-
-@dataclass(frozen=True)
 class ToggleSection:
     """Open or close a section of the panel."""
 
@@ -290,20 +264,6 @@ class PlaceWindow:
     """The window is here: x, y, width, height in screen units; None: where it was, while it fills the screen."""
 
     place: tuple[int, int, int, int] | None
-
-
-@dataclass(frozen=True)
-class SetFullscreen:
-    """Fill the screen with the window, without frame and title; or no longer."""
-
-    is_full: bool
-
-
-@dataclass(frozen=True)
-class HidePanel:
-    """Leave its room to the picture; or show it again."""
-
-    is_hidden: bool
 
 
 @dataclass(frozen=True)
@@ -327,34 +287,21 @@ class EditsSaved:
     edits: DepthEdits
 
 
-@dataclass(frozen=True)
-class SessionsKept:
-    """Whether what the open photo is left with is kept for the next time, so that closing loses nothing."""
-
-    are_kept: bool
-
-
-@dataclass(frozen=True)
-class TellSessions:
-    """Say that depth edits are kept: once, for whoever looks for a way to save them."""
-
-
 MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Sway | Touch | Tick
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
-PreferencesAction = SetTheme | SetFontScale | SetUnits | ToggleSection | PlaceWindow
+PreferencesAction = SetPreference | ToggleSection | PlaceWindow
 
 Action = (
     LensAction
     | MotionAction
     | WorkerEvent
     | PreferencesAction
+    | SetState
     | InspectionAction
     | DepthAction
     | FolderAction
     | ShowTiltHandles
     | SetGlossBrush
-    | SetFullscreen
-    | HidePanel
     | ShowBefore
     | SetZoom
     | FreeCameraAction
@@ -362,8 +309,6 @@ Action = (
     | FactsRead
     | TakeSettings
     | RestoreSession
-    | SessionsKept
-    | TellSessions
     | EndGesture
     | Undo
     | Redo
@@ -371,11 +316,9 @@ Action = (
     | StopWork
     | ResumeWork
     | WorkerLost
-    | PictureDrawn
     | DoTask
     | TaskTaken
     | ShowPrompt
-    | AskForPath
     | AskToSave
     | AskToExport
     | JobsChanged

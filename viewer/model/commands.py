@@ -17,18 +17,14 @@ from viewer.model.actions import (
     Action,
     AskToSave,
     DoTask,
-    HidePanel,
     Notify,
     OpenPath,
     PauseMotion,
     Quit,
     Redo,
     ReturnHome,
-    SetFontScale,
-    SetFullscreen,
     SetLoop,
-    SetTheme,
-    SetUnits,
+    SetState,
     ShowBefore,
     ShowPrompt,
     ShowTiltHandles,
@@ -44,7 +40,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
 from viewer.model.state.exporting import AskToExport
 from viewer.model.state.filling import FillTask
-from viewer.model.state.folder import SetFolderOrder, ShowFilmstrip, StepPhoto
+from viewer.model.state.folder import SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import (
     COMPARISONS,
     OVERLAYS,
@@ -52,15 +48,13 @@ from viewer.model.state.inspection import (
     Comparison,
     KeepState,
     OverlayKind,
+    SetInspection,
     SetOverlay,
-    ShowEpis,
-    ShowGrid,
-    ShowValues,
 )
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetOptics
-from viewer.model.state.preferences import SECTIONS
+from viewer.model.state.preferences import SECTIONS, SetPreference
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask
@@ -135,7 +129,7 @@ def _always(action: Action) -> Callable[[AppState], Action]:
 
 
 def _scale_text(factor: float) -> Callable[[AppState], Action]:
-    return lambda state: SetFontScale(state.preferences.font_scale * factor)
+    return lambda state: SetPreference("font_scale", state.preferences.font_scale * factor)
 
 
 def _toggle_help(state: AppState) -> Action:
@@ -190,7 +184,11 @@ COMMANDS: tuple[Command, ...] = (
     Command("Keep these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
     Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), when_held="awaits photo"),
     Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), when_held="awaits photo"),
-    Command("Filmstrip", lambda state: ShowFilmstrip(not state.preferences.shows_filmstrip), (Chord("f"),)),
+    Command(
+        "Filmstrip",
+        lambda state: SetPreference("shows_filmstrip", not state.preferences.shows_filmstrip),
+        (Chord("f"),),
+    ),
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),
     Command("Export…", _always(AskToExport()), (Chord("e", ctrl=True),)),
@@ -219,9 +217,13 @@ COMMANDS: tuple[Command, ...] = (
     Command("Get true depth", _always(GetDepth())),
     Command("Depth models…", _always(ShowPrompt(ModelsPrompt()))),
     Command("Save the depth map…", _always(AskToSave("map"))),
-    Command("EPI strips", lambda s: ShowEpis(not s.inspection.shows_epis), (Chord("e"),)),
-    Command("All views", lambda s: ShowGrid(not s.inspection.shows_grid), (Chord("g"),)),
-    Command("Values under the pointer", lambda s: ShowValues(not s.inspection.shows_values), (Chord("v"),)),
+    Command("EPI strips", lambda s: SetInspection("shows_epis", not s.inspection.shows_epis), (Chord("e"),)),
+    Command("All views", lambda s: SetInspection("shows_grid", not s.inspection.shows_grid), (Chord("g"),)),
+    Command(
+        "Values under the pointer",
+        lambda s: SetInspection("shows_values", not s.inspection.shows_values),
+        (Chord("v"),),
+    ),
     *(
         Command(f"Overlay: {kind}", _toggle_overlay(kind), (Chord("d"),) if kind == "disparity" else ())
         for kind in OVERLAYS
@@ -236,14 +238,14 @@ COMMANDS: tuple[Command, ...] = (
     Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
     Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),
     *(Command(f"Section: {section}", _always(ToggleSection(section))) for section in SECTIONS),
-    Command("Full screen", lambda s: SetFullscreen(not s.is_fullscreen), (Chord("f11"),)),
-    Command("Hide or show the panel", lambda s: HidePanel(not s.hides_panel), (Chord("tab"),)),
+    Command("Full screen", lambda s: SetState("is_fullscreen", not s.is_fullscreen), (Chord("f11"),)),
+    Command("Hide or show the panel", lambda s: SetState("hides_panel", not s.hides_panel), (Chord("tab"),)),
     Command("Before and after", lambda s: ShowBefore(not s.shows_before), (Chord("backslash"),)),
     Command("Keep this state to compare", _always(KeepState()), (Chord("k"),)),
-    Command("Light or dark", lambda s: SetTheme("dark" if s.preferences.theme == "light" else "light")),
+    Command("Light or dark", lambda s: SetPreference("theme", "dark" if s.preferences.theme == "light" else "light")),
     Command(
         "Units: a photographer's or a light field's",
-        lambda s: SetUnits("photographic" if s.preferences.units == "light field" else "light field"),
+        lambda s: SetPreference("units", "photographic" if s.preferences.units == "light field" else "light field"),
     ),
     Command(
         "Larger text",
@@ -252,7 +254,7 @@ COMMANDS: tuple[Command, ...] = (
         "repeats",
     ),
     Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),), "repeats"),
-    Command("Usual text size", _always(SetFontScale(1.0)), (Chord("_0", ctrl=True),)),
+    Command("Usual text size", _always(SetPreference("font_scale", 1.0)), (Chord("_0", ctrl=True),)),
     Command("All commands", _toggle_palette, (Chord("p", ctrl=True),)),
     Command("Mouse and keys", _toggle_help, (Chord("f1"),)),
     Command("Quit", _always(Quit()), (Chord("q", ctrl=True),)),

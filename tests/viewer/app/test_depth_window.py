@@ -15,21 +15,12 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model.actions import (
-    AskForPath,
-    AskToSave,
-    EndGesture,
-    Notify,
-    SetDepthStrength,
-    SetFontScale,
-    ShowPrompt,
-    ToggleSection,
-)
+from viewer.model.actions import AskToSave, EndGesture, Notify, SetDepthStrength, ShowPrompt, ToggleSection
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
-from viewer.model.state.inspection import SetOpacity, SetOverlay, ShowEpis
+from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
-from viewer.model.state.preferences import SECTIONS
+from viewer.model.state.preferences import SECTIONS, SetPreference
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
@@ -123,7 +114,9 @@ def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_else
 
 
 def test_the_disparity_as_colours_follows_the_brush(viewer: Driver) -> None:
-    viewer.app.do(SetOverlay("disparity"), SetOpacity(1.0), SetBrush(Brush("farther", 0.1, 1.0, is_on=True)))
+    viewer.app.do(
+        SetOverlay("disparity"), SetInspection("opacity", 1.0), SetBrush(Brush("farther", 0.1, 1.0, is_on=True))
+    )
     viewer.until_idle()
     shown = viewer.app.inspection_view._drawn["overlay"][0]
     press_at(viewer, 0.5, 0.5)
@@ -254,7 +247,7 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
     viewer.until_idle()
     np.testing.assert_array_equal(np.load(out), wanted)
     assert str(out) in viewer.app.state.notices[-1].text
-    viewer.app.do(AskForPath("map"))
+    viewer.app.do(ShowPrompt(PathPrompt("map")))
     viewer.until_idle()
     viewer.type(str(out))
     viewer.send("key", "Return")
@@ -293,7 +286,7 @@ def test_one_escape_closes_the_palette(viewer: Driver) -> None:
 
 
 def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None:
-    viewer.app.do(ShowEpis(True), *(Notify(Notice(f"{i}: " + "many words " * 20)) for i in range(5)))
+    viewer.app.do(SetInspection("shows_epis", True), *(Notify(Notice(f"{i}: " + "many words " * 20)) for i in range(5)))
     viewer.until_idle()
     frame, layout = imgui.internal.find_window_by_name("notices"), viewer.app.layout()
     assert layout.strip_across is not None
@@ -306,5 +299,5 @@ def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None
 def test_no_dialog_means_a_prompt(viewer: Driver) -> None:
     viewer.press("Open map…")
     viewer.until(lambda app: app.state.prompt == PathPrompt("map"))
-    viewer.app.do(ShowPrompt(None), SetFontScale(1.0), ToggleSection("depth"))
+    viewer.app.do(ShowPrompt(None), SetPreference("font_scale", 1.0), ToggleSection("depth"))
     viewer.until_idle()

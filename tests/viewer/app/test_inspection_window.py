@@ -23,7 +23,7 @@ from viewer.app.main_loop import App, initial_state
 from viewer.model.actions import OpenPath, SetLoop, ToggleSection
 from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import Compare, KeepState, SetOverlay, ShowEpis
+from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
 from viewer.model.state.optics import MoveEye
 from viewer.model.state.tasks import ReadTruthTask
 
@@ -237,7 +237,7 @@ def test_a_light_field_from_disk_beside_its_truth(open_window: Opener, photo_pat
     driver = open_window(made)
     driver.until_idle()
     app = driver.app
-    app.do(ShowEpis(True), SetOverlay("inpainted"))
+    app.do(SetInspection("shows_epis", True), SetOverlay("inpainted"))
     assert app.state.inspection.overlay is None
     assert "read from disk" in app.state.notices[-1].text
     app.do(MoveEye(ViewOffset(1, -1)))

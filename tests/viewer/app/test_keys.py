@@ -10,12 +10,12 @@ import pytest
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model.actions import Action, AskToSave, SetFullscreen, ShowPrompt, Undo
+from viewer.model.actions import Action, AskToSave, SetState, ShowPrompt, Undo
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
-from viewer.model.state.inspection import Compare, SetOverlay, ShowGrid
+from viewer.model.state.inspection import Compare, SetInspection, SetOverlay
 from viewer.model.state.optics import MoveEye, ResetOptics
 from viewer.model.state.prompts import PalettePrompt
 
@@ -36,9 +36,9 @@ def test_keys() -> None:
     [
         ((Compare("photo"),), Compare(None)),
         ((SetOverlay("disparity"),), SetOverlay(None)),
-        ((SetFullscreen(True), SetOverlay("disparity")), SetOverlay(None)),
-        ((SetFullscreen(True),), SetFullscreen(False)),
-        ((ShowGrid(True), Compare("photo")), ShowGrid(False)),
+        ((SetState("is_fullscreen", True), SetOverlay("disparity")), SetOverlay(None)),
+        ((SetState("is_fullscreen", True),), SetState("is_fullscreen", False)),
+        ((SetInspection("shows_grid", True), Compare("photo")), SetInspection("shows_grid", False)),
     ],
 )
 def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], closes: Action) -> None:

@@ -21,12 +21,13 @@ from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model.actions import EndGesture, OpenPath, Redo, SetFontScale, ShowPrompt, Undo
+from viewer.model.actions import EndGesture, OpenPath, Redo, ShowPrompt, Undo
 from viewer.model.lens.focal_plane import place_of, sharp_disparity
 from viewer.model.reducers.depth_models import offered_model
 from viewer.model.state.depth_editing import Brush, Paint, SetBrush
-from viewer.model.state.model_download import ModelsPrompt, SetEstimatesDepth, UseModel
+from viewer.model.state.model_download import ModelsPrompt, UseModel
 from viewer.model.state.optics import FocusOn, MoveEye, SetAperture, SetFocus
+from viewer.model.state.preferences import SetPreference
 
 MODEL = known_model("depth-anything-v2-small")
 GRID = GridShape(3, 3)
@@ -183,7 +184,7 @@ def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opene
     driver.until(is_next_deep)
     assert seen[0] == "rough", "the guess comes first"
     assert not downloaded.asked
-    driver.app.do(SetEstimatesDepth(False))
+    driver.app.do(SetPreference("estimates_depth", False))
     driver.app.do(OpenPath(source_beside(source, str(write_photo(tmp_path / "third.png", seed=99)))))
     with_offer(driver)
     assert depth_kind(driver.app) == "rough"
@@ -192,7 +193,7 @@ def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opene
 def test_nothing_is_fetched_unasked(hub: Hub, open_window: Opener, tmp_path: Path) -> None:
     hub.may_finish.set()
     driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
-    driver.app.do(SetEstimatesDepth(True), ShowPrompt(ModelsPrompt()))
+    driver.app.do(SetPreference("estimates_depth", True), ShowPrompt(ModelsPrompt()))
     with_offer(driver)
     assert not hub.asked
 
@@ -214,7 +215,7 @@ def test_the_offer_is_dismissed_for_this_photo_and_comes_back_by_the_badge(viewe
 
 
 def test_the_button_is_in_reach_where_the_panel_leaves_no_room(viewer: Driver) -> None:
-    viewer.app.do(SetFontScale(2.3))
+    viewer.app.do(SetPreference("font_scale", 2.3))
     viewer.until_idle()
     viewer.find(GET, "notices")
 

@@ -11,18 +11,23 @@ import pytest
 from iibr_core.types import InputError
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, last_opened, load_preferences, store_preferences
-from viewer.model.actions import PlaceWindow, SetFontScale, SetTheme, ToggleSection
+from viewer.model.actions import PlaceWindow, ToggleSection
 from viewer.model.reducers.lens import APERTURE_OPENED
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import FocusOn
-from viewer.model.state.preferences import Preferences
+from viewer.model.state.preferences import Preferences, SetPreference
 from viewer.model.window_limits import FONT_SCALE_LIMITS
 
 
 def test_what_is_kept_comes_back(tmp_path: Path) -> None:
     state = AppState(recent=("/photos/ä.png", "b.png"))
-    for action in (SetTheme("light"), SetFontScale(1.5), ToggleSection("scene"), PlaceWindow((10, 20, 900, 700))):
+    for action in (
+        SetPreference("theme", "light"),
+        SetPreference("font_scale", 1.5),
+        ToggleSection("scene"),
+        PlaceWindow((10, 20, 900, 700)),
+    ):
         state = reduce(state, action)
     folder = tmp_path / "not" / "there" / "yet"
     store_preferences(state, folder)

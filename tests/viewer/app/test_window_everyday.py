@@ -18,7 +18,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.preferences_store import load_preferences
-from viewer.model.actions import AskForPath, DoTask, OpenPath, ShowPrompt, StopWork
+from viewer.model.actions import DoTask, OpenPath, ShowPrompt, StopWork
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
@@ -286,7 +286,7 @@ def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
     from viewer.model.reducers.root import reduce
     from viewer.model.state.prompts import PathPrompt
 
-    assert reduce(AppState(), AskForPath("mask")).prompt == PathPrompt("mask")
+    assert reduce(AppState(), ShowPrompt(PathPrompt("mask"))).prompt == PathPrompt("mask")
 
 
 def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: Path) -> None:

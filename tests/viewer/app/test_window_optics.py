@@ -10,11 +10,12 @@ from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
-from viewer.model.actions import Action, Notify, SetDepthStrength, SetFontScale, SetTheme, ShowPrompt, ShowTiltHandles
+from viewer.model.actions import Action, Notify, SetDepthStrength, ShowPrompt, ShowTiltHandles
 from viewer.model.lens.focal_plane import handle_points, sharp_disparity
 from viewer.model.state.app_state import TiltHandles
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import ApplyPreset, MoveEye, SetOptics
+from viewer.model.state.preferences import SetPreference
 
 
 @pytest.fixture
@@ -152,7 +153,7 @@ ONLY_PANELS = (
     ShowTiltHandles(True),
     Notify(Notice("hello")),
     ShowPrompt("help"),
-    SetTheme("light"),
+    SetPreference("theme", "light"),
     ShowTiltHandles(False),
 )
 
@@ -178,7 +179,7 @@ def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch
     assert cost_of(DRAWS[-1]) == (False, False, False, False), "the same again"
     assert cost_of(SetDepthStrength(2.0, is_finished=False)) == (False, False, False, False), "its section is closed"
     assert cost_of(SetDepthStrength(2.0, is_finished=True)) == (True, True, True, True)
-    assert cost_of(SetFontScale(1.3))[2:] == (False, False)
+    assert cost_of(SetPreference("font_scale", 1.3))[2:] == (False, False)
 
 
 def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[object]:

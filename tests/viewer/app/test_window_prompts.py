@@ -13,21 +13,13 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.app.window_slot import STEP
-from viewer.model.actions import (
-    AskToSave,
-    HidePanel,
-    Notify,
-    OpenPath,
-    SetFontScale,
-    ShowPrompt,
-    StopWork,
-    ToggleSection,
-)
+from viewer.model.actions import AskToSave, Notify, OpenPath, SetState, ShowPrompt, StopWork, ToggleSection
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
@@ -63,7 +55,7 @@ def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(vi
 
 def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer: Driver) -> None:
     for hides_panel in (False, True):
-        viewer.app.do(HidePanel(hides_panel), ShowPrompt("help"))
+        viewer.app.do(SetState("hides_panel", hides_panel), ShowPrompt("help"))
         viewer.until_idle()
         pad, window = imgui.internal.find_window_by_name("prompt str"), viewer.app.layout().window
         assert (pad.pos.x + pad.size.x, pad.size.y) == (window.width, window.height)
@@ -87,7 +79,7 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) -> None:
-    viewer.app.do(SetFontScale(scale), ShowPrompt(ExportPrompt("sbs", "a.png")))
+    viewer.app.do(SetPreference("font_scale", scale), ShowPrompt(ExportPrompt("sbs", "a.png")))
     viewer.until_idle()
     viewer.find("##Eyes", "prompt ExportPrompt")
     viewer.until_idle()

@@ -11,7 +11,7 @@ import pytest
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover, SetUnits
+from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME
 from viewer.model.inspection_request import (
@@ -38,15 +38,12 @@ from viewer.model.state.inspection import (
     Pair,
     PairCompared,
     Probe,
-    Probed,
-    SetOpacity,
+    SetInspection,
     SetOverlay,
-    ShowEpis,
-    ShowGrid,
-    ShowValues,
     TruthRead,
 )
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.overlays.inspection import legend_words, status_text
 from viewer.ui.overlays.reticle import hover_text
@@ -67,7 +64,13 @@ def after(state: AppState, *actions: Action) -> AppState:
 
 
 def test_looking_changes_neither_optics_nor_history_nor_the_work() -> None:
-    actions = (ShowEpis(True), ShowGrid(True), ShowValues(True), SetOverlay("disparity"), Compare("photo"))
+    actions = (
+        SetInspection("shows_epis", True),
+        SetInspection("shows_grid", True),
+        SetInspection("shows_values", True),
+        SetOverlay("disparity"),
+        Compare("photo"),
+    )
     state = after(OPEN, *actions)
     assert replace(state, inspection=OPEN.inspection) == OPEN
     assert state.inspection == Inspection(shows_epis=True, shows_grid=True, shows_values=True, comparison="photo")
@@ -83,11 +86,11 @@ def test_an_overlay_and_a_comparison_take_turns() -> None:
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_what_is_not_finite_changes_nothing(value: float) -> None:
     state = after(OPEN, Compare("photo"))
-    assert after(state, SetOpacity(value), MoveDivider(value)) == state
+    assert after(state, SetInspection("opacity", value), MoveDivider(value)) == state
 
 
 def test_opacity_and_divider_are_held_within_the_picture() -> None:
-    inspection = after(OPEN, SetOpacity(3), MoveDivider(-5)).inspection
+    inspection = after(OPEN, SetInspection("opacity", 3.0), MoveDivider(-5)).inspection
     assert inspection.opacity == 1
     assert 0 < inspection.divider < 0.1
     assert 0.9 < after(OPEN, MoveDivider(5)).inspection.divider < 1
@@ -142,7 +145,7 @@ def test_a_light_field_from_disk_takes_ground_truth_of_its_own_grid() -> None:
 
 
 def test_another_scene_takes_ground_truth_and_findings_away_and_leaves_what_is_looked_at() -> None:
-    state = after(OPEN, ShowEpis(True), TruthRead(TRUTH), SetHover(Hover(3, 4, 0.5)))
+    state = after(OPEN, SetInspection("shows_epis", True), TruthRead(TRUTH), SetHover(Hover(3, 4, 0.5)))
     opened = after(state, SceneOpened(3, replace(SCENE, source=Source("b.png"))))
     assert opened.inspection == Inspection(shows_epis=True)
     replanned = after(state, SceneOpened(3, SCENE))
@@ -160,7 +163,7 @@ def test_scores_of_another_comparison_or_scene_are_not_heard() -> None:
 
 def test_the_place_pointed_at_last_stays_and_what_was_found_there_goes() -> None:
     probe = Probe((1, 2, 3), 4, 5, "photo")
-    state = after(OPEN, SetHover(Hover(3, 4, 0.5)), Probed(probe))
+    state = after(OPEN, SetHover(Hover(3, 4, 0.5)), SetInspection("probe", probe))
     assert after(state, SetHover(Hover(5, 6, 0.5))).inspection.probe == probe, "until more is known"
     left = after(state, SetHover(None)).inspection
     assert (left.place, left.probe) == ((3, 4), None)
@@ -217,7 +220,12 @@ def test_ground_truth_follows_the_hand_and_is_scored_when_all_is_still() -> None
 
 
 def test_without_a_second_image_there_is_no_work() -> None:
-    for action in (Compare("photo"), SetOverlay("disparity"), SetOverlay("inpainted"), ShowEpis(True)):
+    for action in (
+        Compare("photo"),
+        SetOverlay("disparity"),
+        SetOverlay("inpainted"),
+        SetInspection("shows_epis", True),
+    ):
         assert make_inspection_request(after(OPEN, action), is_moving=False, before=None) is None
     assert make_inspection_request(AppState(), is_moving=False, before=None) is None
 
@@ -249,9 +257,9 @@ def test_a_window_too_small_for_strips_has_no_picture_and_no_strips() -> None:
 
 
 def test_a_single_view_has_no_epis() -> None:
-    state = after(replace(OPEN, scene=replace(SCENE, grid=GridShape(1, 1))), ShowEpis(True))
+    state = after(replace(OPEN, scene=replace(SCENE, grid=GridShape(1, 1))), SetInspection("shows_epis", True))
     assert beside_of(state).epi_views is None
-    assert beside_of(after(OPEN, ShowEpis(True))).epi_views == (5, 7)
+    assert beside_of(after(OPEN, SetInspection("shows_epis", True))).epi_views == (5, 7)
 
 
 @pytest.mark.parametrize("grid", [GridShape(1, 1), GridShape(3, 9), GridShape(17, 17)])
@@ -275,7 +283,7 @@ def test_words() -> None:
     assert score_text(math.inf, 0.0) == "identical"
     assert "still" in score_text(None, None)
     hover = Hover(12.3, 4.0, -0.5)
-    plain, numbers = after(OPEN), after(OPEN, SetUnits("light field"))
+    plain, numbers = after(OPEN), after(OPEN, SetPreference("units", "light field"))
     assert status_text(plain, SCENE, hover, None) == ["12, 4", hover_text(plain.optics, SCENE, hover)]
     assert "px" not in hover_text(plain.optics, SCENE, hover)
     words = status_text(numbers, SCENE, hover, Probe((1, 20, 255), 7, 35, "inpainted"))
@@ -287,7 +295,10 @@ def test_words() -> None:
 def test_the_legend_speaks_the_units_of_the_panel() -> None:
     shown, ends = after(OPEN, SetOverlay("disparity")), (-1.5, 2.0)
     assert legend_words(shown, SCENE, ends) == ("distance", ["far", "near"])
-    assert legend_words(reduce(shown, SetUnits("light field")), SCENE, ends) == ("px per step", ["−1.50", "2.00"])
+    assert legend_words(reduce(shown, SetPreference("units", "light field")), SCENE, ends) == (
+        "px per step",
+        ["−1.50", "2.00"],
+    )
     in_metres = replace(SCENE, inverse_metres=(0.1, 0.2))
     assert legend_words(shown, in_metres, ends) == ("distance", ["20 m", "2.50 m"])
     assert legend_words(reduce(shown, SetOverlay("entropy")), SCENE, (0.0, 1.0)) == ("entropy", ["0.00", "1.00"])

@@ -33,10 +33,9 @@ from viewer.model.actions import (
     ProgressMade,
     Quit,
     SceneOpened,
-    SessionsKept,
     SetDepthStrength,
     SetHover,
-    SetTheme,
+    SetState,
     StopWork,
     TakeSettings,
     Undo,
@@ -58,6 +57,7 @@ from viewer.model.state.optics import (
     SetFocus,
     SetOptics,
 )
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.saving import SavedSettings
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 
@@ -264,7 +264,7 @@ def test_undone_edits_are_lost_as_little_as_others() -> None:
     assert reduce(reduce(half, EditsSaved(second)), Quit()).prompt == "quit", "the file has what was undone"
     assert reduce(reduce(half, EditsSaved(first)), Quit()).should_quit
     assert reduce(reduce(half, Undo()), Quit()).should_quit, "all is as it was found"
-    assert reduce(reduce(half, SessionsKept(True)), Quit()).should_quit, "it opens as it is left"
+    assert reduce(reduce(half, SetState("keeps_sessions", True)), Quit()).should_quit, "it opens as it is left"
 
 
 def test_what_is_opened_closes_the_help() -> None:
@@ -396,7 +396,7 @@ def test_reset_brings_the_first_optics_back() -> None:
         (FocusOn((0.0, 0.0), 1.0), True, False),
         (ApplyPreset("macro"), True, False),
         (SetHover(Hover(3.0, 4.0, 1.0)), False, False),
-        (SetTheme("light"), False, False),
+        (SetPreference("theme", "light"), False, False),
         (StopWork(), False, False),
         (Undo(), False, False),
         (SetOptics("focus_tilt", (math.inf, 0.0)), False, False),

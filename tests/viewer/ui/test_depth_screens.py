@@ -13,12 +13,12 @@ from iibr_core.depth.editing.edits import BrushTool, DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.display.depth_preview import DepthPreview
-from viewer.model.actions import AskToSave, SetFontScale, SetHover, SetTheme
+from viewer.model.actions import AskToSave, SetHover
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import Brush, DepthSample, SetBrush, SetTone
-from viewer.model.state.inspection import SetOpacity, SetOverlay
-from viewer.model.state.preferences import Theme
+from viewer.model.state.inspection import SetInspection, SetOverlay
+from viewer.model.state.preferences import SetPreference, Theme
 
 SIZE = 640, 800
 PANEL = np.s_[:, -int(PANEL_WIDTH) :]
@@ -38,7 +38,7 @@ def differs(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_clips_show_in_the_histogram_and_sliders_only(viewer: HeadlessViewer, theme: Theme) -> None:
-    viewer.do(SetTheme(theme))
+    viewer.do(SetPreference("theme", theme))
     before = viewer.screen(SIZE)
     viewer.do(SetTone(DepthEdits(far_clip=0.3, near_clip=0.6), is_finished=False))
     changed = differs(before, viewer.screen(SIZE))
@@ -70,7 +70,7 @@ def test_the_panel_ends_at_its_border_at_any_size_of_text(
     viewer: HeadlessViewer, scale: float, tool: BrushTool
 ) -> None:
     sample = DepthSample((0.5, 0.5), 1.0)
-    viewer.do(SetFontScale(scale), SetBrush(Brush(tool, is_on=True, sample=sample)))
+    viewer.do(SetPreference("font_scale", scale), SetBrush(Brush(tool, is_on=True, sample=sample)))
     panel = viewer.screen((900, 1800))[:, -int(PANEL_WIDTH * scale) :]
     ground = panel[2:-2, 3]
     assert (ground == ground[0]).all(), "nothing reaches over the left border"
@@ -86,7 +86,7 @@ def test_the_prompt_for_a_map_has_no_size(viewer: HeadlessViewer) -> None:
 
 
 def test_a_stroke_under_way_is_seen_in_colours(viewer: HeadlessViewer) -> None:
-    viewer.do(SetOverlay("disparity"), SetOpacity(1.0))
+    viewer.do(SetOverlay("disparity"), SetInspection("opacity", 1.0))
     scene_view, before = viewer._scene_view, viewer.screen(SIZE)
     preview = DepthPreview(scene_view)
     preview.update(viewer.state)

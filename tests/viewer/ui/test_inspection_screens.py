@@ -11,24 +11,14 @@ import pytest
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import Action, Notify, SetFontScale, SetHover, SetTheme, ToggleSection
+from viewer.model.actions import Action, Notify, SetHover, ToggleSection
 from viewer.model.inspection_request import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, Rect, layout_of
 from viewer.model.state.app_state import Hover
-from viewer.model.state.inspection import (
-    OVERLAYS,
-    Compare,
-    MoveDivider,
-    OverlayKind,
-    SetOpacity,
-    SetOverlay,
-    ShowEpis,
-    ShowGrid,
-    ShowValues,
-)
+from viewer.model.state.inspection import OVERLAYS, Compare, MoveDivider, OverlayKind, SetInspection, SetOverlay
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
-from viewer.model.state.preferences import Theme
+from viewer.model.state.preferences import SetPreference, Theme
 
 SIZE = 640, 760
 GRID = GridShape(3, 3)
@@ -63,7 +53,7 @@ def part(screen: np.ndarray, rect: Rect | None) -> np.ndarray:
 @pytest.mark.parametrize("scale", [1.0, 1.5])
 def test_the_whole_section_is_seen_at_any_size_of_text(viewer: HeadlessViewer, theme: Theme, scale: float) -> None:
     size = round(SIZE[0] * scale), round(SIZE[1] * scale)
-    viewer.do(SetTheme(theme), SetFontScale(scale), SetOverlay("disparity"))
+    viewer.do(SetPreference("theme", theme), SetPreference("font_scale", scale), SetOverlay("disparity"))
     opened = viewer.screen(size).astype(int)
     viewer.do(ToggleSection("inspect"))
     changed = np.abs(viewer.screen(size) - opened).max(axis=2) > 24
@@ -76,7 +66,9 @@ def test_the_whole_section_is_seen_at_any_size_of_text(viewer: HeadlessViewer, t
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: HeadlessViewer, theme: Theme) -> None:
-    viewer.do(SetTheme(theme), SetHover(replace(HOVER, disparity=None)), ShowEpis(True))
+    viewer.do(
+        SetPreference("theme", theme), SetHover(replace(HOVER, disparity=None)), SetInspection("shows_epis", True)
+    )
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
     across, down = part(screen, layout.strip_across), part(screen, layout.strip_down)
     row, column = part(screen, layout.picture)[:, 100], part(screen, layout.picture)[100]
@@ -94,7 +86,7 @@ def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: Headless
 
 
 def test_the_middle_of_the_epi_moves_with_the_eye(viewer: HeadlessViewer) -> None:
-    viewer.do(ShowEpis(True))
+    viewer.do(SetInspection("shows_epis", True))
     changed = changed_after(viewer, MoveEye(ViewOffset(0, 1)))
     assert part(changed, layout_now(viewer).strip_across).sum() > ENOUGH_PIXELS
 
@@ -104,11 +96,11 @@ def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: HeadlessV
     viewer.do(MoveEye(ViewOffset(0, 1)))
     picture = layout_now(viewer).picture
     plain = part(viewer.screen(SIZE), picture).astype(int)
-    viewer.do(SetOverlay(kind), SetOpacity(0.0))
+    viewer.do(SetOverlay(kind), SetInspection("opacity", 0.0))
     clear = part(viewer.screen(SIZE), picture).astype(int)
     below_legend = np.s_[60:]
     assert np.abs(clear - plain)[below_legend].max() <= 2
-    viewer.do(SetOpacity(1.0))
+    viewer.do(SetInspection("opacity", 1.0))
     covered = part(viewer.screen(SIZE), picture).astype(int)
     differs = (np.abs(covered - plain).max(axis=2) > 24)[below_legend]
     assert differs.sum() > 3 * ENOUGH_PIXELS
@@ -149,7 +141,7 @@ def test_fast_and_exact_are_compared_with_their_scores(viewer: HeadlessViewer) -
 
 
 def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: HeadlessViewer) -> None:
-    viewer.do(ShowGrid(True))
+    viewer.do(SetInspection("shows_grid", True))
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
     assert layout.picture is not None
     for cell in sheet_cells(layout.picture, GRID):
@@ -160,7 +152,7 @@ def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: HeadlessVi
 
 
 def test_the_status_line_is_not_covered_by_notices(viewer: HeadlessViewer) -> None:
-    viewer.do(ShowValues(True), SetHover(HOVER))
+    viewer.do(SetInspection("shows_values", True), SetHover(HOVER))
     line = part(viewer.screen(SIZE), layout_now(viewer).status)
     assert line.std() > 5
     probe = viewer.state.inspection.probe
@@ -174,7 +166,7 @@ def test_the_status_line_is_not_covered_by_notices(viewer: HeadlessViewer) -> No
 
 def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: HeadlessViewer) -> None:
     """Beside the square, in the middle row, from an eye that looks behind it."""
-    viewer.do(ShowValues(True), MoveEye(ViewOffset(0, 1)))
+    viewer.do(SetInspection("shows_values", True), MoveEye(ViewOffset(0, 1)))
     origins = set()
     for x in range(0, WIDTH, 2):
         disparity = viewer.pick(x, HEIGHT / 2)

@@ -19,14 +19,14 @@ from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.background.model_download import list_models
-from viewer.model.actions import SetFontScale, SetUnits, ShowPrompt
+from viewer.model.actions import ShowPrompt
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.optics import SetAperture, SetOptics
-from viewer.model.state.preferences import SECTIONS, Theme, Units
+from viewer.model.state.preferences import SECTIONS, SetPreference, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS
 from viewer.ui.sections.depth import START_TIPS, START_WORDS
@@ -106,7 +106,12 @@ def test_no_widget_is_cut_and_none_lies_over_another(
 ) -> None:
     lens = (SetAperture(2.3), SetOptics("focus_range", 0.7), SetOptics("focus_tilt", (0.3, -0.2)))
     kind = APERTURE_KINDS[SCALES.index(scale) % (len(APERTURE_KINDS) - 1)]
-    viewer.do(SetFontScale(scale), SetUnits(units), SetOptics("aperture_shape", ApertureShape(kind)), *lens)
+    viewer.do(
+        SetPreference("font_scale", scale),
+        SetPreference("units", units),
+        SetOptics("aperture_shape", ApertureShape(kind)),
+        *lens,
+    )
     left = 120  # room for a small picture: it is not what is looked at
     right = left + PANEL_WIDTH * scale
     viewer.screen(ScreenSize(round(right), 2600))
@@ -124,7 +129,7 @@ def test_no_widget_is_cut_and_none_lies_over_another(
 
 @pytest.mark.parametrize("scale", SCALES)
 def test_the_grip_of_a_slider_lies_below_its_value(viewer: HeadlessViewer, items: list[Item], scale: float) -> None:
-    viewer.do(SetFontScale(scale))
+    viewer.do(SetPreference("font_scale", scale))
     viewer.screen(ScreenSize(round(120 + PANEL_WIDTH * scale), 2600))
     line = min(item.bottom - item.top for item in items if item.kind == "text")
     sliders = [item.bottom - item.top for item in items if item.kind == "slider_float"]
@@ -167,7 +172,7 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
         viewer.state = replace(viewer.state, jobs=jobs, depth=edited)
     if name == WELCOME:
         viewer.state = AppState()
-    viewer.do(SetFontScale(scale), list_models(), ShowPrompt(PROMPTS.get(name)))
+    viewer.do(SetPreference("font_scale", scale), list_models(), ShowPrompt(PROMPTS.get(name)))
     viewer.screen(WINDOW)
     left, top, right, bottom, hidden = ended[-1]
     assert (left >= 0, top >= 0, right <= WINDOW.width, bottom <= WINDOW.height) == (True,) * 4, ended[-1]

@@ -15,18 +15,15 @@ from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import (
     Action,
-    AskForPath,
     AskToSave,
     DismissNotice,
     Notify,
     OpenFailed,
     OpenPath,
-    PictureDrawn,
     ProgressMade,
-    SetFontScale,
     SetHover,
     SetLoop,
-    SetTheme,
+    SetState,
     ShowPrompt,
     ShowTiltHandles,
     ToggleSection,
@@ -37,8 +34,8 @@ from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import SetAperture, SetOptics
-from viewer.model.state.preferences import SECTIONS, Section
-from viewer.model.state.prompts import PalettePrompt
+from viewer.model.state.preferences import SECTIONS, Section, SetPreference
+from viewer.model.state.prompts import PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings
 from viewer.ui.overlays.progress_rows import job_text
 from viewer.ui.style import DARK, LIGHT
@@ -80,7 +77,7 @@ def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section
     [
         ShowPrompt(PalettePrompt("mo")),
         AskToSave(),
-        AskForPath("photo"),
+        ShowPrompt(PathPrompt("photo")),
         Notify(Notice("damaged.png: cut off", is_error=True)),
         JobsChanged((JobProgress(1, "picture", "large.png", "drawing", 0.4), JobProgress(2, "export", "a.mp4"))),
         ShowTiltHandles(True),
@@ -110,7 +107,7 @@ def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind
         SetLoop("eight"),
         SetAperture(2.0),
         ProgressMade(1, Progress(4, 9, 0.3)),
-        PictureDrawn(DrawReport(3, 9, 12.0, 0.004)),
+        SetState("report", DrawReport(3, 9, 12.0, 0.004)),
     ],
     ids=lambda action: type(action).__name__,
 )
@@ -120,7 +117,7 @@ def test_the_panel_tells(viewer: HeadlessViewer, action: Action) -> None:
 
 def test_light_and_dark(viewer: HeadlessViewer) -> None:
     for theme, palette in (("dark", DARK), ("light", LIGHT)):
-        viewer.do(SetTheme(theme))  # type: ignore[arg-type]
+        viewer.do(SetPreference("theme", theme))  # type: ignore[arg-type]
         screen = viewer.screen(SIZE) / 255
         np.testing.assert_allclose(screen[-2, -8], palette.panel[:3], atol=0.01)
         np.testing.assert_allclose(screen[2, 2], palette.background[:3], atol=0.01)
@@ -131,7 +128,7 @@ def test_light_and_dark(viewer: HeadlessViewer) -> None:
 def test_text_twice_as_large_in_a_window_twice_as_large_is_the_same_screen_finer(viewer: HeadlessViewer) -> None:
     viewer.do(Notify(Notice("A notice that is long enough to be wrapped into a second line of text, at any size.")))
     small = viewer.screen(SIZE).astype(float)
-    viewer.do(SetFontScale(2.0))
+    viewer.do(SetPreference("font_scale", 2.0))
     large = viewer.screen((2 * SIZE[0], 2 * SIZE[1])).astype(float)
     halved = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3))
     layout = layout_of(SIZE, (96, 64))

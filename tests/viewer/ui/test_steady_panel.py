@@ -15,7 +15,7 @@ from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import Action, SetLoop, ShowTiltHandles
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
-from viewer.model.state.inspection import Compare, KeepState, SetOverlay, ShowEpis
+from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
 from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
 from viewer.model.state.preferences import SECTIONS
 
@@ -36,7 +36,7 @@ SWITCHES: dict[str, tuple[Action, ...]] = {
     "surroundings": (SetOptics("gloss", replace(FIRST_GLOSS, environment="")), SetGlossBrush(GlossBrush(is_on=True))),
     "brush": (SetBrush(Brush("nearer", is_on=True)),),
     "bucket": (SetBrush(Brush("fill", is_on=True)), PickDepth(DepthSample((0.5, 0.5), 1.0))),
-    "EPIs": (ShowEpis(True),),
+    "EPIs": (SetInspection("shows_epis", True),),
     "overlay": (SetOverlay("disparity"),),
     "photo": (Compare("photo"),),
     "kept": (KeepState(), Compare("kept")),

@@ -16,7 +16,6 @@ from viewer.model.state.model_download import (
     ModelAction,
     ModelOffer,
     ModelsListed,
-    SetEstimatesDepth,
     ShowOffer,
     UseModel,
 )
@@ -56,8 +55,6 @@ def reduce_models(state: AppState, action: ModelAction) -> AppState:
             is_left = downloading is None and _is_elsewhere(models.asked, models)
             asked = None if is_left else models.asked
             return replace(state, models=replace(models, downloading=downloading, asked=asked))
-        case SetEstimatesDepth(is_wanted):
-            return replace(state, preferences=replace(state.preferences, estimates_depth=is_wanted))
         case GetDepth():
             return _get_depth(state)
     if scene is None:

@@ -18,12 +18,8 @@ from viewer.model.state.inspection import (
     MoveDivider,
     OverlayKind,
     PairCompared,
-    Probed,
-    SetOpacity,
+    SetInspection,
     SetOverlay,
-    ShowEpis,
-    ShowGrid,
-    ShowValues,
     TruthRead,
 )
 from viewer.model.state.notices import Notice
@@ -42,16 +38,12 @@ NO_DISPARITY = "These views come without disparity."
 def reduce_inspection(state: AppState, action: InspectionAction) -> AppState:
     """The state after an inspection action."""
     match action:
-        case ShowEpis(is_shown):
-            return _with(state, shows_epis=is_shown)
-        case ShowGrid(is_shown):
-            return _with(state, shows_grid=is_shown)
-        case ShowValues(is_shown):
-            return _with(state, shows_values=is_shown, probe=None)
+        case SetInspection("opacity", float(opacity)):
+            return _with(state, opacity=clamp(opacity, 0.0, 1.0)) if math.isfinite(opacity) else state
+        case SetInspection(field, value):
+            return _with(state, **{field: value})
         case SetOverlay(kind):
             return _set_overlay(state, kind)
-        case SetOpacity(opacity) if math.isfinite(opacity):
-            return _with(state, opacity=clamp(opacity, 0.0, 1.0))
         case Compare(comparison):
             return _set_comparison(state, comparison)
         case KeepState() if state.scene is not None:
@@ -62,8 +54,6 @@ def reduce_inspection(state: AppState, action: InspectionAction) -> AppState:
             return _set_truth(state, truth)
         case PairCompared(pair) if pair.kind == state.inspection.comparison and pair.generation == state.generation:
             return _with(state, pair=pair)
-        case Probed(probe):
-            return _with(state, probe=probe)
     return state
 
 

@@ -5,25 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import PurePath
+from typing import Any
 
 from iibr_core.rendering import Optics
 from iibr_core.rendering.gloss import STROKE_RADIUS_LIMITS
 from iibr_core.scenes import DepthSettings, Progress, Source, clamp, clamp_optics, is_finite, is_same_field
 from viewer.model.actions import (
     Action,
-    AskForPath,
     AskToSave,
     DismissNotice,
     DismissNotices,
     DoTask,
     EditsSaved,
     EndGesture,
-    HidePanel,
     MotionAction,
     Notify,
     OpenPath,
     PauseMotion,
-    PictureDrawn,
     PlaceWindow,
     PreferencesAction,
     Quit,
@@ -31,15 +29,11 @@ from viewer.model.actions import (
     RestoreSession,
     ResumeWork,
     ReturnHome,
-    SessionsKept,
     SetDepthStrength,
-    SetFontScale,
-    SetFullscreen,
     SetHover,
     SetLoop,
     SetSpeed,
-    SetTheme,
-    SetUnits,
+    SetState,
     ShowBefore,
     ShowPrompt,
     ShowTiltHandles,
@@ -47,7 +41,6 @@ from viewer.model.actions import (
     Sway,
     TakeSettings,
     TaskTaken,
-    TellSessions,
     Tick,
     ToggleSection,
     Touch,
@@ -71,7 +64,7 @@ from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.exporting import AskToExport
 from viewer.model.state.filling import ViewsFilled
-from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, ShowFilmstrip, StepPhoto
+from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
@@ -79,14 +72,13 @@ from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetGlossBrush, SetOptics
 from viewer.model.state.photo_facts import FactsRead
-from viewer.model.state.preferences import SECTIONS, Preferences
-from viewer.model.state.prompts import PathPrompt, Saved, SavePrompt
+from viewer.model.state.preferences import SECTIONS, Preferences, SetPreference
+from viewer.model.state.prompts import Saved, SavePrompt
 from viewer.model.state.saving import SavedSettings, path_beside
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT, FONT_SCALE_LIMITS, SPEED_LIMITS
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
-EDITS_KEPT = "Depth edits are kept: the photo opens as you leave it. Save the depth map for other programs."
 FILLED = "the views between those on disk are there. Open it again to see them."
 LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
 
@@ -97,13 +89,13 @@ def reduce(state: AppState, action: Action) -> AppState:
         state = _touch(state) if state.awaits_touch else state
         state = replace(state, shows_before=False) if state.shows_before else state
         state = replace(state, free_camera=None) if isinstance(action, ResetOptics) else state
-        field = action.field if isinstance(action, SetOptics) else ""
-        moves = isinstance(action, MoveEye | ResetOptics) or field == "dolly"
+        kind = action.field if isinstance(action, SetOptics) else type(action).__name__
+        moves = isinstance(action, MoveEye | ResetOptics) or kind == "dolly"
         still = replace(state, motion=Motion(speed=state.motion.speed)) if moves else state
         edited = reduce_lens(still, action)
         # ReturnHome takes the click back that it began with: so a click is remembered even where it changed nothing
         is_click = isinstance(action, FocusOn) and state.scene is not None
-        return record_edit(state, edited, field or type(action).__name__, always=is_click)
+        return record_edit(state, edited, kind, always=is_click)
     if isinstance(action, MotionAction):
         return _reduce_motion(state, action)
     if isinstance(action, FreeCameraAction):
@@ -125,11 +117,9 @@ def reduce(state: AppState, action: Action) -> AppState:
             return record_edit(state, _take_settings(state, settings), "TakeSettings")
         case RestoreSession(settings):
             return record_edit(state, _restore(state, settings), "RestoreSession")
-        case SessionsKept(are_kept):
-            return replace(state, keeps_sessions=are_kept)
-        case TellSessions():
-            told = replace(state, preferences=replace(state.preferences, told_sessions=True))
-            return add_notice(told, Notice(EDITS_KEPT))
+        case SetState(field, value):
+            change: dict[str, Any] = {field: value}
+            return replace(state, **change)
         case EndGesture():
             return release_divider(end_gesture(end_stroke(state)))
         case Undo():
@@ -157,8 +147,6 @@ def _reduce_files(state: AppState, action: Action) -> AppState:
             return _step_photo(state, steps)
         case ScrollFilmstrip(photos_on):
             return scroll_filmstrip(state, photos_on)
-        case ShowFilmstrip(is_shown):
-            return replace(state, preferences=replace(state.preferences, shows_filmstrip=is_shown))
         case SetFolderOrder(order):
             state = replace(state, preferences=replace(state.preferences, folder_order=order))
             return list_folder(state, state.folder.path, state.folder.photos) if state.folder is not None else state
@@ -191,15 +179,11 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
     match action:
         case ShowPrompt(prompt):
             return replace(state, prompt=prompt)
-        case AskForPath(what):
-            return replace(state, prompt=PathPrompt(what))
         case AskToSave(what) if state.scene is not None and (what == "picture" or state.scene.plan is not None):
             scene = state.scene
             is_full = scene.own_size is not None and state.optics.dolly == 0 and state.free_camera is None
             size = scene.own_size if is_full and scene.own_size is not None else scene.size
             return replace(state, prompt=SavePrompt(_path_beside(state, what), size, what=what))
-        case PictureDrawn(report):
-            return replace(state, report=report)
         case AskToExport():
             return ask_to_export(state)
         case JobsChanged(jobs):
@@ -216,10 +200,6 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
             return replace(state, notices=())
         case SetGlossBrush(brush):
             return _take_gloss_brush(state, brush)
-        case SetFullscreen(is_full):
-            return replace(state, is_fullscreen=is_full)
-        case HidePanel(is_hidden):
-            return replace(state, hides_panel=is_hidden)
         case ShowBefore(is_shown):
             return replace(state, shows_before=is_shown and state.scene is not None)
         case SetZoom(zoom):
@@ -366,12 +346,12 @@ def _restore(state: AppState, settings: SavedSettings) -> AppState:
 
 def _reduce_preferences(preferences: Preferences, action: PreferencesAction) -> Preferences:
     match action:
-        case SetTheme(theme):
-            return replace(preferences, theme=theme)
-        case SetFontScale(scale) if math.isfinite(scale):
-            return replace(preferences, font_scale=clamp(scale, *FONT_SCALE_LIMITS))
-        case SetUnits(units):
-            return replace(preferences, units=units)
+        case SetPreference("font_scale", float(scale)):
+            scale = clamp(scale, *FONT_SCALE_LIMITS) if math.isfinite(scale) else preferences.font_scale
+            return replace(preferences, font_scale=scale)
+        case SetPreference(field, value):
+            change: dict[str, Any] = {field: value}
+            return replace(preferences, **change)
         case ToggleSection(section):
             is_open = preferences.open_sections
             return replace(preferences, open_sections=tuple(s for s in SECTIONS if (s in is_open) != (s == section)))

@@ -64,13 +64,6 @@ class ScrollFilmstrip:
 
 
 @dataclass(frozen=True)
-class ShowFilmstrip:
-    """Show or hide the row of small pictures."""
-
-    is_shown: bool
-
-
-@dataclass(frozen=True)
 class SetFolderOrder:
     """Go through the photos by name, or by the time they were written."""
 
@@ -84,4 +77,4 @@ class ListFolderTask:
     path: str
 
 
-FolderAction = FolderListed | StepPhoto | ScrollFilmstrip | ShowFilmstrip | SetFolderOrder
+FolderAction = FolderListed | StepPhoto | ScrollFilmstrip | SetFolderOrder

@@ -88,24 +88,11 @@ class Inspection:
 
 
 @dataclass(frozen=True)
-class ShowEpis:
-    """Show or hide the EPI strips."""
+class SetInspection:
+    """Give one field of `Inspection` this value; the others have actions of their own, for more depends on them."""
 
-    is_shown: bool
-
-
-@dataclass(frozen=True)
-class ShowGrid:
-    """Show or hide the sheet of all views."""
-
-    is_shown: bool
-
-
-@dataclass(frozen=True)
-class ShowValues:
-    """Show or hide the line that says what is under the pointer."""
-
-    is_shown: bool
+    field: Literal["shows_epis", "shows_grid", "shows_values", "opacity", "probe"]
+    value: bool | float | Probe | None
 
 
 @dataclass(frozen=True)
@@ -113,13 +100,6 @@ class SetOverlay:
     """Lay this over the picture; None takes it away. It takes the place of a comparison."""
 
     kind: OverlayKind | None
-
-
-@dataclass(frozen=True)
-class SetOpacity:
-    """Of the overlay, 0..1."""
-
-    opacity: float
 
 
 @dataclass(frozen=True)
@@ -157,26 +137,7 @@ class PairCompared:
     pair: Pair
 
 
-@dataclass(frozen=True)
-class Probed:
-    """What was found under the pointer; None without."""
-
-    probe: Probe | None
-
-
-InspectionAction = (
-    ShowEpis
-    | ShowGrid
-    | ShowValues
-    | SetOverlay
-    | SetOpacity
-    | Compare
-    | KeepState
-    | MoveDivider
-    | TruthRead
-    | PairCompared
-    | Probed
-)
+InspectionAction = SetInspection | SetOverlay | Compare | KeepState | MoveDivider | TruthRead | PairCompared
 """What is looked at beside the picture; the picture itself stays."""
 
 

@@ -114,13 +114,6 @@ class UseModel:
 
 
 @dataclass(frozen=True)
-class SetEstimatesDepth:
-    """Whether photos without depth get it without a question."""
-
-    is_wanted: bool
-
-
-@dataclass(frozen=True)
 class ShowOffer:
     """Offer the recommended model for the open photo, or do so no more in this run."""
 
@@ -139,13 +132,4 @@ class DepthEstimated:
     model: str
 
 
-ModelAction = (
-    ModelsListed
-    | DownloadingChanged
-    | GetDepth
-    | UseModel
-    | SetEstimatesDepth
-    | ShowOffer
-    | GiveUpEstimate
-    | DepthEstimated
-)
+ModelAction = ModelsListed | DownloadingChanged | GetDepth | UseModel | ShowOffer | GiveUpEstimate | DepthEstimated

@@ -35,3 +35,11 @@ class Preferences:
     told_aperture: bool = False
     told_drag: bool = False
     estimates_depth: bool = False
+
+
+@dataclass(frozen=True)
+class SetPreference:
+    """Give one field of `Preferences` this value; the others have actions of their own, for more depends on them."""
+
+    field: Literal["theme", "font_scale", "units", "shows_filmstrip", "told_sessions", "estimates_depth"]
+    value: Theme | float | Units | bool

@@ -15,7 +15,8 @@ from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
-from viewer.model.state.model_download import DepthModels, ModelsPrompt, SetEstimatesDepth, UseModel
+from viewer.model.state.model_download import DepthModels, ModelsPrompt, UseModel
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.window_words import words_in_window
@@ -112,7 +113,7 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
 
 def _estimates_new(state: AppState, layout: Layout) -> list[Action]:
     estimates = checkbox("Estimate depth of new photos", state.preferences.estimates_depth, layout, ESTIMATES_TIP)
-    return [] if estimates is None else [SetEstimatesDepth(estimates)]
+    return [] if estimates is None else [SetPreference("estimates_depth", estimates)]
 
 
 def _models(models: DepthModels, chosen: str | None) -> list[str]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from imgui_bundle import imgui
 
 from iibr_core.scenes import Scene
-from viewer.model.actions import Action, DoTask, SetUnits
+from viewer.model.actions import Action, DoTask
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
 from viewer.model.reducers.inspection import NOTHING_KEPT, lacks_kept_state, obstacle_to_comparison, obstacle_to_overlay
@@ -18,12 +19,10 @@ from viewer.model.state.inspection import (
     Compare,
     Comparison,
     OverlayKind,
-    SetOpacity,
+    SetInspection,
     SetOverlay,
-    ShowEpis,
-    ShowGrid,
-    ShowValues,
 )
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.widgets import button, checkbox, choice, quiet, slider
 
@@ -82,18 +81,19 @@ def _units(state: AppState, layout: Layout) -> list[Action]:
     is_on = state.preferences.units == "light field"
     tip = "Focus as disparity in px per view step, the aperture in view steps: everywhere in the window."
     chosen = checkbox("Units of light fields", is_on, layout, tip)
-    return [] if chosen is None else [SetUnits("light field" if chosen else "photographic")]
+    return [] if chosen is None else [SetPreference("units", "light field" if chosen else "photographic")]
 
 
 def _toggles(state: AppState, layout: Layout) -> list[Action]:
     inspection = state.inspection
-    row = (
-        ("EPIs", inspection.shows_epis, ShowEpis, EPI_TIP),
-        ("Views", inspection.shows_grid, ShowGrid, "All views; click one to go there (G)"),
-        ("Values", inspection.shows_values, ShowValues, "What is under the pointer, in a line below (V)"),
-    )
-    pressed = _choices([(word, is_on, tip, "") for word, is_on, _, tip in row], layout)
-    return [] if pressed is None else [row[pressed][2](not row[pressed][1])]
+    row = [
+        ("EPIs", inspection.shows_epis, EPI_TIP, ""),
+        ("Views", inspection.shows_grid, "All views; click one to go there (G)", ""),
+        ("Values", inspection.shows_values, "What is under the pointer, in a line below (V)", ""),
+    ]
+    pressed = _choices(row, layout)
+    fields: tuple[Literal["shows_epis", "shows_grid", "shows_values"], ...] = "shows_epis", "shows_grid", "shows_values"
+    return [] if pressed is None else [SetInspection(fields[pressed], not row[pressed][1])]
 
 
 def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -106,7 +106,7 @@ def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         actions.append(SetOverlay(None if chosen == OVERLAYS[pressed] else OVERLAYS[pressed]))
     opacity, is_on = 100 * state.inspection.opacity, chosen is not None
     percent = slider("Opacity", opacity, (0.0, 100.0), "%.0f %%", layout, OPACITY_TIP, is_enabled=is_on)
-    return actions + ([] if percent is None else [SetOpacity(percent / 100)])
+    return actions + ([] if percent is None else [SetInspection("opacity", percent / 100)])
 
 
 def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
