@@ -22,9 +22,7 @@ from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewU
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
-from viewer.gpu.gloss_textures import GlossTextures
-from viewer.gpu.light_field_texture import Box, LightFieldTexture
-from viewer.gpu.refocus.open_field import field_that_fits
+from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.layout import WHOLE, Rect
@@ -286,9 +284,7 @@ class SceneView:
 
     def add_gloss(self, snapshot: SceneSnapshot, found: GlossFound) -> None:
         """Have a snapshot drawn with this gloss."""
-        if snapshot.field.gloss is not None:
-            snapshot.field.gloss.release()
-        snapshot.field.gloss = None if found.maps is None else GlossTextures(self._gl.ctx, found.maps)
+        snapshot.field.set_gloss(found.maps)
         snapshot.gloss = found
 
     def is_shown(self, snapshot: SceneSnapshot) -> bool:

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
+from viewer.gpu.gloss_textures import GlossTextures
 from viewer.gpu.shared import Holders
 
 if TYPE_CHECKING:
-    from viewer.gpu.gloss_textures import GlossTextures
+    from iibr_core.rendering.gloss.shading import GlossMaps
 
 _ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255).astype(np.uint8)
 
@@ -61,6 +62,7 @@ class LightFieldTexture:
         counts = (len(range(middle % stride, count, stride)) for middle, count in zip(grid.centre, grid))
         self._kept = GridShape(*counts)
         check_fits(ctx, self._kept, width, height)
+        self._ctx = ctx
         self.grid, self.width, self.height, self.hdr = grid, width, height, hdr
         self.present = np.zeros(grid, bool)
         self.has_disparity = np.zeros(grid, bool)
@@ -130,6 +132,12 @@ class LightFieldTexture:
         depth = np.clip((values - far) * (top_value / (near - far)), 0, top_value)
         np.copyto(self._texels[(*box, 3)], depth if self.hdr else np.rint(depth), casting="unsafe")
 
+    def set_gloss(self, maps: GlossMaps | None) -> None:
+        """What gloss means for the field, for optics that have one; None where it means nothing."""
+        if self.gloss is not None:
+            self.gloss.release()
+        self.gloss = None if maps is None else GlossTextures(self._ctx, maps)
+
     def share(self) -> LightFieldTexture:
         """The same arrays, with the views and the gloss that are there now: what comes later is not seen in it.
 
@@ -169,6 +177,25 @@ class LightFieldTexture:
         if colors.shape != (*size, 3) or (disparity is not None and disparity.shape != size):
             given = colors.shape, None if disparity is None else disparity.shape
             raise ValueError(f"view ({row}, {column}): colours and disparity are {given}, the field's size is {size}")
+
+
+def field_that_fits(
+    ctx: moderngl.Context, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool
+) -> tuple[LightFieldTexture, str]:
+    """Room for as many views as the driver can hold, and a sentence where that is not all.
+
+    Raises InputError where it cannot hold a single one.
+    """
+    note = ""
+    for stride in range(1, max(grid) + 1):
+        try:
+            return LightFieldTexture(ctx, grid, width, height, hdr, with_disparity, stride), note
+        except InputError as error:
+            if stride == max(grid):
+                raise
+            ordinal = f"{stride + 1}{ {2: 'nd', 3: 'rd'}.get(stride + 1, 'th') }"
+            note = f"showing every {ordinal} view across and down: {error}"
+    raise AssertionError("the last try returns or raises")
 
 
 def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) -> None:

@@ -20,7 +20,7 @@ from iibr_core.rendering import Optics
 from iibr_core.scenes import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import Box, LightFieldTexture
+from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
@@ -35,7 +35,6 @@ from viewer.gpu.refocus.frame_budget import (
     stretch_image,
 )
 from viewer.gpu.refocus.lens import lens_of
-from viewer.gpu.refocus.open_field import OpenField
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.screen_image import ScreenImage
 from viewer.model.state.app_state import DrawReport
@@ -53,7 +52,8 @@ class Renderer:
 
     prefilter: smooth what lies between sparse samples; off, it shows them as separate copies. adaptive: tiles take few
     samples where all is sharp, and skip searches that find nothing. report: what is known of the picture drawn last.
-    passes_shown: how many passes of the best picture what is shown is made of; 0: it is softer than that.
+    passes_shown: how many passes of the best picture what is shown is made of; 0: it is softer than that. field: None
+    before the first. note: what of it had to be left out, a sentence for people.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -65,7 +65,9 @@ class Renderer:
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self.adaptive = True
-        self._fields = OpenField(self.ctx)
+        self.field: LightFieldTexture | None = None
+        self.note = ""
+        self._stand_in: LightFieldTexture | None = None
         self._screen = ScreenImage(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
         self._shown_from_pass = 0
@@ -84,19 +86,15 @@ class Renderer:
         self._accumulator.passes.adaptive = is_on
 
     @property
-    def field(self) -> LightFieldTexture | None:
-        """The light field, None before the first."""
-        return self._fields.field
-
-    @property
     def drawn_field(self) -> LightFieldTexture:
         """What is drawn: the field, or what stands in for it. Raises ValueError before the first."""
-        return self._fields.drawn
+        return self._stand_in or self._loaded
 
     @property
-    def note(self) -> str:
-        """What of the field had to be left out, a sentence for people."""
-        return self._fields.note
+    def _loaded(self) -> LightFieldTexture:
+        if self.field is None:
+            raise ValueError("no light field is open")
+        return self.field
 
     def open_field(
         self,
@@ -112,18 +110,22 @@ class Renderer:
         Where the graphics driver cannot hold all views, fewer are kept, and `note` says so. Raises InputError where it
         cannot hold a single one; the old field then stays.
         """
-        self._fields.open(grid, width, height, hdr, with_disparity, color_space)
+        field, self.note = field_that_fits(self.ctx, grid, width, height, hdr, with_disparity)
+        if self.field is not None:
+            self.field.release()
+        field.color_space = color_space
+        self.field = field
         self._accumulation = None
 
     def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Add or replace one view; see LightFieldTexture.upload."""
-        self._fields.loaded.upload(row, column, colors, disparity)
+        self._loaded.upload(row, column, colors, disparity)
         if not self.is_renewing:
             self._accumulation = None
 
     def change_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
         """Replace the disparity of the view uploaded last; see LightFieldTexture.change_disparity."""
-        self._fields.loaded.change_disparity(row, column, disparity, box)
+        self._loaded.change_disparity(row, column, disparity, box)
         if not self.is_renewing:
             self._accumulation = None
 
@@ -132,12 +134,19 @@ class Renderer:
 
         It has the size of the field's views, a disparity, and sRGB's colours.
         """
-        self._fields.stand_in(view)
+        if self._stand_in is not None:
+            self._stand_in.release()
+            self._stand_in = None
+        if view is not None:
+            field = self._loaded
+            size = field.grid, field.width, field.height
+            self._stand_in = LightFieldTexture(self.ctx, *size, field.hdr, with_disparity=True, stride=max(field.grid))
+            self._stand_in.upload(*field.grid.centre, view.colors, view.disparity)
         self._accumulation = None
 
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """What gloss means for the field, for optics that have one; None where it means nothing."""
-        self._fields.set_gloss(maps)
+        self._loaded.set_gloss(maps)
         self._accumulation = None
 
     def render(
@@ -228,7 +237,7 @@ class Renderer:
 
         What was drawn last stays as it is. field: it is drawn from, by default what the screen shows.
         """
-        field = self._fields.drawn if field is None else field
+        field = self.drawn_field if field is None else field
         accumulator = Accumulator(self.ctx, self.programs)
         accumulator.passes.adaptive = self.adaptive
         whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
@@ -263,7 +272,7 @@ class Renderer:
     @property
     def samples_converged(self) -> int:
         """How many the converged picture is made of, about."""
-        accumulation, field = self._current(), self._fields.drawn
+        accumulation, field = self._current(), self.drawn_field
         per_pass = 1
         if accumulation.lens.aperture_share > 0 and field.present.any():
             per_pass = len(accumulation.lens.samples(field.grid, field.present))
@@ -292,7 +301,9 @@ class Renderer:
         self.programs.release()
         self._accumulator.release()
         self._screen.release()
-        self._fields.release()
+        for field in (self.field, self._stand_in):
+            if field is not None:
+                field.release()
 
     def _current(self) -> ProgressiveAccumulation:
         assert self._accumulation is not None, "render first"
@@ -306,7 +317,7 @@ class Renderer:
         part: TargetWindow = WHOLE_PICTURE,
         field: LightFieldTexture | None = None,
     ) -> ProgressiveAccumulation:
-        field = self._fields.drawn if field is None else field
+        field = self.drawn_field if field is None else field
         whole_width_px = round(size_px[0] / part.width)
         lens = replace(lens_of(optics, field, whole_width_px, self.prefilter, level), part=part)
         count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
@@ -316,7 +327,7 @@ class Renderer:
         accumulation = self._current()
         sample_s = self._refining_s * math.prod(accumulation.size_px)
         targets = self._screen.targets_of(accumulation.size_px)
-        self._accumulator.sum_up(self._fields.drawn, accumulation, targets, passes, budget_s, sample_s)
+        self._accumulator.sum_up(self.drawn_field, accumulation, targets, passes, budget_s, sample_s)
 
     def _finish(self, framebuffer: moderngl.Framebuffer | None) -> None:
         targets = self._screen.targets_of(self._current().size_px)
@@ -325,7 +336,7 @@ class Renderer:
         self.passes_shown = self._current().pass_index
 
     def _work(self, optics: Optics, size_px: ScreenSize, part: TargetWindow, level: QualityLevel) -> DrawCost:
-        field = self._fields.drawn
+        field = self.drawn_field
         lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), self.prefilter, level)
         samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []
         return DrawCost(
