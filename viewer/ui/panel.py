@@ -24,7 +24,7 @@ from viewer.ui.sections.lens import aperture_section, focus_section, light_secti
 from viewer.ui.sections.scene import scene_section
 from viewer.ui.sections.view import view_section
 from viewer.ui.style import Palette, palette_of
-from viewer.ui.widgets import button, gap, heading, last_part, quiet, tooltip
+from viewer.ui.widgets import button, gap, heading, in_row, last_part, quiet, tooltip
 
 TOOLS = (
     (icons.ICON_FA_IMAGE, "Open a photo…"),
@@ -36,16 +36,6 @@ TOOLS = (
     (icons.ICON_FA_CIRCLE_HALF_STROKE, "Light or dark"),
     (icons.ICON_FA_CIRCLE_QUESTION, "Mouse and keys"),
 )
-SECTION_WORDS: dict[Section, str] = {
-    "view": "View",
-    "focus": "Focus",
-    "aperture": "Aperture",
-    "light": "Light",
-    "gloss": "Gloss",
-    "depth": "Depth",
-    "inspect": "Inspect",
-    "scene": "Scene",
-}
 _FIXED = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
@@ -128,13 +118,9 @@ def size_text(scene: Scene) -> str:
 def _tools(state: AppState, layout: Layout) -> list[Action]:
     """A row of icons for commands; what cannot be done now is grey."""
     actions: list[Action] = []
-    spacing = 4 * layout.ui_scale
-    width = (imgui.get_content_region_avail().x - spacing * (len(TOOLS) - 1)) / len(TOOLS)
-    for i, (icon, name) in enumerate(TOOLS):
+    for (icon, name), width in in_row(TOOLS, layout):
         command = BY_NAME[name]
         chords = f" ({command.chords[0].words})" if command.chords else ""
-        if i:
-            imgui.same_line(0, spacing)
         if button(f"{icon}##{name}", layout, name.rstrip("…") + chords, _is_possible(name, state), width):
             actions.append(command.action(state))
     return actions
@@ -232,7 +218,7 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout, pa
         ],
     }
     is_open = section in state.preferences.open_sections
-    toggled: list[Action] = [ToggleSection(section)] if heading(SECTION_WORDS[section], is_open, layout) else []
+    toggled: list[Action] = [ToggleSection(section)] if heading(section.capitalize(), is_open, layout) else []
     return toggled + (builders[section]() if is_open else [])
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from viewer.model.layout import Layout
 
+Item = TypeVar("Item")
 LABEL_WIDTH = 92.0
 GRIP_WIDTH, GRIP_HEIGHT = 12.0, 4.0
 TOOLTIP_WIDTH = 260.0
@@ -147,9 +149,24 @@ def heading(text: str, is_open: bool, layout: Layout) -> bool:
     return bool(pressed)
 
 
+def in_row(items: Sequence[Item], layout: Layout, a_row: int = 0) -> Iterator[tuple[Item, float]]:
+    """Each with its width, side by side over the whole width; a_row: so many at the most, 0: all of them."""
+    count, spacing = a_row or len(items), 4 * layout.ui_scale
+    width = (imgui.get_content_region_avail().x - spacing * (count - 1)) / count
+    for i, item in enumerate(items):
+        if i % count:
+            imgui.same_line(0, spacing)
+        yield item, width
+
+
 def quiet(text: str) -> None:
     """Words that do not ask for attention."""
-    imgui.push_style_color(imgui.Col_.text, imgui.get_style().color_(imgui.Col_.text_disabled))
+    colored(text, imgui.get_style().color_(imgui.Col_.text_disabled))
+
+
+def colored(text: str, color: imgui.ImVec4) -> None:
+    """Words in a colour, on as many lines as they need."""
+    imgui.push_style_color(imgui.Col_.text, color)
     imgui.text_wrapped(text)
     imgui.pop_style_color()
 

@@ -11,6 +11,7 @@ from viewer.model.layout import Layout
 from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import ShowOffer
+from viewer.ui.overlays.prompt_rows import CARD_FLAGS
 from viewer.ui.style import DARK
 from viewer.ui.widgets import tooltip
 
@@ -19,15 +20,7 @@ FULL, SHORT = "Free camera: off the plane of views. C returns", "Free camera. C 
 AT_END = "The photo ends here. C returns"
 GUESS_TIP = "Depth is guessed: it moves, it is not true."
 GAP = 8.0
-_BARE = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.no_background
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.no_focus_on_appearing
-    | imgui.WindowFlags_.always_auto_resize
-)
+_BARE = CARD_FLAGS | imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
 
 
 def chips(state: AppState, layout: Layout) -> list[Action]:

@@ -16,7 +16,7 @@ from viewer.model.state.notices import Notice
 from viewer.ui.overlays.progress_rows import build_rows, progress_rows
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import quiet
+from viewer.ui.widgets import colored, quiet
 
 NOTICE_WIDTH = 420.0
 LEAST_WIDTH, LEAST_HEIGHT = 160.0, 40.0
@@ -80,9 +80,7 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     imgui.same_line()
     imgui.begin_group()
     imgui.align_text_to_frame_padding()
-    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
-    imgui.text_wrapped(notice.text)
-    imgui.pop_style_color()
+    colored(notice.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
     offers += [("Use its settings", TakeSettings(notice.offer))] if notice.offer is not None else []
     offers += [(f"Close all ({others + 1})", DismissNotices())] if others else []

@@ -13,18 +13,17 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import Prompt
 from viewer.model.window_limits import LARGEST_SIDE_PX
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import button, combo, gap, label, tooltip
+from viewer.ui.widgets import button, colored, combo, gap, label, tooltip
 
 Choice = TypeVar("Choice", bound=str)
-CARD_FLAGS = (
+PROMPT_FLAGS = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
     | imgui.WindowFlags_.no_move
     | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
     | imgui.WindowFlags_.always_auto_resize
-    | imgui.WindowFlags_.no_focus_on_appearing
 )
+CARD_FLAGS = PROMPT_FLAGS | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_focus_on_appearing
 """Of a card that stands by itself over the picture."""
 
 
@@ -95,9 +94,7 @@ def size_rows(size_px: tuple[int, int], layout: Layout) -> int | None:
 def say_problem(problem: str, state: AppState) -> None:
     """Why it cannot be so, if there is a reason."""
     if problem:
-        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*palette_of(state.preferences.theme).error))
-        imgui.text_wrapped(problem)
-        imgui.pop_style_color()
+        colored(problem, imgui.ImVec4(*palette_of(state.preferences.theme).error))
 
 
 def button_rows(offers: list[tuple[str, Action]]) -> list[Action]:

@@ -24,6 +24,7 @@ from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.models_prompt import models_prompt
 from viewer.ui.overlays.prompt_rows import (
+    PROMPT_FLAGS,
     button_rows,
     focus_on_appearing,
     path_field,
@@ -67,13 +68,6 @@ PATH_WORDS = {
     "model": "A depth model: an ONNX file, or a folder",
     "model folder": "The folder of a depth model",
 }
-_FLAGS = (
-    imgui.WindowFlags_.no_title_bar
-    | imgui.WindowFlags_.no_resize
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.always_auto_resize
-)
 
 
 def prompts(state: AppState, layout: Layout) -> list[Action]:
@@ -82,7 +76,7 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     if prompt is None:
         return []
     _place(prompt, layout)
-    imgui.begin(f"prompt {type(prompt).__name__}", None, _FLAGS)
+    imgui.begin(f"prompt {type(prompt).__name__}", None, PROMPT_FLAGS)
     # A field that is typed in takes Esc for itself; one Esc is to close all of it.
     is_left = imgui.get_io().want_text_input and imgui.is_key_pressed(imgui.Key.escape, False)
     actions = _contents(prompt, state, layout)

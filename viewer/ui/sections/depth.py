@@ -21,7 +21,7 @@ from viewer.model.state.tasks import ChooseTask
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
-from viewer.ui.widgets import button, checkbox, choice, combo, gap, label, last_part, quiet, slider, tooltip
+from viewer.ui.widgets import button, checkbox, choice, combo, gap, in_row, label, last_part, quiet, slider, tooltip
 
 START_WORDS: dict[DepthStart, str] = {
     "auto": "The best there is",
@@ -173,11 +173,7 @@ def _brush(state: AppState, layout: Layout) -> list[Action]:
     brush = state.brush
     actions: list[Action] = []
     imgui.text("Brush")
-    spacing = 4 * layout.ui_scale
-    width = (imgui.get_content_region_avail().x - spacing * (TOOLS_A_ROW - 1)) / TOOLS_A_ROW
-    for i, tool in enumerate(BRUSH_TOOLS):
-        if i % TOOLS_A_ROW:
-            imgui.same_line(0, spacing)
+    for tool, width in in_row(BRUSH_TOOLS, layout, TOOLS_A_ROW):
         is_in_hand = brush.is_on and brush.tool == tool
         if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), BRUSH_TIPS[tool]):
             actions.append(SetBrush(replace(brush, tool=tool, is_on=not is_in_hand)))

@@ -24,9 +24,8 @@ from viewer.model.state.inspection import (
 )
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
-from viewer.ui.widgets import button, checkbox, choice, quiet, slider
+from viewer.ui.widgets import button, checkbox, choice, in_row, quiet, slider
 
-OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "Disparity", "entropy": "Entropy", "inpainted": "Inpainted"}
 EPI_TIP = (
     "Epipolar plane images through the pointer (E): one line of the picture from every view, a surface slopes the more"
     " the nearer."
@@ -99,7 +98,7 @@ def _toggles(state: AppState, layout: Layout) -> list[Action]:
 def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     imgui.text("Over the picture")
     chosen = state.inspection.overlay
-    row = [(OVERLAY_WORDS[k], chosen == k, OVERLAY_TIPS[k], obstacle_to_overlay(scene, k)) for k in OVERLAYS]
+    row = [(k.capitalize(), chosen == k, OVERLAY_TIPS[k], obstacle_to_overlay(scene, k)) for k in OVERLAYS]
     pressed = _choices(row, layout)
     actions: list[Action] = []
     if pressed is not None:
@@ -151,12 +150,8 @@ def pair_text(state: AppState, scene: Scene, kind: Comparison) -> str:
 
 def _choices(row: list[tuple[str, bool, str, str]], layout: Layout) -> int | None:
     """A row of lit buttons (word, is lit, tip, why not) as wide as the panel; which was pressed."""
-    spacing = 4 * layout.ui_scale
-    width = (imgui.get_content_region_avail().x - spacing * (len(row) - 1)) / len(row)
     pressed = None
-    for i, (word, is_on, tip, obstacle) in enumerate(row):
-        if i:
-            imgui.same_line(0, spacing)
+    for (i, (word, is_on, tip, obstacle)), width in in_row(tuple(enumerate(row)), layout):
         imgui.begin_disabled(bool(obstacle))
         if choice(word, is_on, layout, (width, 0), obstacle or tip):
             pressed = i

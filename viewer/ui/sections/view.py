@@ -13,7 +13,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
-from viewer.ui.style import Palette, pack_color
+from viewer.ui.style import Palette
 from viewer.ui.widgets import button, choice, slider, tooltip
 
 PAD_TIP = "Drag to move the viewpoint. Dots are views, faint ones still to be made; beyond the light area is a guess."
@@ -27,7 +27,7 @@ def view_section(state: AppState, scene: Scene, layout: Layout, palette: Palette
     imgui.same_line()
     imgui.begin_group()
     actions += _loops(state, layout)
-    _place(state, scene, palette)
+    _place(state)
     imgui.end_group()
     actions += _speed(state, layout)
     if farthest := dolly_limit(scene.grid):
@@ -50,14 +50,11 @@ def _loops(state: AppState, layout: Layout) -> list[Action]:
     return actions
 
 
-def _place(state: AppState, scene: Scene, palette: Palette) -> None:
+def _place(state: AppState) -> None:
     """Where the viewpoint is, in one line that never wraps."""
     eye = state.optics.eye
     s, t = (round(value, 1) + 0.0 for value in (eye.s, eye.t))  # + 0.0 takes the sign of -0.0 away
-    words = f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}"
-    imgui.push_style_color(imgui.Col_.text, pack_color(palette.quiet))
-    imgui.text(words)
-    imgui.pop_style_color()
+    imgui.text_disabled(f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}")
 
 
 def _speed(state: AppState, layout: Layout) -> list[Action]:
