@@ -8,7 +8,7 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
-from viewer.model.layout import BACKGROUND
+from viewer.model.layout import BACKGROUND, Rect
 from viewer.model.state.preferences import Theme
 
 FONT_SIZE = 16.0
@@ -76,6 +76,11 @@ def palette_of(theme: Theme) -> Palette:
 def pack_color(color: Color, alpha: float = 1.0) -> int:
     """A colour for draw lists."""
     return int(imgui.get_color_u32(imgui.ImVec4(color[0], color[1], color[2], color[3] * alpha)))
+
+
+def corners(rect: Rect) -> tuple[imgui.ImVec2, imgui.ImVec2]:
+    """The upper left and the lower right one."""
+    return imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height)
 
 
 def load_fonts() -> None:

@@ -12,7 +12,7 @@ from viewer.model.layout import Layout, Rect
 from viewer.model.reducers.folder import filmstrip_range, place_of_photo
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ScrollFilmstrip, StepPhoto, Thumbnail
-from viewer.ui.style import pack_color, palette_of
+from viewer.ui.style import corners, pack_color, palette_of
 
 CELL_ASPECT, ROOM = 1.5, 6.0
 WORDS_SIZE = 0.85
@@ -79,7 +79,7 @@ def _write(cell: Rect, words: str, state: AppState) -> None:
 def _cell(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, state: AppState, layout: Layout) -> bool:
     """The picture as large as it fits, a plain ground before it is read. Whether it was clicked."""
     palette, draw, scale = palette_of(state.preferences.theme), imgui.get_window_draw_list(), layout.ui_scale
-    corner, far = imgui.ImVec2(cell.x, cell.y), imgui.ImVec2(cell.x + cell.width, cell.y + cell.height)
+    corner, far = corners(cell)
     imgui.set_cursor_screen_pos(corner)
     pressed = imgui.invisible_button(f"photo {name}", imgui.ImVec2(cell.width, cell.height))
     is_hovered = imgui.is_item_hovered()
@@ -88,9 +88,8 @@ def _cell(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, sta
         width = min(cell.width, cell.height * thumbnail.aspect)
         height = width / thumbnail.aspect
         x, y = cell.x + (cell.width - width) / 2, cell.y + (cell.height - height) / 2
-        ends = imgui.ImVec2(x, y), imgui.ImVec2(x + width, y + height)
         uv = imgui.ImVec2(*thumbnail.low), imgui.ImVec2(*thumbnail.high)
-        draw.add_image(imgui.ImTextureRef(thumbnail.texture), *ends, *uv)
+        draw.add_image(imgui.ImTextureRef(thumbnail.texture), *corners(Rect(x, y, width, height)), *uv)
     if is_open or is_hovered:
         color = pack_color(palette.accent if is_open else palette.quiet)
         draw.add_rect(corner, far, color, 3 * scale, (3 if is_open else 1.5) * scale)

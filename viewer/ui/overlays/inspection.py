@@ -20,7 +20,7 @@ from viewer.model.lens.photographic_units import metres, metres_text
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Comparison, Origin, Probe
 from viewer.ui.overlays.reticle import WORD_GAP, hover_text
-from viewer.ui.style import DARK, Color, pack_color, palette_of
+from viewer.ui.style import DARK, Color, corners, pack_color, palette_of
 
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
 SIDES: dict[Comparison, tuple[str, str]] = {
@@ -82,8 +82,7 @@ def status_text(state: AppState, scene: Scene, hover: Hover, probe: Probe | None
 
 
 def _image(texture: int, rect: Rect) -> None:
-    corner, far = imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height)
-    imgui.get_background_draw_list().add_image(imgui.ImTextureRef(texture), corner, far)
+    imgui.get_background_draw_list().add_image(imgui.ImTextureRef(texture), *corners(rect))
 
 
 def _line(x0: float, y0: float, x1: float, y1: float, color: int, width: float) -> None:
@@ -164,10 +163,10 @@ def _draw_comparison(state: AppState, scene: Scene, layout: Layout, frame: Rect,
     draw.add_circle_filled(knob, 7.5 * scale, pack_color(DARK.text))
     for side in (-1, 1):
         tip, back = knob.x + side * 5 * scale, knob.x + side * 1.5 * scale
-        corners = imgui.ImVec2(back, knob.y - 3 * scale), imgui.ImVec2(back, knob.y + 3 * scale)
-        draw.add_triangle_filled(imgui.ImVec2(tip, knob.y), *corners, pack_color(DARK.background))
+        base = imgui.ImVec2(back, knob.y - 3 * scale), imgui.ImVec2(back, knob.y + 3 * scale)
+        draw.add_triangle_filled(imgui.ImVec2(tip, knob.y), *base, pack_color(DARK.background))
     names, top = SIDES[kind], frame.y + 8 * scale
-    draw.push_clip_rect(imgui.ImVec2(frame.x, frame.y), imgui.ImVec2(frame.x + frame.width, bottom), True)
+    draw.push_clip_rect(*corners(frame), True)
     _words(names[0], x - 10 * scale, top, scale, align=1.0)
     _words(names[1], x + 10 * scale, top, scale)
     pair = state.inspection.pair
@@ -204,7 +203,7 @@ def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, t
             _image(texture, rect)
     draw = imgui.get_background_draw_list()
     for rect in (across, down):
-        draw.push_clip_rect(imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height), True)
+        draw.push_clip_rect(*corners(rect), True)
         _draw_marks(state, scene, rect, layout, is_upright=rect is down)
         draw.pop_clip_rect()
     x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
@@ -260,8 +259,7 @@ def _draw_status(state: AppState, scene: Scene, layout: Layout, rect: Rect) -> N
             return
         if is_color and probe is not None:
             red, green, blue = (value / 255 for value in probe.rgb)
-            corner, far = imgui.ImVec2(x, y), imgui.ImVec2(x + swatch, y + swatch)
-            draw.add_rect_filled(corner, far, pack_color((red, green, blue, 1.0)), 3 * scale)
+            draw.add_rect_filled(*corners(Rect(x, y, swatch, swatch)), pack_color((red, green, blue, 1.0)), 3 * scale)
             x, width = x + swatch + 5 * scale, width - swatch - 5 * scale
         draw.add_text(imgui.ImVec2(x, y), pack_color(palette.text), words)
         x += width + gap

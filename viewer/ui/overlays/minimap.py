@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.model.layout import Layout
-from viewer.ui.style import DARK, pack_color
+from viewer.ui.style import DARK, corners, pack_color
 
 
 def draw_minimap(layout: Layout, texture: int) -> None:
@@ -13,9 +13,9 @@ def draw_minimap(layout: Layout, texture: int) -> None:
     at, picture, frame, draw = layout.minimap, layout.picture, layout.frame, imgui.get_background_draw_list()
     if at is None or picture is None or frame is None:
         return
-    scale, far = layout.ui_scale, imgui.ImVec2(at.x + at.width, at.y + at.height)
-    draw.add_image(imgui.ImTextureRef(texture), imgui.ImVec2(at.x, at.y), far)
-    draw.add_rect(imgui.ImVec2(at.x, at.y), far, pack_color((0, 0, 0, 1), 0.7), 0, scale)
+    scale, (near, far) = layout.ui_scale, corners(at)
+    draw.add_image(imgui.ImTextureRef(texture), near, far)
+    draw.add_rect(near, far, pack_color((0, 0, 0, 1), 0.7), 0, scale)
     left = at.x + (frame.x - picture.x) / picture.width * at.width
     top = at.y + (frame.y - picture.y) / picture.height * at.height
     right = left + frame.width / picture.width * at.width

@@ -6,16 +6,15 @@ import math
 
 from imgui_bundle import imgui
 
-from iibr_core.depth.editing import DEPTH_TOOLS
+from iibr_core.depth.editing import DEPTH_TOOLS, BrushTool
 from iibr_core.rendering import Optics
 from iibr_core.scenes import Scene, aperture_limit
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
-from viewer.model.state.optics import GlossBrush
 from viewer.model.state.preferences import Units
-from viewer.ui.style import DARK, pack_color
+from viewer.ui.style import DARK, Color, corners, pack_color
 
 HINT = "Drag to look"
 WORD_GAP = "  ·  "
@@ -32,16 +31,17 @@ def overlays(state: AppState, layout: Layout) -> None:
     if scene is None or picture is None or frame is None:
         return
     draw = imgui.get_background_draw_list()
-    far = imgui.ImVec2(frame.x + frame.width, frame.y + frame.height)
-    draw.push_clip_rect(imgui.ImVec2(frame.x, frame.y), far, True)
+    draw.push_clip_rect(*corners(frame), True)
     if state.tilt_handles is not None:
         _draw_handles(state.tilt_handles, layout, picture)
     if state.brush.is_on and scene.plan is not None:
         _draw_sample(state, layout, picture)
         if state.hover is not None:
-            _draw_brush(state, scene, state.hover, layout, picture)
+            _draw_brush(state.brush.radius, scene, state.hover, layout, picture, DARK.text)
+            _draw_direction(state.brush.tool, scene, state.hover, layout, picture)
     elif state.gloss_brush.is_on and state.optics.gloss is not None and state.hover is not None:
-        _draw_gloss_brush(state.gloss_brush, scene, state.hover, layout, picture)
+        color = DARK.warning if state.gloss_brush.erases else DARK.text
+        _draw_brush(state.gloss_brush.radius, scene, state.hover, layout, picture, color)
     elif state.hover is not None and state.hover.disparity is not None:
         _draw_reticle(state, scene, state.hover, layout, picture)
     draw.pop_clip_rect()
@@ -92,8 +92,7 @@ def _distance_words(scene: Scene, disparity: float, sharp: float, is_sharp: bool
 def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
     """A ring where a click would focus, and words beside it that stay within the picture."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
-    x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
-    y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
+    x, y = _pointed_at(hover, scene, picture)
     radius, frame = RETICLE_RADIUS * scale, layout.frame or picture
     _ring(draw, x, y, radius, scale, pack_color(DARK.text))
     words = pointer_text(state, scene, hover)
@@ -106,25 +105,27 @@ def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, p
     draw.add_text(imgui.ImVec2(left, top), pack_color(DARK.text), words)
 
 
-def _draw_brush(state: AppState, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
-    """How far the brush reaches about the pointer, and in its middle what it does."""
-    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
+def _pointed_at(hover: Hover, scene: Scene, picture: Rect) -> tuple[float, float]:
+    """In the window."""
     x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
-    y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
-    _ring(draw, x, y, max(state.brush.radius * picture.width, 2 * scale), scale, pack_color(DARK.text))
-    if state.brush.tool in ("nearer", "farther"):
-        arm = 4 * scale
-        draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), pack_color(DARK.text), 1.5 * scale)
-    if state.brush.tool == "nearer":
-        draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), pack_color(DARK.text), 1.5 * scale)
+    return x, picture.y + (hover.y_px + 0.5) / scene.height * picture.height
 
 
-def _draw_gloss_brush(brush: GlossBrush, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
+def _draw_brush(radius: float, scene: Scene, hover: Hover, layout: Layout, picture: Rect, color: Color) -> None:
+    """How far the brush reaches about the pointer. radius: of the photo's width."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
-    x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
-    y = picture.y + (hover.y_px + 0.5) / scene.height * picture.height
-    color = pack_color(DARK.warning if brush.erases else DARK.text)
-    _ring(draw, x, y, max(brush.radius * picture.width, 2 * scale), scale, color)
+    place = _pointed_at(hover, scene, picture)
+    _ring(draw, *place, max(radius * picture.width, 2 * scale), scale, pack_color(color))
+
+
+def _draw_direction(tool: BrushTool, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
+    """Plus or minus, for what brings nearer or pushes away."""
+    draw, scale, (x, y) = imgui.get_background_draw_list(), layout.ui_scale, _pointed_at(hover, scene, picture)
+    arm, color = 4 * scale, pack_color(DARK.text)
+    if tool in ("nearer", "farther"):
+        draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), color, 1.5 * scale)
+    if tool == "nearer":
+        draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), color, 1.5 * scale)
 
 
 def _draw_sample(state: AppState, layout: Layout, picture: Rect) -> None:

@@ -10,10 +10,10 @@ from iibr_core.depth.editing import DepthEdits, Levels, invert_tone_curve, tone_
 from iibr_core.scenes import Scene
 from viewer.model.actions import Action
 from viewer.model.colormap import map_color
-from viewer.model.layout import Layout
+from viewer.model.layout import Layout, Rect
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import SetTone
-from viewer.ui.style import pack_color, palette_of
+from viewer.ui.style import corners, pack_color, palette_of
 from viewer.ui.widgets import tooltip
 
 HEIGHT = 56.0
@@ -26,17 +26,14 @@ def depth_histogram(state: AppState, scene: Scene, layout: Layout) -> list[Actio
     levels = scene.levels
     if levels is None:
         return []
-    edits, scale = state.depth.edits, layout.ui_scale
-    corner = imgui.get_cursor_screen_pos()
+    scale, corner = layout.ui_scale, imgui.get_cursor_screen_pos()
     room = HANDLE_WIDTH * scale / 2
-    width, height = imgui.get_content_region_avail().x - 2 * room, HEIGHT * scale
-    left, top = corner.x + room, corner.y
-    _draw_bars(levels, edits, left, top, width, height)
-    _draw_focus(state, scene, levels, left, top, width, height, scale)
-    actions = _handle("far_clip", edits, left, top, width, height, state, layout)
-    actions += _handle("near_clip", edits, left, top, width, height, state, layout)
+    rect = Rect(corner.x + room, corner.y, imgui.get_content_region_avail().x - 2 * room, HEIGHT * scale)
+    _draw_bars(levels, state.depth.edits, rect)
+    _draw_focus(state, scene, levels, rect, scale)
+    actions = _handle("far_clip", rect, state, scale) + _handle("near_clip", rect, state, scale)
     imgui.set_cursor_screen_pos(corner)
-    imgui.dummy(imgui.ImVec2(width + 2 * room, height + 4 * scale))
+    imgui.dummy(imgui.ImVec2(rect.width + 2 * room, rect.height + 4 * scale))
     tooltip(TIP, layout)
     return actions
 
@@ -58,11 +55,10 @@ def focus_share(state: AppState, scene: Scene, levels: Levels) -> float | None:
     return share if 0 <= share <= 1 else None
 
 
-def _draw_bars(levels: Levels, edits: DepthEdits, left: float, top: float, width: float, height: float) -> None:
-    draw, style = imgui.get_window_draw_list(), imgui.get_style()
-    far = imgui.ImVec2(left + width, top + height)
-    ground = imgui.get_color_u32(imgui.Col_.frame_bg)
-    draw.add_rect_filled(imgui.ImVec2(left, top), far, ground, style.frame_rounding)
+def _draw_bars(levels: Levels, edits: DepthEdits, rect: Rect) -> None:
+    draw, (left, top, width, height) = imgui.get_window_draw_list(), rect
+    ground, rounding = imgui.get_color_u32(imgui.Col_.frame_bg), imgui.get_style().frame_rounding
+    draw.add_rect_filled(*corners(rect), ground, rounding)
     heights = bar_heights(levels, edits.is_inverted)
     step = width / len(heights)
     tone = replace(edits, is_inverted=False)
@@ -74,21 +70,17 @@ def _draw_bars(levels: Levels, edits: DepthEdits, left: float, top: float, width
         draw.add_rect_filled(corner, imgui.ImVec2(left + (i + 1) * step, top + height), color)
 
 
-def _draw_focus(
-    state: AppState, scene: Scene, levels: Levels, left: float, top: float, width: float, height: float, scale: float
-) -> None:
+def _draw_focus(state: AppState, scene: Scene, levels: Levels, rect: Rect, scale: float) -> None:
     share = focus_share(state, scene, levels)
     if share is not None:
-        x, color = left + share * width, pack_color(palette_of(state.preferences.theme).accent)
+        x, color = rect.x + share * rect.width, pack_color(palette_of(state.preferences.theme).accent)
         draw = imgui.get_window_draw_list()
-        draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, top + height), color, 1.5 * scale)
+        draw.add_line(imgui.ImVec2(x, rect.y), imgui.ImVec2(x, rect.y + rect.height), color, 1.5 * scale)
 
 
-def _handle(
-    name: str, edits: DepthEdits, left: float, top: float, width: float, height: float, state: AppState, layout: Layout
-) -> list[Action]:
+def _handle(name: str, rect: Rect, state: AppState, scale: float) -> list[Action]:
     """One of the clips: a line over the bars with a grip below; it follows the pointer while it is held."""
-    scale, palette = layout.ui_scale, palette_of(state.preferences.theme)
+    edits, palette, (left, top, width, height) = state.depth.edits, palette_of(state.preferences.theme), rect
     x = left + getattr(edits, name) * width
     grip = HANDLE_WIDTH * scale
     imgui.set_cursor_screen_pos(imgui.ImVec2(x - grip / 2, top))
@@ -99,8 +91,8 @@ def _handle(
     draw, bottom = imgui.get_window_draw_list(), top + height
     draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, bottom), color, scale)
     side, up = grip / 2, 7 * scale
-    corners = imgui.ImVec2(x - side, bottom + 4 * scale), imgui.ImVec2(x + side, bottom + 4 * scale)
-    draw.add_triangle_filled(imgui.ImVec2(x, bottom + 4 * scale - up), *corners, color)
+    low = imgui.ImVec2(x - side, bottom + 4 * scale), imgui.ImVec2(x + side, bottom + 4 * scale)
+    draw.add_triangle_filled(imgui.ImVec2(x, bottom + 4 * scale - up), *low, color)
     if not (is_held or is_released):
         return []
     share = min(max((imgui.get_io().mouse_pos.x - left) / width, 0.0), 1.0)

@@ -12,7 +12,7 @@ from viewer.model.actions import Action
 from viewer.model.layout import Layout, Rect
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye
-from viewer.ui.style import Palette, pack_color
+from viewer.ui.style import Palette, corners, pack_color
 
 PAD_SIDE = 136.0
 EDGE = 7.0
@@ -61,9 +61,8 @@ def pad(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list
 
 def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float, palette: Palette) -> None:
     draw, rect = imgui.get_window_draw_list(), chart.rect
-    corners = imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height)
-    draw.add_rect_filled(*corners, pack_color(palette.frame), 4 * scale)
-    draw.push_clip_rect(*corners, True)
+    draw.add_rect_filled(*corners(rect), pack_color(palette.frame), 4 * scale)
+    draw.push_clip_rect(*corners(rect), True)
     _draw_stored(draw, grid, chart, scale, palette)
     _draw_views(draw, state.views_there, grid, chart, scale, palette)
     x, y = chart.point(state.optics.eye)
@@ -77,8 +76,8 @@ def _draw_stored(draw: imgui.ImDrawList, grid: GridShape, chart: PadMap, scale: 
     left, top = chart.point(grid.offset(0, 0))
     right, bottom = chart.point(grid.offset(grid.rows - 1, grid.columns - 1))
     room = 4 * scale
-    corners = imgui.ImVec2(left - room, top - room), imgui.ImVec2(right + room, bottom + room)
-    draw.add_rect_filled(*corners, pack_color(palette.frame_hovered), 3 * scale)
+    ends = imgui.ImVec2(left - room, top - room), imgui.ImVec2(right + room, bottom + room)
+    draw.add_rect_filled(*ends, pack_color(palette.frame_hovered), 3 * scale)
 
 
 def _draw_views(
