@@ -297,7 +297,7 @@ class InspectionView:
     def _origin(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Origin:
         """By what the view nearest to the eye says of the surface under the pointer."""
         if scene.plan is None:
-            return "stored"
+            return "stored view"
         eye = state.optics.eye
         row, column = view_near(eye, scene.grid if field.grid == scene.grid else field.grid)
         view: ViewIndex = tuple(nearest_present(field.present)[row, column].tolist())

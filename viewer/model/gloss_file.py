@@ -14,6 +14,7 @@ import msgspec
 from iibr_core.formats import read_text
 from iibr_core.rendering.gloss import Gloss, require_sound
 from iibr_core.types import InputError
+from viewer.model.saved_settings import unknown_fields
 
 MOST_BYTES = 1_000_000
 
@@ -26,9 +27,8 @@ def read_gloss(path: Path) -> Gloss:
     text = read_text(path, MOST_BYTES)
     try:
         whole = tomllib.loads(text)
-        unknown = _unknown_names(whole, msgspec.to_builtins(Gloss()))
-        if unknown:
-            raise ValueError(f"it knows no {unknown[0]}")
+        for unknown in unknown_fields(whole, msgspec.to_builtins(Gloss())):
+            raise ValueError(f"it knows no {unknown}")  # a misspelt name would silently be as usual
         gloss = msgspec.convert(whole, Gloss)
         require_sound(gloss)
     except (ValueError, RecursionError) as error:
@@ -47,13 +47,3 @@ def require_environment(path: Path, gloss: Gloss) -> None:
         read_photo_header(Path(gloss.environment))
     except InputError as error:
         raise InputError(f"{path}: its environment cannot be read: {error}") from error
-
-
-def _unknown_names(given: dict[str, object], known: dict[str, object], within: str = "") -> list[str]:
-    """Names, with dots, that mean nothing: a misspelt one would silently be as usual."""
-    names = [f"{within}{name}" for name in given if name not in known]
-    for name, value in given.items():
-        inner = known.get(name)
-        if isinstance(value, dict) and isinstance(inner, dict):
-            names += _unknown_names(value, inner, f"{within}{name}.")
-    return names

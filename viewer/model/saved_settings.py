@@ -113,7 +113,7 @@ def settings_from_text(text: str, name: str, folder: Path | None = None, is_own:
         raise InputError(
             f"{name}: its settings are damaged or of another program ({reason}); set them by hand"
         ) from error
-    named = dict.fromkeys(_unknown_fields(whole, msgspec.to_builtins(read)))
+    named = dict.fromkeys(unknown_fields(whole, msgspec.to_builtins(read)))
     unknown = tuple(field for field in named if field not in OF_THE_MACHINE)
     optics, refused = _with_own_files(read.optics, folder)
     source = _source_from_text(Source(""), read.source)
@@ -227,14 +227,14 @@ def _require_within(name: str, value: int, limits: tuple[int, int]) -> None:
         raise ValueError(f"optics.aperture_shape.{name}: {value} is not from {low} to {high}")
 
 
-def _unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:
+def unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:
     """Names, with dots, of what stands in the text but not in what was read from it."""
     if isinstance(raw, dict) and isinstance(known, dict):
         for name, value in raw.items():
             if name in known:
-                yield from _unknown_fields(value, known[name], f"{within}{name}.")
+                yield from unknown_fields(value, known[name], f"{within}{name}.")
             else:
                 yield within + printable(" ".join(name.split())[:40])
     elif isinstance(raw, list) and isinstance(known, list | tuple):
         for value, known_value in zip(raw, known):
-            yield from _unknown_fields(value, known_value, within)
+            yield from unknown_fields(value, known_value, within)

@@ -23,7 +23,6 @@ from viewer.ui.sections.inspect import inspect_section
 from viewer.ui.sections.lens import aperture_section, focus_section, light_section
 from viewer.ui.sections.scene import scene_section
 from viewer.ui.sections.view import view_section
-from viewer.ui.style import Palette, palette_of
 from viewer.ui.widgets import button, gap, heading, in_row, last_part, quiet, tooltip
 
 TOOLS = (
@@ -49,7 +48,7 @@ _FIXED = (
 
 def panel(state: AppState, layout: Layout) -> list[Action]:
     """Build the panel; what the user changed comes back as actions."""
-    rect, palette = layout.panel, palette_of(state.preferences.theme)
+    rect = layout.panel
     if not rect.width:
         return []
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
@@ -69,7 +68,7 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
             quiet(report_text(state.report, state.progress.is_complete))
         actions += _presets(state.scene, layout)
         for section in SECTIONS:
-            actions += _section(section, state, state.scene, layout, palette)
+            actions += _section(section, state, state.scene, layout)
     imgui.end()
     return actions
 
@@ -200,26 +199,13 @@ def _presets(scene: Scene, layout: Layout) -> list[Action]:
     return actions
 
 
-def _section(section: Section, state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
+def _section(section: Section, state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """A heading that opens and closes what is under it. Where there is one view, focus and aperture mean nothing."""
     if section in ("focus", "aperture", "view") and not aperture_limit(scene.grid):
         return []
-    builders: dict[Section, Callable[[], list[Action]]] = {
-        "view": lambda: view_section(state, scene, layout, palette),
-        "focus": lambda: focus_section(state, scene, layout),
-        "aperture": lambda: aperture_section(state, scene, layout, palette),
-        "light": lambda: light_section(state, layout),
-        "gloss": lambda: gloss_section(state, layout, palette),
-        "depth": lambda: depth_section(state, scene, layout),
-        "inspect": lambda: inspect_section(state, scene, layout),
-        "scene": lambda: [
-            *scene_section(scene, state.source, state.jobs, state.facts, layout),
-            *_recent_elsewhere(state, layout),
-        ],
-    }
     is_open = section in state.preferences.open_sections
     toggled: list[Action] = [ToggleSection(section)] if heading(section.capitalize(), is_open, layout) else []
-    return toggled + (builders[section]() if is_open else [])
+    return toggled + (BUILDERS[section](state, scene, layout) if is_open else [])
 
 
 def _recent_elsewhere(state: AppState, layout: Layout) -> list[Action]:
@@ -229,3 +215,15 @@ def _recent_elsewhere(state: AppState, layout: Layout) -> list[Action]:
         return []
     gap(layout, 2)
     return _recent(others, state.source, layout)
+
+
+BUILDERS: dict[Section, Callable[[AppState, Scene, Layout], list[Action]]] = {
+    "view": view_section,
+    "focus": focus_section,
+    "aperture": aperture_section,
+    "light": light_section,
+    "gloss": gloss_section,
+    "depth": depth_section,
+    "inspect": inspect_section,
+    "scene": lambda state, scene, layout: scene_section(state, scene, layout) + _recent_elsewhere(state, layout),
+}

@@ -288,7 +288,7 @@ def test_words() -> None:
     assert "px" not in hover_text(plain.optics, SCENE, hover)
     words = status_text(numbers, SCENE, hover, Probe((1, 20, 255), 7, 35, "inpainted"))
     assert words == ["12, 4", "−0.50 px", "0.50 behind", "inpainted", "RGB 1 20 255", "seen in 7 of 35 views"]
-    flat = status_text(plain, SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "stored"))
+    flat = status_text(plain, SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "stored view"))
     assert flat == ["12, 4", "stored view", "RGB 0 0 0", "35 views"]
 
 

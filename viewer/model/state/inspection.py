@@ -45,8 +45,8 @@ class Pair:
     flip: float | None = None
 
 
-Origin = Literal["photo", "generated", "inpainted", "stored"]
-"""Where a pixel comes from; "stored": from a light field on disk."""
+Origin = Literal["photo", "generated", "inpainted", "stored view"]
+"""Where a pixel comes from; "stored view": from a light field on disk."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from viewer.model.inspection_request import (
 from viewer.model.layout import Layout, Rect
 from viewer.model.lens.photographic_units import metres, metres_text
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Comparison, Origin, Probe
+from viewer.model.state.inspection import Comparison, Probe
 from viewer.ui.overlays.reticle import WORD_GAP, hover_text
 from viewer.ui.style import DARK, Color, corners, pack_color, palette_of
 
@@ -28,12 +28,6 @@ SIDES: dict[Comparison, tuple[str, str]] = {
     "quality": ("fast", "balanced"),
     "truth": ("result", "truth"),
     "kept": ("kept", "now"),
-}
-ORIGIN_WORDS: dict[Origin, str] = {
-    "photo": "photo",
-    "generated": "generated",
-    "inpainted": "inpainted",
-    "stored": "stored view",
 }
 BLACK: Color = (0.0, 0.0, 0.0, 1.0)
 
@@ -76,9 +70,8 @@ def status_text(state: AppState, scene: Scene, hover: Hover, probe: Probe | None
         words += hover_text(state.optics, scene, hover, state.preferences.units).split(WORD_GAP)
     if probe is None:
         return words
-    words.append(ORIGIN_WORDS[probe.origin])
     counted = f"{probe.of} views" if probe.seen_in is None else f"seen in {probe.seen_in} of {probe.of} views"
-    return [*words, "RGB {} {} {}".format(*probe.rgb), counted]
+    return [*words, probe.origin, "RGB {} {} {}".format(*probe.rgb), counted]
 
 
 def _image(texture: int, rect: Rect) -> None:

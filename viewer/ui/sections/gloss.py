@@ -21,8 +21,9 @@ from viewer.model.actions import Action, DoTask
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
+from viewer.model.state.scene import Scene
 from viewer.model.state.tasks import ChooseTask
-from viewer.ui.style import Palette, pack_color
+from viewer.ui.style import Palette, pack_color, palette_of
 from viewer.ui.widgets import button, checkbox, choice, gap, quiet, slider, tooltip
 
 BALL_SIDE = 96.0
@@ -47,12 +48,13 @@ ERASE_TIP = "Drag over the picture to leave parts of it as they are (Esc puts th
 ONLY_TIP = "Nothing is glossy but what the brush marks."
 
 
-def gloss_section(state: AppState, layout: Layout, palette: Palette) -> list[Action]:
+def gloss_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the section: every row always, grey where it means nothing, so that none moves another under a click."""
     is_glossy, gloss = state.optics.gloss is not None, state.optics.gloss or FIRST_GLOSS
     is_on = checkbox("Glossy surface", is_glossy, layout, GLOSS_TIP)
     imgui.begin_disabled(not is_glossy)
-    edited = _reflection(replace(gloss, light=_light(gloss.light, layout, palette)), layout)
+    light = _light(gloss.light, layout, palette_of(state.preferences.theme))
+    edited = _reflection(replace(gloss, light=light), layout)
     actions = _surroundings(gloss, layout)
     edited = replace(edited, surface=_surface(gloss.surface, layout))
     actions += [] if edited == gloss else [SetOptics("gloss", edited)]

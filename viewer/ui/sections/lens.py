@@ -33,7 +33,7 @@ from viewer.model.state.optics import (
 )
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.aperture_icons import draw_shape
-from viewer.ui.style import Palette
+from viewer.ui.style import Palette, palette_of
 from viewer.ui.widgets import button, checkbox, choice, end_words, quiet, slider, whole_slider
 
 FOCUS_TIP = "What is sharp, from near to far. Click in the picture, or turn the wheel."
@@ -121,7 +121,7 @@ def _distance(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     return [] if disparity is None else [SetFocus(disparity)]
 
 
-def aperture_section(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
+def aperture_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the section: diameter, shape, and what the shape asks for."""
     actions: list[Action] = []
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
@@ -133,7 +133,7 @@ def aperture_section(state: AppState, scene: Scene, layout: Layout, palette: Pal
     else:
         actions += _stops(diameter, widest, f_number_text(scene, diameter), layout, tip)
     shape = state.optics.aperture_shape
-    actions += _kinds(shape, layout, palette)
+    actions += _kinds(shape, layout, palette_of(state.preferences.theme))
     if shape.kind == "mask":
         actions += _mask_row(shape, layout)
     return actions + [SetOptics("aperture_shape", new) for new in _shape_edits(shape, layout)]
@@ -197,7 +197,7 @@ def _mask_row(shape: ApertureShape, layout: Layout) -> list[Action]:
     return actions
 
 
-def light_section(state: AppState, layout: Layout) -> list[Action]:
+def light_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the section: exposure and highlights."""
     optics = state.optics
     actions: list[Action] = []

@@ -4,16 +4,13 @@ and why, and what reading it changed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from iibr_core.scenes import Scene, Source
+from iibr_core.scenes import Scene
 from iibr_core.types import GridShape
 from viewer.model.actions import Action, DoTask
 from viewer.model.dense_field import chosen_grid, denser_grids, with_views_between
 from viewer.model.layout import Layout
+from viewer.model.state.app_state import AppState
 from viewer.model.state.filling import FillTask
-from viewer.model.state.jobs import JobProgress
-from viewer.model.state.photo_facts import FactsRead
 from viewer.model.window_words import words_in_window
 from viewer.ui.widgets import combo, gap, label, quiet
 
@@ -23,13 +20,9 @@ BETWEEN_TIP = (
 )
 
 
-def scene_section(
-    scene: Scene, asked: Source | None, jobs: Sequence[JobProgress], facts: FactsRead, layout: Layout
-) -> list[Action]:
-    """Build the section; what can be changed in it: views between those of a light field.
-
-    asked: what is to be opened. jobs: those under way.
-    """
+def scene_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Build the section; what can be changed in it: views between those of a light field."""
+    facts = state.facts
     gap(layout, 2)
     of_file = facts.facts if facts.path == scene.source.path else ()
     for what, value in (*of_file, *_sizes(scene), ("Depth", scene.depth_source)):
@@ -41,7 +34,7 @@ def scene_section(
     for note in scene.further_notes:
         quiet(words_in_window(note))
     if scene.given_grid is not None and denser_grids(scene.given_grid):
-        return _views_between(scene, chosen_grid(scene, asked, jobs), scene.given_grid, layout)
+        return _views_between(scene, chosen_grid(scene, state.source, state.jobs), scene.given_grid, layout)
     return []
 
 

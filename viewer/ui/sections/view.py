@@ -13,15 +13,14 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
-from viewer.ui.style import Palette
 from viewer.ui.widgets import button, choice, slider, tooltip
 
 PAD_TIP = "Drag to move the viewpoint. Dots are views, faint ones still to be made; beyond the light area is a guess."
 
 
-def view_section(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
+def view_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the section."""
-    actions = pad(state, scene, layout, palette)
+    actions = pad(state, scene, layout)
     if not state.motion.is_running:
         tooltip("" if imgui.is_item_active() else PAD_TIP, layout)
     imgui.same_line()

@@ -12,7 +12,7 @@ from viewer.model.actions import Action
 from viewer.model.layout import Layout, Rect
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye
-from viewer.ui.style import Palette, corners, pack_color
+from viewer.ui.style import Palette, corners, pack_color, palette_of
 
 PAD_SIDE = 136.0
 EDGE = 7.0
@@ -45,13 +45,13 @@ def pad_map(rect: Rect, grid: GridShape, edge: float) -> PadMap:
     return PadMap(rect, ViewOffset((top + bottom) / 2, (left + right) / 2), (rect.width - 2 * edge) / widest)
 
 
-def pad(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list[Action]:
+def pad(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the pad; dragging in it moves the viewpoint."""
     side = PAD_SIDE * layout.ui_scale
     corner = imgui.get_cursor_screen_pos()
     imgui.invisible_button("pad", imgui.ImVec2(side, side))
     chart = pad_map(Rect(corner.x, corner.y, side, side), scene.grid, EDGE * layout.ui_scale)
-    _draw(state, scene.grid, chart, layout.ui_scale, palette)
+    _draw(state, scene.grid, chart, layout.ui_scale)
     if not imgui.is_item_active():
         return []
     mouse = imgui.get_io().mouse_pos
@@ -59,8 +59,8 @@ def pad(state: AppState, scene: Scene, layout: Layout, palette: Palette) -> list
     return [MoveEye(eye)] if eye != state.optics.eye else []
 
 
-def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float, palette: Palette) -> None:
-    draw, rect = imgui.get_window_draw_list(), chart.rect
+def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float) -> None:
+    draw, rect, palette = imgui.get_window_draw_list(), chart.rect, palette_of(state.preferences.theme)
     draw.add_rect_filled(*corners(rect), pack_color(palette.frame), 4 * scale)
     draw.push_clip_rect(*corners(rect), True)
     _draw_stored(draw, grid, chart, scale, palette)
