@@ -26,7 +26,7 @@ from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset
 
 HYPOTHESES = 6
-"""K: the paper's 5 surfaces and the plain look-up. More take time and gain little (docs/tables)."""
+"""K: the paper's 5 surfaces and the plain look-up. More take time and gain little (docs/speed.md)."""
 PLAIN = 128
 """Added to the source of the hypothesis that the ray shows the front-most surface as the photo mixed it at its edge."""
 LEAST_WEIGHT = 0.02

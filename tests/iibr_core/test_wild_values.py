@@ -508,6 +508,7 @@ FINITE_BY_CONTRACT = {
     "geometry.distance_between": "of lines that `line_of` made",
     "geometry.offset_of_line": "lines along the plane give infinity or NaN, as it says",
     "geometry.pixel_of_line": "lines along the plane give infinity or NaN, as it says",
+    "stages.stages_without": "names only",
     "inpainting.background.fill_background": "of rendered views only",
     "inpainting.background.continue_farthest": "of rendered views only",
     "inpainting.background.goes_on_in_front": "of rendered views only",
