@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from iibr_core.generation.memory_model import DRAFT_BYTES, UNDECIDED_BYTES, Making, making_bytes
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
+from iibr_core.rendering.ambiguity import AMBIGUOUS_PX
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 
@@ -25,12 +26,8 @@ STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
 SMOOTH_PX = 0.4
 """A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
-AMBIGUOUS_PX = 1.5
-"""Where a step of disparity moves its sides apart by more than this, surfaces meet: some rays there are ambiguous."""
 OPEN_SHARE = 0.28
 """Of the rays where surfaces meet, so many are left open by the closed form."""
-REMADE = 0.6
-"""What an outer view takes once more, of the closed form's time, where the transformer is asked."""
 MOST_PARALLAX_PX = 1e6
 
 
@@ -45,7 +42,7 @@ class Workload(NamedTuple):
     rays: float
 
 
-NANOSECONDS = Workload(45.0, 600.0, 1200.0)
+NANOSECONDS = Workload(45.0, 420.0, 1000.0)
 """What each takes one core."""
 
 
@@ -156,13 +153,12 @@ def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstim
 
 def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> Workload:
     """What there is to do for all views of a grid in one quality."""
-    pixels, views = statistics.step.size, grid.rows * grid.columns - 1
-    outer, asks = _inpainted_views(statistics, grid), quality != "fast"
-    # The outer views complete the ray set in closed form; for the transformer, most but their colours is made again.
-    again = REMADE * outer if asks else 0.0
-    rough = _sum_over_views(statistics.rough_share, grid) + again * statistics.rough_share(1.0)
+    pixels, views, asks = statistics.step.size, grid.rows * grid.columns - 1, quality != "fast"
+    # The outer views complete the ray set, which takes as long as they do; for the transformer they are made again.
+    more = (2 if asks else 1) * _inpainted_views(statistics, grid)
+    rough = _sum_over_views(statistics.rough_share, grid) + more * statistics.rough_share(1.0)
     rays = _sum_over_views(statistics.ambiguous_share, grid) if asks else 0.0
-    return Workload(pixels * (views + again), pixels * rough, pixels * rays)
+    return Workload(pixels * (views + more), pixels * rough, pixels * rays)
 
 
 def _sum_over_views(share: Callable[[float], float], grid: GridShape) -> float:

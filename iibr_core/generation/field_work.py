@@ -5,7 +5,7 @@ The unit is a view in closed form that one of several threads makes.
 
 from __future__ import annotations
 
-from iibr_core.generation.cost_model import REMADE, CostEstimates
+from iibr_core.generation.cost_model import CostEstimates
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import Quality
 
@@ -25,7 +25,7 @@ class FieldWork:
         self.quality = quality
         self.inner = costs.of(quality).seconds / costs.fast.seconds if costs.fast.seconds > 0 else 1.0
         self.finish_inner = max(self.inner - 1.0, 0.0)
-        self.finish_outer = self.finish_inner + REMADE if quality == "balanced" else 0.0
+        self.finish_outer = self.inner if quality == "balanced" else 0.0
         self.outer = OUTER_BY_MODEL if by_model else OUTER_WORK
         self._done = 0.0
         self._total = views[0] * (self.outer + self.finish_outer) + views[1] * self.inner

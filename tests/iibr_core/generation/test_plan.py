@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.generation.cost_model import REMADE, estimate_workload, largest_offset, measure_parallax
+from iibr_core.generation.cost_model import estimate_workload, largest_offset, measure_parallax
 from iibr_core.generation.light_field import generate, ray_set
 from iibr_core.generation.memory_model import whole_bytes
 from iibr_core.generation.plan import (
@@ -113,7 +113,7 @@ def test_as_many_views_are_counted_again_as_complete_the_ray_set(grid):
     again = len(list(ray_set(photo, disparity, plan_literal(photo, disparity, grid))[1]))
     statistics = measure_parallax(disparity.values, largest_offset(grid))
     fast, balanced = (estimate_workload(statistics, grid, quality) for quality in ("fast", "balanced"))
-    assert balanced.pixels - fast.pixels == pytest.approx(REMADE * again * disparity.values.size)
+    assert balanced.pixels - fast.pixels == again * disparity.values.size
 
 
 def test_plans_load_no_kernels_until_one_is_made():
@@ -199,7 +199,7 @@ def quality_planned(parallax_px, wanted=None, squares=200):
 
 def test_the_transformer_is_asked_where_it_is_worth_its_time():
     assert quality_planned(8.0, squares=5).quality == "balanced"
-    rough = quality_planned(8.0, squares=800)
+    rough = quality_planned(8.0, squares=400)
     assert rough.costs.balanced.seconds > 1.5 * rough.costs.fast.seconds
     assert rough.quality == "fast"
     assert rough.peak_bytes == rough.costs.fast.peak_bytes
