@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.agreement import find_confirmed
 from iibr_core.depth.multi_view.gradient_refinement import refine_by_gradients
-from iibr_core.depth.multi_view.matching import MatchingViews, choose_views, luma_of, matching_views, sweep
+from iibr_core.depth.multi_view.matching import STEP_PX, MatchingViews, choose_views, luma_of, matching_views, sweep
 from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
@@ -32,8 +32,6 @@ from iibr_core.types import (
 FINDING = "finding disparity"
 SMALL_SIDE_PX = 160
 """The longer side of the first, small map."""
-STEP_PX = 0.5
-"""By which the farthest view's match moves from one disparity of a sweep to the next."""
 MOST_SHIFT_SHARE = 0.4
 """Of the longer side: by which the farthest view's match may be shifted."""
 SURE = 0.4

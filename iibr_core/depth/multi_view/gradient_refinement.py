@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from iibr_core.depth.multi_view.matching import MatchingViews
+from iibr_core.depth.multi_view.matching import STEP_PX, MatchingViews
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, image_size
@@ -14,8 +14,6 @@ from iibr_core.types import FloatImage, image_size
 ROUNDS = 2
 UNLIKE = 0.02
 """Differences of texture (1 = white) from which on a view counts as hidden there (Geman and McClure's weights)."""
-LONGEST_STEP_PX = 0.5
-"""By which the farthest view's match may move in a round."""
 SMOOTHNESS = 1e-2
 EDGE_LUMA = 0.05
 """Edges of the picture this strong let a third of the smoothness through."""
@@ -31,7 +29,7 @@ def refine_by_gradients(views: MatchingViews, disparity: FloatImage, should_stop
     Raises Cancelled once should_stop is true.
     """
     size = image_size(disparity)
-    longest = np.float32(LONGEST_STEP_PX / max(views.reach, 1e-6))
+    longest = np.float32(STEP_PX / max(views.reach, 1e-6))
     curvature, pull = np.empty(size, np.float32), np.empty(size, np.float32)
     for _ in range(ROUNDS):
         _measure_all(views, disparity, curvature, pull, should_stop)

@@ -22,6 +22,8 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
 from iibr_core.types import FloatImage, StoredColors, ViewOffset
 
+STEP_PX = 0.5
+"""By which the farthest view's match moves from one disparity of a sweep to the next."""
 MOST_VIEWS = 32
 """Matched against the reference: on eight rays from it, as the others add little."""
 TEXTURE_RADIUS_PX = 3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,7 @@ JUMP_COST = 240
 """Of any greater step, where the picture shows no edge."""
 EDGE_LUMA = 0.02
 """An edge of this much (1 = white) brings the cost of a jump down to a third of it."""
-PATHS = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
+PATHS = [at for at in product((-1, 0, 1), repeat=2) if any(at)]
 """The directions, (y, x), from which neighbours are heard."""
 
 
