@@ -34,9 +34,9 @@ def bytes_of(**arrays: str) -> int:
 
 
 MIB = 2**20
-VIEWER_BYTES, WRITER_BYTES = 350 * MIB, 260 * MIB
+VIEWER_BYTES, WRITER_BYTES = 370 * MIB, 280 * MIB
 """Measured, of a process that does nothing yet: Python and compiled kernels; OpenGL, where views are shown."""
-HEADROOM = 1.06
+HEADROOM = 1.15
 """Times the arrays: small ones are not counted, and heaps are never full."""
 READING_BYTES, DEPTH_MAP_BYTES, TILE_BYTES = 90, 26, 121
 """Measured, the most per pixel: of a photo while it is read and its depth looked for; of a map of depth while it
