@@ -8,9 +8,10 @@ import numpy as np
 
 from iibr_core.rendering.aperture_shape import openness
 from iibr_core.rendering.lens_light import LargeLens, LensSample
-from iibr_core.rendering.optics import HIGHLIGHT_GAIN, Optics
+from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
+from viewer.gpu.refocus.lens import highlight_gain
 
 SHARP_UP_TO_PX = (1.0, 2.0)
 """Pixels of the light field: what is blurred wider holds nothing that its own picture does not show."""
@@ -34,7 +35,7 @@ def large_lens(optics: Optics, scene: Scene, enlarged: float) -> LargeLens:
         tilt=(enlarged * optics.focus_tilt[0], enlarged * optics.focus_tilt[1]),
         focus_range=enlarged * max(optics.focus_range, 0.0),
         sharp_up_to_px=(from_px, to_px),
-        highlight_gain=0.0 if scene.is_hdr else HIGHLIGHT_GAIN * optics.highlight_recovery * min(diameter, 1.0),
+        highlight_gain=highlight_gain(optics, diameter, scene.is_hdr),
         exposure=2.0**optics.exposure_stops,
     )
 
