@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.disparity_statistics import SOFT
-from iibr_core.rendering.ray_set import CELL_PX, RayArrays, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, OWN_SURFACE_PX, RayArrays, RaySet
 from iibr_core.rendering.resampling import ShownRays
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset
@@ -44,8 +44,6 @@ AMBIGUOUS_AROUND_PX = 1.5
 """Near a soft edge a surface that lands near by makes a ray ambiguous if its parallax differs by this."""
 OWN_LANDING_PX = 0.75
 """What lands near by and differs from a hypothesis by less parallax than this is of its surface."""
-DISTINCT_PX = 0.5
-"""Hypotheses closer than this are one; where all of a ray's are, nothing is to be decided."""
 VISIBLE = 0.08
 """Where the colours of a ray's hypotheses lie no farther apart than this, sRGB-encoded, nothing is to be decided."""
 INPAINTED_APART_PX = 100.0
@@ -250,7 +248,7 @@ def _pick_apart(near_disparity, near_source, n, photo_images, parallax, disparit
             for i in range(n):
                 between = INPAINTED_APART_PX if (near_source[i] >= photo_images) != is_guess else 0.0
                 away[i] = min(away[i], abs(near_disparity[i] - d) * parallax + between)
-        best, best_distance = -1, DISTINCT_PX
+        best, best_distance = -1, OWN_SURFACE_PX
         for i in range(n):
             if away[i] > best_distance:
                 best, best_distance = i, away[i]
@@ -322,4 +320,4 @@ def _is_undecided(landed, y, x, disparity, source):
             r, g, b = images[k, v, u, 0], images[k, v, u, 1], images[k, v, u, 2]
             low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
             high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
-    return apart > DISTINCT_PX and max(high_r - low_r, high_g - low_g, high_b - low_b) > VISIBLE
+    return apart > OWN_SURFACE_PX and max(high_r - low_r, high_g - low_g, high_b - low_b) > VISIBLE

@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.coherent_cells import backward_warp, find_coherent_cells, land_incoherent
 from iibr_core.rendering.joined_rays import BELOW, RIGHT
-from iibr_core.rendering.ray_set import CELL_PX, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, OWN_SURFACE_PX, RaySet
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset
 
-SAME_SURFACE_PX = 0.5
-"""Rays of one source whose colour look-ups lie closer than this are one candidate."""
 SEALED_GAP_PX = 0.75
 """A gap between landing neighbours up to this wide is no disocclusion: their footprints stretch to meet. So they do
 where a steep surface joins them.
@@ -132,7 +130,7 @@ def _land_rays(rays, index, joined, steep, needed, needed_rows, s, t, found):
     slots, rows, width = coverage.shape
     height = len(ray_disparity)
     # The same as a difference of disparities.
-    same_surface = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
+    same_surface = OWN_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     for y in range(height):
         if not needed_rows[y // CELL_PX]:
             continue

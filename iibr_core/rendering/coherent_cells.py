@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ray_set import CELL_PX, Cells, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, OWN_SURFACE_PX, Cells, RaySet
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage, ViewOffset
 
@@ -17,8 +17,6 @@ REACH_PX = 1.5
 """A ray that lands farther than this from a pixel's centre does not touch the pixel."""
 ONE_SURFACE_PX = 1.0
 """What lands on a cell with more parallax between its parts is not taken for one surface."""
-IN_FRONT_PX = 0.5
-"""An inpainted ray shows before a surface of the photo only if it is this far in front of it."""
 SETTLED_PX = 0.002
 """A ray is followed until it moves by less than this."""
 MOST_ROUNDS = 30
@@ -108,7 +106,7 @@ def _land_cells(cells, incoherent, offsets, first_cell, photo_images, parallax, 
                         if k == 0 and not incoherent[v, u]:
                             far[row, column] = min(far[row, column], least)
                             near[row, column] = max(near[row, column], most)
-                        elif k < photo_images or (most - far[row, column]) * parallax > IN_FRONT_PX:
+                        elif k < photo_images or (most - far[row, column]) * parallax > OWN_SURFACE_PX:
                             smooth[row, column] = False
 
 

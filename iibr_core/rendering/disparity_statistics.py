@@ -15,9 +15,7 @@ from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
 AROUND_PX = 2
-"""Reach of the range of disparities around a source ray."""
-STEP_AROUND_PX = 2
-"""Reach of the search for a depth edge."""
+"""Reach of the range of disparities, and of the largest step, around a source ray."""
 EDGE_WINDOW_PX = 8
 """A depth edge softer than this is a slope."""
 SOFT_EDGES_PX = (8, 12)
@@ -36,7 +34,7 @@ EDGE_PARALLAX_PX = 2.0
 
 class DisparityStatistics(NamedTuple):
     """Of S source images. low, high (S, H, W): least and greatest disparity within AROUND_PX of each ray. step
-    (S, H, W): the largest step between neighbours within STEP_AROUND_PX; all px per view step, 0 where nothing is.
+    (S, H, W): the largest step between neighbours there; all px per view step, 0 where nothing is.
     softness: 0..1, of the photo's depth edges: 0 where each is one step, near 1 where they are slopes. soft (H, W):
     the photo's rays near a soft edge.
     """
@@ -166,7 +164,7 @@ def _row_edges(rows, least_edge, changes, lefts, soft):
 def _window_extremes(disparity, first, last, low, high, step):
     """Rows [first, last) of the range, and of the largest step, within a square: along rows first, then columns."""
     height, width = disparity.shape
-    top, bottom = max(first - STEP_AROUND_PX, 0), min(last + STEP_AROUND_PX, height)
+    top, bottom = max(first - AROUND_PX, 0), min(last + AROUND_PX, height)
     row_low, row_high = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
     row_step, row_rise = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
     _extremes_along_rows(disparity, top, row_low, row_high, row_step, row_rise)
@@ -180,23 +178,23 @@ def _extremes_along_rows(disparity, top, low, high, step, rise):
     NaN lies around the frame, as where nothing is: it is neither less nor greater than anything.
     """
     width = disparity.shape[1]
-    here = np.full(width + 2 * STEP_AROUND_PX, np.nan, np.float32)
-    above = np.full(width + 2 * STEP_AROUND_PX, np.nan, np.float32)
+    here = np.full(width + 2 * AROUND_PX, np.nan, np.float32)
+    above = np.full(width + 2 * AROUND_PX, np.nan, np.float32)
     for row in range(len(low)):
-        here[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[top + row]
+        here[AROUND_PX : AROUND_PX + width] = disparity[top + row]
         if top + row > 0:
-            above[STEP_AROUND_PX : STEP_AROUND_PX + width] = disparity[top + row - 1]
+            above[AROUND_PX : AROUND_PX + width] = disparity[top + row - 1]
         for x in range(width):
             # Written out: NaN fails every comparison, where min and max might keep it.
             least, most = np.float32(np.inf), np.float32(-np.inf)
-            for i in range(STEP_AROUND_PX - AROUND_PX, STEP_AROUND_PX + AROUND_PX + 1):
+            for i in range(2 * AROUND_PX + 1):
                 d = here[x + i]
                 least, most = d if d < least else least, d if d > most else most
             widest, steepest = np.float32(0.0), np.float32(0.0)
-            for i in range(2 * STEP_AROUND_PX):
+            for i in range(2 * AROUND_PX):
                 change = abs(here[x + i + 1] - here[x + i])
                 widest = change if change > widest else widest
-            for i in range(2 * STEP_AROUND_PX + 1):
+            for i in range(2 * AROUND_PX + 1):
                 change = abs(here[x + i] - above[x + i])
                 steepest = change if change > steepest else steepest
             low[row, x], high[row, x] = least, most
@@ -211,17 +209,15 @@ def _extremes_along_columns(row_low, row_high, row_step, row_rise, top, first, l
         least_here, most_here, widest_here = low[y], high[y], step[y]
         least_here[:], most_here[:], widest_here[:] = np.inf, -np.inf, 0.0
         # Row by row, so that the inner loops run along the rows in memory.
-        for v in range(max(y - STEP_AROUND_PX, 0), min(y + STEP_AROUND_PX + 1, bottom)):
+        for v in range(max(y - AROUND_PX, 0), min(y + AROUND_PX + 1, bottom)):
             for x in range(width):
                 widest_here[x] = max(widest_here[x], row_step[v - top, x])
+                least_here[x] = min(least_here[x], row_low[v - top, x])
+                most_here[x] = max(most_here[x], row_high[v - top, x])
             # A rise comes from the row before: that of the first row leads out of the square.
-            if v > y - STEP_AROUND_PX:
+            if v > y - AROUND_PX:
                 for x in range(width):
                     widest_here[x] = max(widest_here[x], row_rise[v - top, x])
-            if abs(v - y) <= AROUND_PX:
-                for x in range(width):
-                    least_here[x] = min(least_here[x], row_low[v - top, x])
-                    most_here[x] = max(most_here[x], row_high[v - top, x])
         # Nothing near by: both 0.
         for x in range(width):
             if not least_here[x] <= most_here[x]:

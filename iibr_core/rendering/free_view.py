@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import continue_farthest
-from iibr_core.rendering.candidates import SAME_SURFACE_PX, SEALED_GAP_PX
+from iibr_core.rendering.candidates import SEALED_GAP_PX
 from iibr_core.rendering.joined_rays import BELOW, RIGHT
-from iibr_core.rendering.ray_set import CELL_PX, HIGHEST_LEVEL, RaySet
+from iibr_core.rendering.ray_set import CELL_PX, HIGHEST_LEVEL, OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
@@ -82,7 +82,7 @@ def render_free_view(
     drawing = [tuple(map(float, matrix.ravel())) for matrix in matrices]
     looking_up = np.stack([np.linalg.inv(matrix).ravel() for matrix in matrices])
     landing = [_landing(rays, k, matrix, should_stop) for k, matrix in enumerate(drawing)]
-    surface, sealed_step = SAME_SURFACE_PX / rays.farthest_views, SEALED_STEPS * rounding_step
+    surface, sealed_step = OWN_SURFACE_PX / rays.farthest_views, SEALED_STEPS * rounding_step
 
     def band(first: int, last: int) -> None:
         nearest, source = _draw(rays, drawing, landing, surface, sealed_step, (first, last), size.width)
@@ -310,7 +310,7 @@ def _resolve(
                 spans_y = max(abs(m[4] - at_y * m[8]), abs(m[5] - at_y * m[9])) / abs(w)
                 is_fine = max(spans_x, spans_y) > FINE_PX
                 moves = max(abs(m[3] - at_x * m[11]), abs(m[7] - at_y * m[11]), 1e-9)
-                one_surface = SAME_SURFACE_PX * abs(w) / moves
+                one_surface = OWN_SURFACE_PX * abs(w) / moves
                 parallax = moves / max(abs(m[15] - at_d * m[11]), 1e-9)
                 limit = min(max(farthest_views / parallax, 1.0), HIGHEST_LEVEL - 1.0)
                 # The samples of its surface: their mean place and disparity lie on it.

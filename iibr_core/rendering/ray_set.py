@@ -24,6 +24,8 @@ CELL_PX = 4
 """Side of the cells that rays are summarised by."""
 NO_MARGINS = Margins()
 HIGHEST_LEVEL = 255
+OWN_SURFACE_PX = 0.5
+"""Rays whose landing, or look-ups, differ by more parallax than this are of several surfaces."""
 SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
 IN_FRONT_PX = 1.0

@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.types import FloatImage
 
 KEYS_A = np.float32(-0.75)
 """The sharper of the usual cubic kernels; it scored as well as longer ones on held-out light fields."""
-OWN_SURFACE_PX = 0.5
-"""Pixels whose landing differs by more than this from the candidate's belong to another surface."""
 SOLE = 1 - 1e-6
 """A candidate with at least this share of the weights is the only one."""
 LEAST_TAP_WEIGHT = 0.3

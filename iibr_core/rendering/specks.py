@@ -13,8 +13,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ray_set import HIGHEST_LEVEL, RaySet
-from iibr_core.rendering.resampling import OWN_SURFACE_PX
+from iibr_core.rendering.ray_set import HIGHEST_LEVEL, OWN_SURFACE_PX, RaySet
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ViewOffset, image_size

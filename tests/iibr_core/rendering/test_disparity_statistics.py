@@ -8,7 +8,6 @@ from iibr_core.rendering.disparity_statistics import (
     SHARP_SHARE,
     SOFT_AROUND_PX,
     SOFT_EDGES_PX,
-    STEP_AROUND_PX,
     find_soft_edges,
     measure_disparity,
 )
@@ -24,9 +23,7 @@ def slow_surroundings(disparity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
             near = disparity[max(y - AROUND_PX, 0) : y + AROUND_PX + 1, max(x - AROUND_PX, 0) : x + AROUND_PX + 1]
             if np.isfinite(near).any():
                 low[y, x], high[y, x] = np.nanmin(near), np.nanmax(near)
-            wide = disparity[
-                max(y - STEP_AROUND_PX, 0) : y + STEP_AROUND_PX + 1, max(x - STEP_AROUND_PX, 0) : x + STEP_AROUND_PX + 1
-            ]
+            wide = disparity[max(y - AROUND_PX, 0) : y + AROUND_PX + 1, max(x - AROUND_PX, 0) : x + AROUND_PX + 1]
             steps = [np.abs(np.diff(wide, axis=axis)).ravel() for axis in (0, 1)]
             step[y, x] = max((s for s in np.concatenate(steps) if np.isfinite(s)), default=0)
     return low, high, step

@@ -7,8 +7,7 @@ import pytest
 from scipy import ndimage
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import OWN_SURFACE_PX
+from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.specks import (
     GAP_PX,
     STANDS_OUT,
