@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from iibr_core.generation.memory_model import DRAFT_BYTES, UNDECIDED_BYTES, Making, making_bytes
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
-from iibr_core.rendering.ambiguity import AMBIGUOUS_PX
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 
@@ -26,6 +25,8 @@ STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
 SMOOTH_PX = 0.4
 """A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
+AMBIGUOUS_PX = 1.5
+"""Where a step of disparity moves its sides apart by more than this, surfaces meet: some rays there are ambiguous."""
 OPEN_SHARE = 0.28
 """Of the rays where surfaces meet, so many are left open by the closed form."""
 MOST_PARALLAX_PX = 1e6

@@ -31,8 +31,7 @@ class PixelRect(NamedTuple):
         return ScreenSize(self.width, self.height)
 
 
-@dataclass(frozen=True)
-class Rect:
+class Rect(NamedTuple):
     """A rectangle: its upper left corner and its size."""
 
     x: float
@@ -52,6 +51,11 @@ class Rect:
             min(self.y + self.height, other.y + other.height),
         )
         return Rect(x, y, max(far_x - x, 0.0), max(far_y - y, 0.0))
+
+    def part(self, inner: Rect) -> Rect:
+        """A part of it. inner: as shares of it."""
+        left, top = self.x + inner.x * self.width, self.y + inner.y * self.height
+        return Rect(left, top, inner.width * self.width, inner.height * self.height)
 
 
 WHOLE = Rect(0.0, 0.0, 1.0, 1.0)

@@ -17,11 +17,11 @@ from iibr_core.rendering.gloss import (
     GlossSurface,
     Triple,
 )
+from iibr_core.scenes import Scene
 from viewer.model.actions import Action, DoTask
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
-from viewer.model.state.scene import Scene
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.style import Palette, pack_color, palette_of
 from viewer.ui.widgets import button, checkbox, choice, gap, quiet, slider, tooltip
