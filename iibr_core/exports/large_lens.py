@@ -11,7 +11,6 @@ from iibr_core.rendering.lens_light import LargeLens, LensSample
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.gpu.refocus.lens import highlight_gain
 
 SHARP_UP_TO_PX = (1.0, 2.0)
 """Pixels of the light field: what is blurred wider holds nothing that its own picture does not show."""
@@ -35,7 +34,7 @@ def large_lens(optics: Optics, scene: Scene, enlarged: float) -> LargeLens:
         tilt=(enlarged * optics.focus_tilt[0], enlarged * optics.focus_tilt[1]),
         focus_range=enlarged * max(optics.focus_range, 0.0),
         sharp_up_to_px=(from_px, to_px),
-        highlight_gain=highlight_gain(optics, diameter, scene.is_hdr),
+        highlight_gain=optics.highlight_gain(diameter, scene.is_hdr),
         exposure=2.0**optics.exposure_stops,
     )
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
         APERTURE_KINDS,
         CENTRE,
         EXPOSURE_LIMIT_STOPS,
-        HIGHLIGHT_GAIN,
         RING_INNER_LIMIT,
         ApertureKind,
         ApertureMask,

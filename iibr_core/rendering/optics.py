@@ -76,3 +76,7 @@ class Optics:
     highlight_recovery: float = within(0.0, 1.0, 0.0)
     exposure_stops: float = within(-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS, 0.0)
     gloss: Gloss | None = None
+
+    def highlight_gain(self, diameter: float, is_hdr: bool) -> float:
+        """What clipped light counts for beyond white through an aperture so many view steps wide."""
+        return 0.0 if is_hdr else HIGHLIGHT_GAIN * self.highlight_recovery * min(diameter, 1.0)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.exports import WHOLE_PICTURE, TargetWindow
-from iibr_core.rendering import HIGHLIGHT_GAIN, Optics
+from iibr_core.rendering import Optics
 from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
@@ -122,16 +122,11 @@ def lens_of(
         widest_blur_px=blur_px * beside,
         samples_across=samples_across,
         keeps_layers=keeps,
-        highlight_gain=highlight_gain(optics, diameter, field.hdr),
+        highlight_gain=optics.highlight_gain(diameter, field.hdr),
         exposure=2.0**optics.exposure_stops,
         most_sources=level.sources,
         color_space=field.color_space,
     )
-
-
-def highlight_gain(optics: Optics, diameter: float, is_hdr: bool) -> float:
-    """What clipped light counts for beyond white through an aperture so many view steps wide."""
-    return 0.0 if is_hdr else HIGHLIGHT_GAIN * optics.highlight_recovery * min(diameter, 1.0)
 
 
 def _most_beside_focus(optics: Optics, range_px: tuple[float, float]) -> float:
