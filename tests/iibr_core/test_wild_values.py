@@ -486,6 +486,9 @@ ELEMENTWISE = {
 
 GLOSSY = "of a field's disparity and sound settings, as `shade_views` is given them"
 FINITE_BY_CONTRACT = {
+    "rendering.aperture_shape.opening": "of Optics, see scenes.lens_limits.is_finite",
+    "rendering.aperture_shape.openness": "of Optics, see scenes.lens_limits.is_finite",
+    "rendering.optics.within": "says the limits of a field",
     "rendering.gloss.geometry.SceneGeometry": GLOSSY,
     "rendering.gloss.light_search.find_light": GLOSSY,
     "rendering.gloss.microfacet.lobe_shares": GLOSSY,
@@ -638,6 +641,7 @@ READS_OR_TELLS = {
     "formats.images.oiio_reader": "read_size read_orientation read_raster PictureRows require_whole_png text_attribute "
     "complaint_of full_scale",
     "formats.images.header": "PhotoHeader read_photo_header",
+    "formats.images.settings_text": "settings_text_in",
     "formats.images.thumbnail": "read_thumbnail",
     "formats.light_fields.stanford": "read_stanford StanfordWriter",
     "formats.weights": "load_weights read_weights read_tensors require_shapes",
@@ -658,6 +662,7 @@ READS_OR_TELLS = {
     "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes",
     "runtime.compiling": "tell_compiling note_kernel",
     "runtime.kernel_cache": "KernelCache sources_hash fill",
+    "runtime.offers": "offered_by",
     "runtime.resources": "resource_folder",
     "runtime.extras": "is_installed require_extra said_by",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
@@ -681,8 +686,10 @@ READS_OR_TELLS = {
 }
 """Files, bytes and names go in: hostile ones are fuzzed (`python -m benchmarks.fuzz`) and tested beside each reader."""
 
-ELSEWHERE = ("training.", "evaluation.", "interface.", "runtime.jit.", "depth.editing.")
-"""Packages whose own tests feed them such values: drawn scenes, figures, what users call, pieces of kernels, edits."""
+ELSEWHERE = ("training.", "evaluation.", "interface.", "scenes.", "exports.", "runtime.jit.", "depth.editing.")
+"""Packages whose own tests feed them such values: drawn scenes, figures, what users call, use cases, pieces of kernels,
+edits.
+"""
 
 
 def plain(result):

@@ -96,12 +96,6 @@ def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
     assert np.array_equal(scene_view.renderer.read_image(), shown)
 
 
-@pytest.mark.parametrize("size_px", [(0, 5), (5, -1), (20_000, 20_000)])
-def test_absurd_sizes_are_refused(opened: HeadlessViewer, size_px: tuple[int, int]) -> None:
-    with pytest.raises(InputError, match=rf"{size_px[0]}x{size_px[1]} px: .* million"):
-        opened.draw(RenderSettings(opened.state.optics, size_px))
-
-
 def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"missing-folder.* does not exist"):
         saved(opened, tmp_path / "missing-folder" / "a.png", (8, 8))
