@@ -11,6 +11,5 @@ from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
     from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthOrigin, DepthStart
-    from iibr_core.depth.multi_view.estimate import FINDING, estimate_coarse, estimate_disparity
 else:
     __getattr__ = offered_by(__file__)

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         writer_for,
     )
     from iibr_core.formats.light_fields.scene import common_size
-    from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
+    from iibr_core.formats.light_fields.views import grid_of, read_stored_view
     from iibr_core.formats.maps.reader import read_map
     from iibr_core.formats.maps.writer import write_map
     from iibr_core.formats.outputs import (

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
-    from iibr_core.generation.dense_field import densify, require_steps
     from iibr_core.generation.free_views import (
         FreeViews,
         depths_of,
@@ -19,15 +18,12 @@ if TYPE_CHECKING:
         reach_of,
         steered,
     )
-    from iibr_core.generation.given_views import DenseFieldWork, read_given_views
-    from iibr_core.generation.light_field import generate, ray_set, transformer_for
+    from iibr_core.generation.light_field import ray_set, transformer_for
     from iibr_core.generation.memory_model import (
         PHOTO_BYTES,
         READING_BYTES,
         budget_of,
-        require_field,
         require_free_views,
-        require_matching,
         require_picture,
         require_process,
         whole_bytes,
