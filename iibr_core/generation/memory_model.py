@@ -55,7 +55,7 @@ VIEW_BYTES = bytes_of(colors="3f4", disparity="f4", occluded="?", inpainted="?",
 """Of a view in the making, with what it adds to the rays."""
 CANDIDATE_BYTES = bytes_of(coverage="5f4", disparity="5f4", source="5u1", weights="5f4", count="u1", shown="f4")
 BAND_BYTES = CANDIDATE_BYTES + bytes_of(image="u1", colors="3f4")
-"""Of the band of rows in the making."""
+"""Of the rows in the making."""
 UNDECIDED_BYTES = bytes_of(pixel="i4", number="u1", uncovered="f4") + HYPOTHESES * bytes_of(
     disparity="f4", source="u1", share="f4", nearest="f4"
 )
@@ -66,7 +66,6 @@ HOLE_BYTES = bytes_of(pixel="2i8", number="i4", around="16i8", reach="f4", chang
 DRAFT_BYTES = bytes_of(colors="3u1", with_specks="3u1", disparity="f4", inpainted="?")
 MAP_BYTES = bytes_of(values="f4", is_known="?", is_finite="?")
 STORED_BYTES, STORED_HDR_BYTES = (bytes_of(colors=each, disparity="f4") for each in ("3u1", "3f2"))
-"""Of a view in a light field."""
 TARGET_BYTES = bytes_of(light="4f4", color="4f2")
 MOST_TARGET_PIXELS = 8_000_000
 """What a picture is drawn into; larger ones are drawn in parts."""
