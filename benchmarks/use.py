@@ -30,7 +30,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.main_loop import App
-from viewer.model.actions import Action, DismissNotices, DoTask, EndGesture, OpenPath, Redo, ShowPrompt, Undo
+from viewer.model.actions import Action, DismissNotice, DoTask, EndGesture, OpenPath, Redo, ShowPrompt, Undo
 from viewer.model.free_camera import LeaveCamera, MoveCamera
 from viewer.model.state.depth_editing import Paint
 from viewer.model.state.exporting import ExportTask
@@ -125,7 +125,7 @@ def turn_camera(user: User) -> None:
 def save(user: User) -> None:
     user.do(DoTask(SaveTask(str(user.out / "picture.png"), ScreenSize(270, 180), may_replace=True)))
     user.until(lambda: not user.app.state.jobs and not user.app.state.tasks)
-    user.do(DismissNotices())
+    user.do(DismissNotice(None))
 
 
 def export(user: User) -> None:

@@ -17,7 +17,7 @@ from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import DismissNotices, SetHover
+from viewer.model.actions import DismissNotice, SetHover
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
@@ -47,7 +47,7 @@ def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
     viewer.do(
         SetFocus(pointed.disparity), SetAperture(6.0), SetOptics("aperture_shape", ApertureShape("polygon", blades=7))
     )
-    viewer.do(DismissNotices(), SetHover(pointed))
+    viewer.do(DismissNotice(None), SetHover(pointed))
     return viewer.screen(SIZE)
 
 

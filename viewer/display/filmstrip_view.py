@@ -16,13 +16,6 @@ from viewer.gpu.thumbnails import CELL, ThumbnailTexture
 from viewer.model.state.folder import Thumbnail
 
 
-@dataclass(frozen=True)
-class ThumbnailRequest:
-    """Photos to be read in small, by path."""
-
-    paths: tuple[str, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class ThumbnailRead:
     """A photo in small, (h, w, 3); None where it cannot be read."""
@@ -38,7 +31,7 @@ class FilmstripView:
         """wake: called, in the reading thread, when a photo was read."""
         self._ctx = gl.ctx
         self._texture: ThumbnailTexture | None = None
-        self._thread: JobThread[ThumbnailRequest, ThumbnailRead | Failed[None]] = JobThread(
+        self._thread: JobThread[tuple[str, ...], ThumbnailRead | Failed[None]] = JobThread(
             "iibr-thumbnails", wake, _read, lambda request, message: Failed(None, message)
         )
         self._unreadable: set[str] = set()
@@ -56,7 +49,7 @@ class FilmstripView:
         missing = tuple(path for path in paths if found[path] is None and path not in self._unreadable)
         if missing and not set(missing) <= set(self._asked):
             self._asked = missing
-            self._thread.submit(ThumbnailRequest(missing))
+            self._thread.submit(missing)
         return {path: found[path] for path in paths if found[path] is not None or path in self._unreadable}
 
     def release(self) -> None:
@@ -72,10 +65,10 @@ class FilmstripView:
             texture.put(result.path, result.pixels)
 
 
-def _read(job: Job[ThumbnailRequest, ThumbnailRead | Failed[None]]) -> Iterator[ThumbnailRead]:
-    from iibr_core.formats import read_thumbnail
+def _read(job: Job[tuple[str, ...], ThumbnailRead | Failed[None]]) -> Iterator[ThumbnailRead]:
+    from iibr_core.formats.images.thumbnail import read_thumbnail
 
-    for path in job.request.paths:
+    for path in job.request:
         try:
             yield ThumbnailRead(path, read_thumbnail(Path(path), CELL))
         except InputError:

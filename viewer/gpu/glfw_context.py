@@ -45,12 +45,11 @@ class GlfwLoader:
         """The context dies with its window."""
 
 
-def create_for_window(window: Any = None) -> GLContext:
-    """The GL context of a GLFW window made for OpenGL 3.3 core (None: of the current one), made current.
+def create_for_window(window: Any) -> GLContext:
+    """The GL context of a GLFW window made for OpenGL 3.3 core, made current.
 
     The window stays the caller's. Raises InputError where the driver offers less than OpenGL 3.3.
     """
-    window = window or glfw.get_current_context()
     glfw.make_context_current(window)
     try:
         ctx = _context_of(window)

@@ -242,14 +242,9 @@ class Notify:
 
 @dataclass(frozen=True)
 class DismissNotice:
-    """Take this notice away."""
+    """Take this notice away; None: all of them."""
 
-    notice: Notice
-
-
-@dataclass(frozen=True)
-class DismissNotices:
-    """Take all of them away."""
+    notice: Notice | None
 
 
 @dataclass(frozen=True)
@@ -328,7 +323,6 @@ Action = (
     | SetHover
     | Notify
     | DismissNotice
-    | DismissNotices
     | EditsSaved
     | Quit
 )

@@ -17,7 +17,7 @@ Color = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Palette:
-    """Colours of a theme, sRGB. background: around the picture. warning: what is made up rather than stored."""
+    """Colours of a theme, sRGB. background: around the picture. warning: what is inpainted rather than stored."""
 
     background: Color
     panel: Color

@@ -48,6 +48,12 @@ def slider(
     return new if changed else None
 
 
+def percent_slider(text: str, share: float, layout: Layout, tip: str, is_enabled: bool = True) -> float | None:
+    """A row with a slider over shares, 0..1, shown in per cent."""
+    percent = slider(text, 100 * share, (0.0, 100.0), "%.0f %%", layout, tip, is_enabled=is_enabled)
+    return None if percent is None else percent / 100
+
+
 def end_words(left: str, right: str, layout: Layout) -> None:
     """Quiet words at the ends of the last slider."""
     corner, far = imgui.get_item_rect_min(), imgui.get_item_rect_max()

@@ -27,7 +27,6 @@ from viewer.app.main_loop import App
 from viewer.model.actions import (
     Action,
     DismissNotice,
-    DismissNotices,
     DoTask,
     EndGesture,
     OpenPath,
@@ -175,7 +174,7 @@ def test_what_is_under_way_stays_as_it_was_asked_for_whatever_is_changed(
     app.do(DoTask(replace(task, path=str(tmp_path / "alone" / name))))
     viewer.until(lambda app: bool(texts(app)) and not app.state.jobs)
     gate.clear()
-    app.do(DismissNotices(), DoTask(replace(task, path=str(tmp_path / "disturbed" / name))))
+    app.do(DismissNotice(None), DoTask(replace(task, path=str(tmp_path / "disturbed" / name))))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
     for actions in ten_changes(viewer, tmp_path):
         app.do(*actions)
@@ -209,7 +208,7 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     app.do(OpenPath(Source(str(photo_path), grid=GridShape(5, 5))))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "scene")
     viewer.until_idle()
-    app.do(DismissNotices(), SetAperture(2.0), DoTask(ExportTask(kind, str(tmp_path / f"late.{kind}"), options)))
+    app.do(DismissNotice(None), SetAperture(2.0), DoTask(ExportTask(kind, str(tmp_path / f"late.{kind}"), options)))
     viewer.until(lambda app: f"Exported {tmp_path / f'late.{kind}'}" in texts(app))
     early, late = (bytes_of(tmp_path / f"{when}.{kind}") for when in ("early", "late"))
     assert list(early.values()) == list(late.values())

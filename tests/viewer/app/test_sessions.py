@@ -21,9 +21,8 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.opened_files import watch
 from tests.viewer.conftest import Driver, Opener, write_scene
-from viewer.app.session_store import sidecar_of
+from viewer.app.session_store import EDITS_KEPT, sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
-from viewer.model.reducers.root import EDITS_KEPT
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetOptics

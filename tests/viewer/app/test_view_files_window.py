@@ -18,7 +18,7 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ImageSize, ViewOffset, ViewUpdate
 from tests.iibr_core.known_scenes import view_of_wall
 from tests.viewer.conftest import Driver
-from viewer.model.actions import DismissNotices, DoTask, OpenPath, SetDepthStrength, StopWork, Undo
+from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, StopWork, Undo
 from viewer.model.commands import COMMANDS
 from viewer.model.dense_field import with_views_between
 from viewer.model.state.filling import FillTask
@@ -109,7 +109,7 @@ def open_lenslet_image(viewer: Driver, folder: Path) -> Scene:
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.source.path == str(path))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.depth_source != "none")
     viewer.until_idle()
-    viewer.app.do(DismissNotices())
+    viewer.app.do(DismissNotice(None))
     assert viewer.app.state.scene is not None
     return viewer.app.state.scene
 

@@ -66,9 +66,7 @@ def end_stroke(state: AppState) -> AppState:
     """The pointer went up: the stroke under way is one of the edits now."""
     if state.stroke is None:
         return state
-    edits = state.depth.edits
-    depth_settings = replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, state.stroke)))
-    return _with_settings(replace(state, stroke=None), depth_settings, "Paint", is_finished=True)
+    return _with_settings(replace(state, stroke=None), current_depth_settings(state), "Paint", is_finished=True)
 
 
 def current_depth_settings(state: AppState) -> DepthSettings:

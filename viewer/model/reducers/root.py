@@ -14,7 +14,6 @@ from viewer.model.actions import (
     Action,
     AskToSave,
     DismissNotice,
-    DismissNotices,
     DoTask,
     EditsSaved,
     EndGesture,
@@ -195,9 +194,8 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
             # what went wrong must be seen
             return replace(add_notice(state, notice), quits_when_done=state.quits_when_done and not notice.is_error)
         case DismissNotice(notice):
-            return replace(state, notices=tuple(other for other in state.notices if other != notice))
-        case DismissNotices():
-            return replace(state, notices=())
+            left = () if notice is None else tuple(other for other in state.notices if other != notice)
+            return replace(state, notices=left)
         case SetGlossBrush(brush):
             return _take_gloss_brush(state, brush)
         case ShowBefore(is_shown):

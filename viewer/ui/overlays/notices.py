@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DismissNotice, DismissNotices, TakeSettings
+from viewer.model.actions import Action, DismissNotice, TakeSettings
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.reducers.depth_models import offered_model
@@ -83,7 +83,7 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     colored(notice.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
     offers += [("Use its settings", TakeSettings(notice.offer))] if notice.offer is not None else []
-    offers += [(f"Close all ({others + 1})", DismissNotices())] if others else []
+    offers += [(f"Close all ({others + 1})", DismissNotice(None))] if others else []
     actions += button_rows(offers)
     imgui.end_group()
     return actions

@@ -34,10 +34,10 @@ def prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]
     return [ShowPrompt(edited)] if edited != prompt else []
 
 
-def prompt_buttons(word: str, layout: Layout, is_enabled: bool = True) -> tuple[bool, bool]:
+def prompt_buttons(word: str, layout: Layout) -> tuple[bool, bool]:
     """(pressed, cancelled)."""
     gap(layout, 2)
-    pressed = button(word, layout, is_enabled=is_enabled)
+    pressed = button(word, layout)
     imgui.same_line()
     return pressed, button("Cancel", layout)
 

@@ -21,7 +21,20 @@ from viewer.model.state.tasks import ChooseTask
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
-from viewer.ui.widgets import button, checkbox, choice, combo, gap, in_row, label, last_part, quiet, slider, tooltip
+from viewer.ui.widgets import (
+    button,
+    checkbox,
+    choice,
+    combo,
+    gap,
+    in_row,
+    label,
+    last_part,
+    percent_slider,
+    quiet,
+    slider,
+    tooltip,
+)
 
 START_WORDS: dict[DepthStart, str] = {
     "auto": "The best there is",
@@ -195,10 +208,9 @@ def _scroll_here_when_taken(is_in_hand: bool) -> None:
 
 
 def _strength(brush: Brush, layout: Layout) -> list[Action]:
-    is_heeded = brush.is_on and brush.tool not in DEPTH_TOOLS
-    limits = (0.0, 100.0)
-    percent = slider("Strength", 100 * brush.strength, limits, "%.0f %%", layout, STROKE_TIP, is_enabled=is_heeded)
-    return [] if percent is None else [SetBrush(replace(brush, strength=percent / 100))]
+    is_used = brush.is_on and brush.tool not in DEPTH_TOOLS
+    strength = percent_slider("Strength", brush.strength, layout, STROKE_TIP, is_used)
+    return [] if strength is None else [SetBrush(replace(brush, strength=strength))]
 
 
 def _sample(brush: Brush, layout: Layout) -> list[Action]:

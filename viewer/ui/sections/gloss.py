@@ -24,7 +24,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.style import Palette, pack_color, palette_of
-from viewer.ui.widgets import button, checkbox, choice, gap, quiet, slider, tooltip
+from viewer.ui.widgets import button, checkbox, choice, gap, percent_slider, quiet, slider, tooltip
 
 BALL_SIDE = 96.0
 FIRST_COLOR: Triple = (0.5, 0.5, 0.5)
@@ -55,7 +55,7 @@ def gloss_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     imgui.begin_disabled(not is_glossy)
     light = _light(gloss.light, layout, palette_of(state.preferences.theme))
     edited = _reflection(replace(gloss, light=light), layout)
-    actions = _surroundings(gloss, layout)
+    actions = _environment(gloss, layout)
     edited = replace(edited, surface=_surface(gloss.surface, layout))
     actions += [] if edited == gloss else [SetOptics("gloss", edited)]
     actions += _brush(state.gloss_brush, gloss, layout)
@@ -118,17 +118,15 @@ def _draw_ball(middle: tuple[float, float], radius: float, lit: tuple[float, flo
 
 
 def _reflection(gloss: Gloss, layout: Layout) -> Gloss:
-    percent = slider("Roughness", 100 * gloss.roughness, (0.0, 100.0), "%.0f %%", layout, ROUGH_TIP)
-    if percent is not None:
-        gloss = replace(gloss, roughness=percent / 100)
-    percent = slider("Reflects", 100 * gloss.reflectance, (0.0, 100.0), "%.0f %%", layout, REFLECTS_TIP)
-    if percent is not None:
-        gloss = replace(gloss, reflectance=percent / 100)
+    roughness = percent_slider("Roughness", gloss.roughness, layout, ROUGH_TIP)
+    gloss = gloss if roughness is None else replace(gloss, roughness=roughness)
+    share = percent_slider("Reflects", gloss.reflectance, layout, REFLECTS_TIP)
+    gloss = gloss if share is None else replace(gloss, reflectance=share)
     shines = checkbox("The photo shows it already", gloss.photo_shines, layout, SHOWN_TIP)
     return gloss if shines is None else replace(gloss, photo_shines=shines)
 
 
-def _surroundings(gloss: Gloss, layout: Layout) -> list[Action]:
+def _environment(gloss: Gloss, layout: Layout) -> list[Action]:
     """What is reflected beside the light: the way to a picture or to none, and its name."""
     is_asked = button("Surroundings…", layout, AROUND_TIP)
     imgui.same_line()
@@ -144,12 +142,12 @@ def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface:
     gap(layout, 2)
     only = checkbox("Only what is painted", surface.strokes_only, layout, ONLY_TIP)
     imgui.begin_disabled(surface.strokes_only)
-    far = slider("From far", 100 * surface.farthest, (0.0, 100.0), "%.0f %%", layout, FAR_TIP)
+    far = percent_slider("From far", surface.farthest, layout, FAR_TIP)
     if far is not None:
-        surface = replace(surface, farthest=far / 100, nearest=max(surface.nearest, far / 100))
-    near = slider("To near", 100 * surface.nearest, (0.0, 100.0), "%.0f %%", layout, NEAR_TIP)
+        surface = replace(surface, farthest=far, nearest=max(surface.nearest, far))
+    near = percent_slider("To near", surface.nearest, layout, NEAR_TIP)
     if near is not None:
-        surface = replace(surface, nearest=near / 100, farthest=min(surface.farthest, near / 100))
+        surface = replace(surface, nearest=near, farthest=min(surface.farthest, near))
     surface = _color(surface, layout)
     imgui.end_disabled()
     return surface if only is None else replace(surface, strokes_only=only)

@@ -24,7 +24,7 @@ from viewer.model.state.inspection import (
 )
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
-from viewer.ui.widgets import button, checkbox, choice, in_row, quiet, slider
+from viewer.ui.widgets import button, checkbox, choice, in_row, percent_slider, quiet
 
 EPI_TIP = (
     "Epipolar plane images through the pointer (E): one line of the picture from every view, a surface slopes the more"
@@ -33,7 +33,7 @@ EPI_TIP = (
 OVERLAY_TIPS: dict[OverlayKind, str] = {
     "disparity": "How near everything is, as colours.",
     "entropy": "How undecided the weights of the rays are: 1 where no ray of the photo shows anything.",
-    "inpainted": "What the photo never saw and had to be made up.",
+    "inpainted": "What the photo never saw and had to be inpainted.",
 }
 OPACITY_TIP = "Of what lies over the picture."
 TRUTH_TIP = "A light field on disk to compare with."
@@ -103,9 +103,8 @@ def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     if pressed is not None:
         actions.append(SetOverlay(None if chosen == OVERLAYS[pressed] else OVERLAYS[pressed]))
-    opacity, is_on = 100 * state.inspection.opacity, chosen is not None
-    percent = slider("Opacity", opacity, (0.0, 100.0), "%.0f %%", layout, OPACITY_TIP, is_enabled=is_on)
-    return actions + ([] if percent is None else [SetInspection("opacity", percent / 100)])
+    opacity = percent_slider("Opacity", state.inspection.opacity, layout, OPACITY_TIP, chosen is not None)
+    return actions + ([] if opacity is None else [SetInspection("opacity", opacity)])
 
 
 def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:

@@ -34,7 +34,7 @@ from viewer.model.state.optics import (
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette, palette_of
-from viewer.ui.widgets import button, checkbox, choice, end_words, quiet, slider, whole_slider
+from viewer.ui.widgets import button, checkbox, choice, end_words, percent_slider, quiet, slider, whole_slider
 
 FOCUS_TIP = "What is sharp, from near to far. Click in the picture, or turn the wheel."
 FOCUS_DISPARITY_TIP = "Disparity that is sharp, px per view step: larger is closer."
@@ -204,8 +204,8 @@ def light_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     limits = (-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS)
     new = slider("Exposure", optics.exposure_stops, limits, "%+.1f stops", layout)
     _add(actions, lambda stops: SetOptics("exposure_stops", stops), new)
-    new = slider("Highlights", 100 * optics.highlight_recovery, (0.0, 100.0), "%.0f %%", layout, HIGHLIGHT_TIP)
-    _add(actions, lambda percent: SetOptics("highlight_recovery", percent / 100), new)
+    new = percent_slider("Highlights", optics.highlight_recovery, layout, HIGHLIGHT_TIP)
+    _add(actions, lambda share: SetOptics("highlight_recovery", share), new)
     return actions
 
 
