@@ -22,6 +22,23 @@ settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
 
+LONG_FILES = {
+    "test_limits.py",
+    "test_batch.py",
+    "test_memory.py",
+    "test_kernel_cache.py",
+    "test_precompile.py",
+    "test_speed_command.py",
+    "test_cli.py",
+    "test_window_optics.py",
+}
+"""Begun first, so that all workers end together: those that take ten seconds and more."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.path.name not in LONG_FILES)
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--regenerate-golden", action="store_true", help="write the golden images anew, then look at them")
 

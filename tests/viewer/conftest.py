@@ -85,6 +85,13 @@ def display() -> Iterator[str]:
         yield name
 
 
+def rests(app: App) -> bool:
+    """Whether nothing is left to do in a window, and nothing to be looked for soon."""
+    from viewer.app import main_loop
+
+    return app.wait_s == main_loop.IDLE_WAIT_S
+
+
 @dataclass
 class Driver:
     """A viewer in a window, its loop turned by the test, its mouse and keys moved by the X server."""
@@ -101,7 +108,7 @@ class Driver:
     def until_idle(self) -> None:
         """Turn the loop until every view is there and nothing is left to do; what was sent before is heard first."""
         self.app.step()
-        self.until(lambda app: app.state.progress.is_complete and app.wait_s == 1.0)
+        self.until(lambda app: app.state.progress.is_complete and rests(app))
 
     def send(self, *words: object) -> None:
         """Let xdotool do something."""

@@ -30,3 +30,14 @@ def viewer(open_window: Opener, photo_path: Path, grid: GridShape) -> Driver:
 def no_dialogs(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a system without zenity and its like: a dialog would wait for a person."""
     monkeypatch.setattr("viewer.app.side_effects.has_dialogs", lambda: False)
+
+
+@pytest.fixture(autouse=True)
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A picture is at its best after few passes: how it looks then is tested in tests/viewer/gpu. A window at rest
+    looks often whether there is anything new.
+    """
+    monkeypatch.setattr("viewer.gpu.refocus.accumulation.STILL_SAMPLES", 100)
+    monkeypatch.setattr("viewer.gpu.refocus.accumulation.EDGE_PASSES", 2)
+    monkeypatch.setattr("viewer.app.main_loop.IDLE_WAIT_S", 0.1)
+    monkeypatch.setattr("viewer.app.main_loop.TOOLTIP_S", 0.1)

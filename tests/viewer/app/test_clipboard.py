@@ -69,17 +69,14 @@ def test_what_is_pasted_at_once_waits_until_it_is_copied(viewer: Driver) -> None
     assert not any(notice.is_error for notice in viewer.app.state.notices)
 
 
-@pytest.mark.parametrize("form", ["{}", "file://{}\r\n"])
-def test_a_path_in_the_clipboard_opens(viewer: Driver, tmp_path: Path, form: str) -> None:
-    other = write_scene(tmp_path, "other", seed=1)
-    put(form.format(other).encode())
-    viewer.send("key", "ctrl+v")
-    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
-    assert viewer.app.state.source is not None
-    assert viewer.app.state.source.path == str(other)
-
-
-def test_words_are_no_picture(viewer: Driver) -> None:
+def test_a_path_in_the_clipboard_opens_and_words_do_not(viewer: Driver, tmp_path: Path) -> None:
+    for name, form in (("other", "{}"), ("third", "file://{}\r\n")):
+        path = write_scene(tmp_path, name, seed=1)
+        put(form.format(path).encode())
+        viewer.send("key", "ctrl+v")
+        viewer.until(lambda app, name=name: app.state.scene is not None and app.state.scene.name == name)  # type: ignore[misc]
+        assert viewer.app.state.source is not None
+        assert viewer.app.state.source.path == str(path)
     put(b"some words")
     before = viewer.app.state.source
     viewer.send("key", "ctrl+v")

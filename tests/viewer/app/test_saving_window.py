@@ -6,6 +6,7 @@ import shutil
 import threading
 import time
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,8 @@ from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.state.prompts import Saved, SavePrompt
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
-SIZE = 300, 200
+SIZE = 150, 100
+LARGER = 600, 400
 LARGE = 1500, 1000
 
 
@@ -92,7 +94,7 @@ def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: 
 def test_views_that_come_again_wait_until_the_picture_is_drawn(viewer: Driver, tmp_path: Path) -> None:
     """Else each would make it begin anew."""
     app, out = viewer.app, tmp_path / "large.png"
-    start(viewer, out)
+    start(viewer, out, LARGER)
     uploaded = app.scene_view.views_uploaded
     again = ViewUpdate(0, 0, np.zeros((HEIGHT, WIDTH, 3), np.uint8), np.zeros((HEIGHT, WIDTH), np.float32))
     app.scene_view.add(again)
@@ -137,21 +139,21 @@ def test_a_file_that_waits_to_be_written_is_replaced_only_when_that_is_said(view
     assert not out.exists()
 
 
-@pytest.mark.parametrize("what", ["picture", "map"])
-@pytest.mark.parametrize("name", ["scene.png", "scene_disparity.npy", "mask.png"])
-def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path: Path, what: Saved, name: str) -> None:
+def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path: Path) -> None:
     """The photo, the map beside it, an aperture: a notice, and no question whether to replace it."""
     shutil.copy(photo_path, photo_path.with_name("mask.png"))
     viewer.app.do(DoTask(ReadMaskTask(str(photo_path.with_name("mask.png")))))
     viewer.until(lambda app: app.state.optics.aperture_shape.mask is not None)
-    path = photo_path.with_name(name)
-    before = path.read_bytes()
-    viewer.app.do(DoTask(SaveTask(str(path), (48, 32), may_replace=True, what=what)))
-    viewer.until(lambda app: bool(app.state.notices))
-    expected = "can be written as .png, .jpg" if (what, path.suffix) == ("picture", ".npy") else "is read here"
-    assert expected in texts(viewer)[0]
-    viewer.until_idle()
-    assert path.read_bytes() == before
+    whats: tuple[Saved, ...] = ("picture", "map")
+    for what, name in product(whats, ("scene.png", "scene_disparity.npy", "mask.png")):
+        path = photo_path.with_name(name)
+        before = path.read_bytes()
+        viewer.app.do(DismissNotices(), DoTask(SaveTask(str(path), (48, 32), may_replace=True, what=what)))
+        viewer.until(lambda app: bool(app.state.notices))
+        expected = "can be written as .png, .jpg" if (what, path.suffix) == ("picture", ".npy") else "is read here"
+        assert expected in texts(viewer)[0], (what, name)
+        viewer.until_idle()
+        assert path.read_bytes() == before, (what, name)
 
 
 def test_a_map_that_was_saved_may_be_saved_again(viewer: Driver, tmp_path: Path) -> None:
@@ -207,7 +209,7 @@ def test_closing_the_window_waits_for_what_is_being_written(
     viewer.app.do(DoTask(SaveTask(str(out), SIZE)))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].doing == WRITING)
     viewer.close()
-    assert read_photo(out).pixels.shape == (200, 300, 3)
+    assert read_photo(out).pixels.shape == (*SIZE[::-1], 3)
     assert not list(tmp_path.glob(".iibr-*"))
 
 

@@ -20,7 +20,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.opened_files import watch
-from tests.viewer.conftest import Driver, Opener, write_scene
+from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.session_store import EDITS_KEPT, sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
 from viewer.model.saved_settings import settings_text
@@ -93,7 +93,7 @@ def test_after_a_crash_too(open_window: Opener, photo_path: Path, tmp_path: Path
     """What was written while the window was used must do."""
     first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
     change(first)
-    first.until(lambda app: bool(kept_files(tmp_path / "kept")) and app.wait_s == 1.0)
+    first.until(lambda app: bool(kept_files(tmp_path / "kept")) and rests(app))
     shutil.copytree(tmp_path / "kept" / "sessions", tmp_path / "of the dead" / "sessions")
     left = left_with(first)
     first.app.close()
@@ -210,7 +210,7 @@ def test_many_strokes_are_painted_beside_the_window(
     settings = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(96, 64), DepthEdits(strokes=strokes))
     sidecar_of(photo_path).write_text(settings_text(settings))
     driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
-    driver.until(lambda app: told(driver))
+    driver.until(lambda app: told(driver) and app.state.shown_generation == app.state.generation)
     driver.until_idle()
     assert painted_here == []
     app = driver.app

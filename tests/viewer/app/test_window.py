@@ -14,7 +14,7 @@ from imgui_bundle import imgui
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import FAR, NEAR, Driver, Opener, write_scene
+from tests.viewer.conftest import FAR, NEAR, Driver, Opener, rests, write_scene
 from viewer.app.main_loop import App
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
@@ -272,7 +272,7 @@ def test_edges_are_sharpened_nearest_first_to_where_the_user_looks_then(open_win
     def is_done(app: App) -> bool:
         twice = {(int(row), int(column)) for row, column in np.argwhere(field.uploads == 2)}
         sharpened.extend(sorted(twice.difference(sharpened)))
-        return app.state.progress.is_complete and app.wait_s == 1.0
+        return app.state.progress.is_complete and rests(app)
 
     driver.until(is_done)
     assert field.uploads.max() == 2

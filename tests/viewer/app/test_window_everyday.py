@@ -15,7 +15,7 @@ from iibr_core.formats.images.settings_text import ATTRIBUTE
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, Opener, write_scene
+from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.preferences_store import load_preferences
 from viewer.model.actions import DoTask, OpenPath, ShowPrompt, StopWork
@@ -249,7 +249,7 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
     driver = open_window(photo_path, grid=GridShape(41, 41))
     driver.until(lambda app: app.state.progress.done > 3)
     driver.app.do(StopWork())
-    driver.until(lambda app: app.wait_s == 1.0)
+    driver.until(lambda app: rests(app))
     made = driver.app.scene_view.views_present
     assert 3 < made < 41 * 41
     assert driver.app.scene_view.views_present == made == len(driver.app.state.views_there)

@@ -25,6 +25,11 @@ from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
 
+@pytest.fixture(autouse=True)
+def soon() -> None:
+    """Tooltips come, and windows sleep, when they usually do."""
+
+
 def test_arrows_select_a_command_far_down_the_list_and_enter_runs_it(viewer: Driver) -> None:
     viewer.app.do(ShowPrompt(PalettePrompt()))
     viewer.until_idle()
