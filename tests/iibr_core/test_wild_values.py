@@ -59,8 +59,8 @@ from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize,
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
-WILD = (math.nan, math.inf, 3e38)
-MORE_WILD = (-math.inf, -3e38, 1e30, 1e-42, -1e-300, 0.0)
+WILD = (math.nan, math.inf, -math.inf, 3e38)
+MORE_WILD = (-3e38, 1e30, 1e-42, -1e-300, 0.0)
 if os.environ.get("IIBR_TEST_ALL_VALUES"):  # `make fuzz` sets it
     WILD += MORE_WILD
 SIZE = USUAL_SIZE = ImageSize(12, 14)
