@@ -148,7 +148,7 @@ def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path:
     for what, name in product(whats, ("scene.png", "scene_disparity.npy", "mask.png")):
         path = photo_path.with_name(name)
         before = path.read_bytes()
-        viewer.app.do(DismissNotices(), DoTask(SaveTask(str(path), (48, 32), may_replace=True, what=what)))
+        viewer.app.do(DismissNotice(None), DoTask(SaveTask(str(path), (48, 32), may_replace=True, what=what)))
         viewer.until(lambda app: bool(app.state.notices))
         expected = "can be written as .png, .jpg" if (what, path.suffix) == ("picture", ".npy") else "is read here"
         assert expected in texts(viewer)[0], (what, name)
