@@ -15,7 +15,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.generation.memory_model import DRAFT_BYTES, UNDECIDED_BYTES, Making, making_bytes
+from iibr_core.generation.memory_model import DRAFT_BYTES, Making, making_bytes, undecided_bytes
 from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
@@ -187,4 +187,4 @@ def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:
     views = grid.rows * grid.columns - 1
     drafts = views - _inpainted_views(statistics, grid)
     undecided = _sum_over_views(statistics.ambiguous_share, grid) * drafts / max(views, 1)
-    return round(statistics.step.size * (drafts * DRAFT_BYTES + undecided * UNDECIDED_BYTES))
+    return round(statistics.step.size * (drafts * DRAFT_BYTES + undecided * undecided_bytes()))

@@ -13,8 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from iibr_core.generation.outer_views import outer_views_of_grid
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.rendering.hypotheses import FEATURES
 from iibr_core.runtime.machine import (
     MAPPED_BYTES,
     MOST_USUAL_SHARE,
@@ -56,11 +54,6 @@ VIEW_BYTES = bytes_of(colors="3f4", disparity="f4", occluded="?", inpainted="?",
 CANDIDATE_BYTES = bytes_of(coverage="5f4", disparity="5f4", source="5u1", weights="5f4", count="u1", shown="f4")
 BAND_BYTES = CANDIDATE_BYTES + bytes_of(image="u1", colors="3f4")
 """Of the rows in the making."""
-UNDECIDED_BYTES = bytes_of(pixel="i4", number="u1", uncovered="f4") + HYPOTHESES * bytes_of(
-    disparity="f4", source="u1", share="f4", nearest="f4"
-)
-AMBIGUOUS_BYTES = UNDECIDED_BYTES + HYPOTHESES * bytes_of(mask="?", features=f"{FEATURES}f4")
-"""Of a ray that the transformer is still to be asked for, and is being asked for."""
 HOLE_BYTES = bytes_of(pixel="2i8", number="i4", around="16i8", reach="f4", changed="3f4")
 """Of one pixel of a hole while it is filled: what surrounds it in sixteen directions."""
 DRAFT_BYTES = bytes_of(colors="3u1", with_specks="3u1", disparity="f4", inpainted="?")
@@ -101,13 +94,29 @@ class Making(NamedTuple):
         return cls(pixels, pixels, images, USUAL_HOLES, USUAL_AMBIGUOUS, "balanced")
 
 
+def undecided_bytes() -> int:
+    """Of a ray that the transformer is still to be asked for. Imported here: a plan loads kernels once it is made."""
+    from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+
+    of_hypothesis = bytes_of(disparity="f4", source="u1", share="f4", nearest="f4")
+    return bytes_of(pixel="i4", number="u1", uncovered="f4") + HYPOTHESES * of_hypothesis
+
+
+def ambiguous_bytes() -> int:
+    """The same, of a ray that it is being asked for."""
+    from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+    from iibr_core.rendering.hypotheses import FEATURES
+
+    return undecided_bytes() + HYPOTHESES * bytes_of(mask="?", features=f"{FEATURES}f4")
+
+
 def making_bytes(making: Making) -> int:
     """The most that is held while views are made, beside the photo and views that are done: the ray set; and then a
     view for each core, or the one whose holes are filled.
     """
     pixels, asks = making.pixels, making.quality != "fast"
     band = min(pixels, MOST_BAND_PIXELS)
-    in_flight = THREADS * (pixels * VIEW_BYTES + band * (BAND_BYTES + making.ambiguous_share * AMBIGUOUS_BYTES))
+    in_flight = THREADS * (pixels * VIEW_BYTES + band * (BAND_BYTES + making.ambiguous_share * ambiguous_bytes()))
     filling = pixels * (VIEW_BYTES + making.hole_share * HOLE_BYTES)
     rays = making.images * (RAY_BYTES + (STATISTICS_BYTES if asks else 0)) + DETAIL_BYTES
     return round(making.canvas_pixels * rays + max(in_flight, filling))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iibr_core.generation.light_field import generate, ray_set, transformer_for
-from iibr_core.generation.memory_model import DRAFT_BYTES, UNDECIDED_BYTES
+from iibr_core.generation.memory_model import DRAFT_BYTES, undecided_bytes
 from iibr_core.generation.stored_views import StoredViews
 from iibr_core.rendering import view_synthesis
 from iibr_core.rendering.view_synthesis import ViewSynthesis
@@ -234,5 +234,5 @@ def test_a_draft_takes_about_what_the_plan_says():
     with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
         draft = StoredViews(synthesis, rays, GridShape(5, 5), False, tiling.never).draft(ViewOffset(1.0, 1.0))
     undecided = sum(len(part.pixel) for part in draft.undecided)
-    counted = 60 * 80 * DRAFT_BYTES + undecided * UNDECIDED_BYTES
+    counted = 60 * 80 * DRAFT_BYTES + undecided * undecided_bytes()
     assert 0.8 * counted < draft.nbytes <= counted

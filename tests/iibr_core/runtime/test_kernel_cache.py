@@ -42,7 +42,14 @@ def package(tmp_path):
     """A copy of the package with what kernels need, and one kernel that uses things of other files."""
     source = Path(iibr_core.__file__).parent
     copy = tmp_path / "iibr_core"
-    needed = ("__init__", "runtime/__init__", "runtime/compiling", "runtime/jit", "runtime/kernel_cache")
+    needed = (
+        "__init__",
+        "runtime/__init__",
+        "runtime/compiling",
+        "runtime/jit",
+        "runtime/kernel_cache",
+        "runtime/offers",
+    )
     for name in (f"{name}.py" for name in (*needed, "runtime/time_left")):
         (copy / name).parent.mkdir(exist_ok=True, parents=True)
         (copy / name).write_text((source / name).read_text())
