@@ -36,7 +36,7 @@ def test_files_and_records_are_there(files: str, records: str) -> None:
         assert re.search(rf"^class {record}\b", core, re.MULTILINE), record
 
 
-MOST_CORE_MODULES = 19
+MOST_CORE_MODULES = 20
 """That the viewer and the command line import. A room offers names in its `__init__.py`: take them from there."""
 
 

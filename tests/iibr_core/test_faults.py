@@ -325,5 +325,5 @@ def test_parameters_that_make_no_sense(tmp_path):
     path.write_text(path.read_text().replace("sensor_size_mm = 36.0", "sensor_size_mm = 1e-320"))
     assert open_light_field(tmp_path / "field").focal_px is None
     path.write_bytes(b"\n" * 2_000_000)
-    with pytest.raises(InputError, match=r"parameters\.cfg: more than"):
+    with pytest.raises(InputError, match=r"parameters\.cfg: is larger than"):
         open_light_field(tmp_path / "field")

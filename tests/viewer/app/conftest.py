@@ -40,4 +40,4 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("viewer.gpu.refocus.accumulation.STILL_SAMPLES", 100)
     monkeypatch.setattr("viewer.gpu.refocus.accumulation.EDGE_PASSES", 2)
     monkeypatch.setattr("viewer.app.main_loop.IDLE_WAIT_S", 0.1)
-    monkeypatch.setattr("viewer.app.main_loop.TOOLTIP_S", 0.1)
+    monkeypatch.setattr("viewer.app.pace.TOOLTIP_S", 0.1)

@@ -318,7 +318,7 @@ def test_it_is_asked_for_by_key_and_says_what_is_wrong(viewer: Driver, tmp_path:
 def test_where_it_goes_is_typed_at_once_and_seen_whole(
     viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("viewer.app.main_loop.TOOLTIP_S", 0.5)  # as usual
+    monkeypatch.setattr("viewer.app.pace.TOOLTIP_S", 0.5)  # as usual
     out = tmp_path / ("a" * 60 + ".gif")
     viewer.app.do(ShowPrompt(ExportPrompt("gif", "somewhere.gif")))
     viewer.until_idle()
