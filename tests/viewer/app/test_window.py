@@ -115,7 +115,7 @@ def test_a_double_click_resets(viewer: Driver) -> None:
 
 def test_a_double_click_counts_where_frames_are_slow(viewer: Driver) -> None:
     """Of two clicks the second is heard of only after the frame that the first one asked for."""
-    viewer.app._took_s.extend(3 * [1.5])
+    viewer.app._pace.took_s.extend(3 * [1.5])
     viewer.app.step()
     assert imgui.get_io().mouse_double_click_time > 4.5
 
