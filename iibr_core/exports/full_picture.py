@@ -89,7 +89,7 @@ class FullPicture:
         from iibr_core.exports.large_lens import large_lens
         from iibr_core.rendering.large_views import Part, whole
         from iibr_core.rendering.lens_light import draw_large, mean_of_areas
-        from iibr_core.rendering.view_synthesis import ViewSynthesis
+        from iibr_core.rendering.renderer import open_renderer
 
         height, width = photo.size
         lens = large_lens(self.optics, self.scene, width / self.scene.width)
@@ -97,8 +97,8 @@ class FullPicture:
         down, across = self.part.height * height, self.part.width * width
         pixels = Part(math.floor(top), math.ceil(top + down), math.floor(left), math.ceil(left + across))
         pixels = pixels.grown(0, whole(photo.size))
-        with ViewSynthesis(should_stop) as synthesis:
-            light = draw_large(photo, lens, pixels, synthesis, self.smaller, should_stop, report_progress)
+        with open_renderer(should_stop) as renderer:
+            light = draw_large(photo, lens, pixels, renderer, self.smaller, should_stop, report_progress)
         size = ImageSize(self.size.height, self.size.width)
         return mean_of_areas(light, size, should_stop, (top - pixels.top, left - pixels.left, down, across))
 

@@ -23,6 +23,6 @@ if TYPE_CHECKING:
         Optics,
     )
     from iibr_core.rendering.ray_set import RaySet
-    from iibr_core.rendering.view_synthesis import ViewSynthesis
+    from iibr_core.rendering.renderer import open_renderer
 else:
     __getattr__ = offered_by(__file__)

@@ -145,7 +145,7 @@ class ComparisonJob:
     ) -> StoredColors:
         """The view as the light field stores it; the middle one is the photo."""
         from iibr_core.generation import encode_for_storage, stored_colors, transformer_for
-        from iibr_core.rendering import ViewSynthesis
+        from iibr_core.rendering import open_renderer
 
         loaded, plan = _given(request, inputs)
         if request.view == plan.grid.centre:
@@ -155,22 +155,22 @@ class ComparisonJob:
         if quality == "fast" and offset in self._outer:
             return self._outer[offset]
         transformer = transformer_for(quality)
-        with ViewSynthesis(should_stop, transformer, inpainter=inpainter) as synthesis:
-            return stored_colors(rays, offset, synthesis.render(rays, offset), loaded.photo.is_hdr, should_stop)
+        with open_renderer(should_stop, transformer, inpainter=inpainter) as renderer:
+            return stored_colors(rays, offset, renderer.render(rays, offset), loaded.photo.is_hdr, should_stop)
 
     def _entropy(
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
     ) -> FloatImage:
         """Of the weights of the view (H, W), in [0, 1]; in the middle every ray is the photo's own."""
-        from iibr_core.rendering import ViewSynthesis
+        from iibr_core.rendering import open_renderer
 
         loaded, plan = _given(request, inputs)
         if request.view == plan.grid.centre:
             return np.zeros(loaded.photo.size, np.float32)
         inpainter = load_inpainter(inputs.inpaint)
         rays = self._kept_rays(request, inputs, inpainter, should_stop)
-        with ViewSynthesis(should_stop, keeps_entropy=True, inpainter=inpainter) as synthesis:
-            entropy = synthesis.render(rays, plan.grid.offset(*request.view)).entropy
+        with open_renderer(should_stop, keeps_entropy=True, inpainter=inpainter) as renderer:
+            entropy = renderer.render(rays, plan.grid.offset(*request.view)).entropy
         assert entropy is not None
         return np.clip(entropy, 0, 1)
 
