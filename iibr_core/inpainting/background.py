@@ -8,7 +8,6 @@ frame's border it picks the surface that really leaves the frame, without any th
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,36 +117,29 @@ def _fill_view(
     rims, number = rims_of_holes(known, image_size(hole), should_stop, threads)
     pure = np.where(mixed_beside(hole), np.float32(np.nan), disparity)
     lines = np.zeros((len(rims), 2), np.float32)
-    reach = np.empty(len(pixels), np.float32)
-    changed = np.empty((len(pixels), 3), np.float32)
+    reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
-    def smooth(step_px: int) -> Callable[[slice], None]:
-        return lambda part: _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part])
+    def run(step: Callable[[slice], None], count: int = len(pixels)) -> None:
+        in_pieces(step, pieces_of(count, MOST_PIECE_PIXELS), should_stop, threads)
 
-    def write_colors(part: slice) -> None:
+    def smooth(step_px: int) -> None:
+        run(lambda part: _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part]))
         # Only when all is computed: neighbours are taken as they were before a step, not after it.
-        _write_colors(changed[part], pixels[part], colors)
+        run(lambda part: _write_colors(changed[part], pixels[part], colors))
 
-    def run(step: Callable[[slice], None], count: int, most: int = MOST_PIECE_PIXELS) -> None:
-        in_pieces(step, pieces_of(count, most), should_stop, threads)
-
-    steps: list[Callable[[slice], None]] = [
+    if stages.lines_into_gaps:
+        run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
+    run(
         lambda part: _fill(
             colors, disparity, pixels[part], known[part], number, lines,
             photo_disparity, offset.s, offset.t, one_surface, reach[part],
         ),
-    ]  # fmt: skip
+    )  # fmt: skip
     if stages.median_in_gaps:
-        steps += [
-            lambda part: _agree(disparity, hole, pixels[part], changed[part]),
-            lambda part: _write_disparity(changed[part], pixels[part], disparity),
-        ]
-    if stages.smooth_gaps:
-        steps += chain.from_iterable((smooth(step_px), write_colors) for step_px in SMOOTH_STEPS_PX)
-    if stages.lines_into_gaps:
-        run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
-    for step in steps:
-        run(step, len(pixels))
+        run(lambda part: _agree(disparity, hole, pixels[part], changed[part]))
+        np.put(disparity, pixels, changed[:, 0])
+    for step_px in SMOOTH_STEPS_PX if stages.smooth_gaps else ():
+        smooth(step_px)
     if stages.synthesise_patches:
         number_pixels(pixels, number)
         copy_exemplars(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
@@ -169,8 +161,7 @@ def _fill(
     hidden = one_surface * HIDDEN_PX / SURFACE_PX
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        nearest, farthest = np.inf, np.inf
-        any_possible = False
+        nearest, farthest, any_possible = np.inf, np.inf, False
         # Which of the surfaces around may continue to here, and how likely.
         for k in range(directions):
             weight[k] = 0.0
@@ -179,8 +170,7 @@ def _fill(
             known_y, known_x = known[i, k] // width, known[i, k] % width
             distance = np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
             nearest = min(nearest, distance)
-            d = disparity[known_y, known_x]
-            surface[k] = d
+            surface[k] = d = disparity[known_y, known_x]
             farthest = min(farthest, d)
             rim = number[known_y, known_x]
             along = line_weight(lines[rim, 0], lines[rim, 1], known_y - y, known_x - x)
@@ -196,16 +186,7 @@ def _fill(
         for k in range(directions):
             is_farthest = not any_possible and surface[k] <= farthest
             weight[k] = abs(weight[k]) if is_farthest else max(weight[k], 0.0)
-        # The surface with the most weight, the farther of equals.
-        chosen, most = -1, 0.0
-        for k in range(directions):
-            votes = 0.0
-            if weight[k] > 0:
-                for j in range(directions):
-                    if abs(surface[j] - surface[k]) <= one_surface:
-                        votes += weight[j]
-            if votes > most or (votes > 0 and votes == most and surface[k] < surface[chosen]):
-                chosen, most = k, votes
+        chosen, most = _heaviest(surface, weight, one_surface)
         if chosen < 0:
             continue
         total = r = g = b = sum_d = 0.0
@@ -222,6 +203,21 @@ def _fill(
                 sum_d += w * surface[k]
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
         disparity[y, x] = sum_d / most
+
+
+@kernel
+def _heaviest(surface, weight, one_surface):
+    """Index of the surface with the most weight, the farther of equals, and that weight; -1 where none has any."""
+    chosen, most = -1, 0.0
+    for k in range(len(surface)):
+        votes = 0.0
+        if weight[k] > 0:
+            for j in range(len(surface)):
+                if abs(surface[j] - surface[k]) <= one_surface:
+                    votes += weight[j]
+        if votes > most or (votes > 0 and votes == most and surface[k] < surface[chosen]):
+            chosen, most = k, votes
+    return chosen, most
 
 
 @kernel
@@ -301,10 +297,3 @@ def _write_colors(smoothed, pixels, colors):
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = smoothed[i, 0], smoothed[i, 1], smoothed[i, 2]
-
-
-@kernel
-def _write_disparity(agreed, pixels, disparity):
-    width = disparity.shape[1]
-    for i in range(len(pixels)):
-        disparity[pixels[i] // width, pixels[i] % width] = agreed[i, 0]
