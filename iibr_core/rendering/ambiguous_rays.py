@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.disparity_statistics import SOFT
-from iibr_core.rendering.ray_set import CELL_PX, OWN_SURFACE_PX, RayArrays, RaySet
+from iibr_core.rendering.ray_cells import CELL_PX
+from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RayArrays, RaySet
 from iibr_core.rendering.resampling import ShownRays
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset

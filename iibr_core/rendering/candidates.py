@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.coherent_cells import backward_warp, find_coherent_cells, land_incoherent
 from iibr_core.rendering.joined_rays import BELOW, RIGHT
-from iibr_core.rendering.ray_set import CELL_PX, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_cells import CELL_PX
+from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset
 

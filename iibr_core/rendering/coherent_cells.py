@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ray_set import CELL_PX, OWN_SURFACE_PX, Cells, RaySet
+from iibr_core.rendering.ray_cells import CELL_PX, Cells
+from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage, ViewOffset
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.background import continue_farthest
 from iibr_core.rendering.candidates import SEALED_GAP_PX
 from iibr_core.rendering.joined_rays import BELOW, RIGHT
-from iibr_core.rendering.ray_set import CELL_PX, HIGHEST_LEVEL, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_cells import CELL_PX
+from iibr_core.rendering.ray_set import HIGHEST_LEVEL, OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar

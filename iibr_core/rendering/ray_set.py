@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, SOFT, DisparityStatistics, measure_disparity
 from iibr_core.rendering.joined_rays import BELOW, RIGHT, join_rays, joined_either_way
+from iibr_core.rendering.ray_cells import CELL_PX, Cells, any_in_cells, largest_steps, sum_up
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
-CELL_PX = 4
-"""Side of the cells that rays are summarised by."""
 NO_MARGINS = Margins()
 HIGHEST_LEVEL = 255
 OWN_SURFACE_PX = 0.5
@@ -51,22 +50,12 @@ class RayArrays(NamedTuple):
     photo_images: int
 
 
-class Cells(NamedTuple):
-    """Rays of S images, summarised by cells of CELL_PX x CELL_PX. low, high (S, M, N): their least and greatest
-    disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole rows of cells. step (M, N): the largest
-    step between the photo's pixels there and those beside them, inf where one is unknown or at the border.
-    """
-
-    low: FloatImage
-    high: FloatImage
-    row_ranges: FloatImage
-    step: FloatImage
-
-
 class RaySet:
     """Source images of one size (height, width), at most `capacity` of them. Views show what lies within their margins.
 
-    All arrays are of the images added so far.
+    All arrays are of the images added so far. farthest_views: the largest view offset that will be rendered. margins:
+    of the images around every view. joined (H, W): which steps between the photo's rays are a steep surface's
+    (`joined_rays`). photo_images: so many, from the first on, hold what the photo shows; the others are inpainted.
     """
 
     def __init__(
@@ -79,14 +68,13 @@ class RaySet:
         photo_detail: FloatImage | None = None,
         stages: Stages = ALL_STAGES,
     ) -> None:
-        """size: of the images, margins: of them around every view. surface_step: disparities closer than this are one
-        surface for look-ups. farthest_views: the largest view offset that will be rendered. photo_detail: see there.
-        stages: that are on, for all who make views of the set.
+        """size: of the images. surface_step: disparities closer than this are one surface for look-ups. photo_detail:
+        see there. stages: that are on, for all who make views of the set.
         """
-        self._count, self._photo_images = 0, 0
-        self._margins, self.stages = margins, stages
+        self._count, self.photo_images = 0, 0
+        self.margins, self.stages = margins, stages
         self._surface_step = surface_step
-        self._farthest_views = farthest_views
+        self.farthest_views = farthest_views
         self._photo_detail = photo_detail
         self._statistics: DisparityStatistics | None = None
         self._soft_cells = np.zeros((0, 0, 0), np.bool_)
@@ -103,7 +91,7 @@ class RaySet:
         low, high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
         row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
         self._cells_room = Cells(low, high, row_ranges, np.full(in_cells, np.inf, np.float32))
-        self._joined = np.zeros(size, np.uint8)
+        self.joined = np.zeros(size, np.uint8)
         self._steep, self._nowhere = np.zeros(in_cells, np.bool_), np.zeros(in_cells, np.bool_)
 
     def add(
@@ -125,48 +113,43 @@ class RaySet:
         k, joined = self._count, np.zeros(self.size, np.uint8)
         room, cells = self._room, self._cells_room
         if k == 0 and self.stages.connect_slopes:
-            least_edge = EDGE_PARALLAX_PX / max(self._farthest_views, 1e-9)
-            self._joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
-            self._steep = _any_in_cells(joined_either_way(joined))
+            least_edge = EDGE_PARALLAX_PX / max(self.farthest_views, 1e-9)
+            self.joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
+            self._steep = any_in_cells(joined_either_way(joined))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
-            step = IN_FRONT_PX / max(self._farthest_views, 1e-9)
+            step = IN_FRONT_PX / max(self.farthest_views, 1e-9)
             coverage = coverage.copy()
-            _leave_out_in_front(disparity, room.disparity[0], self._margins, *offset, step, coverage)
+            _leave_out_in_front(disparity, room.disparity[0], self.margins, *offset, step, coverage)
 
         def band(first: int, last: int) -> None:
             rows = slice(first, last)
             room.colors[k, rows], room.disparity[k, rows] = colors[rows], disparity[rows]
             room.coverage[k, rows] = coverage[rows]
             _edge_level(disparity, joined, self._surface_step, first, last, room.edge_level[k])
-            _sum_up(disparity, coverage, first, last, cells.low[k], cells.high[k])
+            sum_up(disparity, coverage, first, last, cells.low[k], cells.high[k])
             if k == 0:
-                _largest_steps(disparity, first, last, cells.step)
+                largest_steps(disparity, first, last, cells.step)
 
         in_bands(band, self.size, should_stop)
         cells.row_ranges[k, :, 0], cells.row_ranges[k, :, 1] = cells.low[k].min(axis=1), cells.high[k].max(axis=1)
         room.offsets[k] = offset
         self._count += 1
-        self._photo_images += not any(offset)
+        self.photo_images += not any(offset)
         self._statistics = None
 
     def survey(self, should_stop: ShouldStop = never) -> DisparityStatistics:
         """`statistics`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
         with self._surveying:
             if self._statistics is None:
-                found = measure_disparity(self.arrays.disparity, self._farthest_views, should_stop)
+                found = measure_disparity(self.arrays.disparity, self.farthest_views, should_stop)
                 self._soft_cells = np.empty(self.cells.low.shape, np.bool_)
-                self._soft_cells[: self.photo_images] = _any_in_cells(found.soft)
+                self._soft_cells[: self.photo_images] = any_in_cells(found.soft)
                 self._soft_cells[self.photo_images :] = found.softness > SOFT
                 self._statistics = found
             return self._statistics
 
     def __len__(self) -> int:
         return self._count
-
-    @property
-    def farthest_views(self) -> float:
-        """The largest view offset that will be rendered."""
-        return self._farthest_views
 
     @property
     def size(self) -> ImageSize:
@@ -178,14 +161,9 @@ class RaySet:
         """Of every view."""
         return image_size(self.in_view(self._room.disparity[0]))
 
-    @property
-    def margins(self) -> Margins:
-        """Of the images around every view."""
-        return self._margins
-
     def in_view(self, image: NDArray[Any]) -> NDArray[Any]:
         """The part of an image (H, W, ...) that its view shows."""
-        top, bottom, left, right = self._margins
+        top, bottom, left, right = self.margins
         return image[top : len(image) - bottom, left : image.shape[1] - right]
 
     @property
@@ -198,7 +176,7 @@ class RaySet:
             room.disparity[added],
             room.coverage[added],
             room.edge_level[added],
-            self._photo_images,
+            self.photo_images,
         )
 
     def to_view(self, offset: ViewOffset) -> NDArray[np.float64]:
@@ -211,18 +189,13 @@ class RaySet:
         Steps between surfaces are those of the farthest view; in a nearer one they are so much larger.
         """
         from_sources = np.abs(self.to_view(offset)).max(axis=1)
-        larger = self._farthest_views / np.maximum(from_sources, 1e-9)
+        larger = self.farthest_views / np.maximum(from_sources, 1e-9)
         return np.asarray(np.clip(larger, 1, HIGHEST_LEVEL - 1), np.uint8)
 
     def smooth_step(self, offset: ViewOffset) -> float:
         """In the view at `offset`, steps of the photo up to this are those of one smooth surface."""
-        larger = self._farthest_views / max(*map(abs, offset), 1e-9)
+        larger = self.farthest_views / max(*map(abs, offset), 1e-9)
         return SMOOTH_SHARE * self._surface_step * max(larger, 1.0)
-
-    @property
-    def joined(self) -> NDArray[np.uint8]:
-        """(H, W): which steps between the photo's rays are a steep surface's (`joined_rays`)."""
-        return self._joined
 
     def steep_cells(self, k: int) -> NDArray[np.bool_]:
         """(M, N): cells of image k with joined rays. Only the photo has any."""
@@ -248,11 +221,6 @@ class RaySet:
         return self._soft_cells
 
     @property
-    def photo_images(self) -> int:
-        """How many images, from the first on, hold what the photo shows; the others are inpainted."""
-        return self._photo_images
-
-    @property
     def photo_disparity(self) -> FloatImage:
         """(H, W) disparity of the photo, as large as views."""
         return np.ascontiguousarray(self.in_view(self._room.disparity[0]))
@@ -273,12 +241,6 @@ class RaySet:
         return image
 
 
-def _any_in_cells(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(M, N): cells of which any pixel (H, W) is marked."""
-    rows, columns = (np.arange(0, length, CELL_PX) for length in marked.shape)
-    return np.asarray(np.logical_or.reduceat(np.logical_or.reduceat(marked, rows, 0), columns, 1))
-
-
 @kernel
 def _leave_out_in_front(disparity, photo_disparity, margins, t, s, step, coverage):
     """No coverage for rays seen from (t, s) that lie more than a step in front of the photo's, or beside such a ray."""
@@ -295,42 +257,6 @@ def _leave_out_in_front(disparity, photo_disparity, margins, t, s, step, coverag
                     for j in range(max(y - DOUBTED_PX, 0), min(y + DOUBTED_PX + 1, height)):
                         for i in range(max(x - DOUBTED_PX, 0), min(x + DOUBTED_PX + 1, width)):
                             coverage[j, i] = 0.0
-
-
-@kernel
-def _sum_up(disparity, coverage, first, last, low, high):
-    """Of the cells that begin in rows [first, last)."""
-    height, width = disparity.shape
-    # Rounded up at both ends: the rows of a cell across two bands belong to the band in which it begins.
-    for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
-        low[v], high[v] = np.inf, -np.inf
-        for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
-            for x in range(width):
-                # Range of the cell; NaN, which differs from itself, is no surface.
-                d, u = disparity[y, x], x // CELL_PX
-                if coverage[y, x] > 0 and d == d:
-                    low[v, u], high[v, u] = min(low[v, u], d), max(high[v, u], d)
-
-
-@kernel
-def _largest_steps(disparity, first, last, step):
-    """`Cells.step` of the cells that begin in rows [first, last)."""
-    height, width = disparity.shape
-    for v in range(-(-first // CELL_PX), -(-last // CELL_PX)):
-        step[v] = 0.0
-        for y in range(v * CELL_PX, min((v + 1) * CELL_PX, height)):
-            for x in range(width):
-                # The border counts as a step: nobody knows what lies beyond.
-                largest = np.float32(np.inf)
-                if 0 < y < height - 1 and 0 < x < width - 1:
-                    here = disparity[y, x]
-                    across = max(abs(disparity[y, x - 1] - here), abs(disparity[y, x + 1] - here))
-                    down = max(abs(disparity[y - 1, x] - here), abs(disparity[y + 1, x] - here))
-                    # NaN, no surface, makes one of both sums NaN.
-                    around = disparity[y, x - 1] + disparity[y, x + 1] + disparity[y - 1, x] + disparity[y + 1, x]
-                    largest = max(across, down) if here + around == here + around else np.float32(np.inf)
-                u = x // CELL_PX
-                step[v, u] = max(step[v, u], largest)
 
 
 @kernel

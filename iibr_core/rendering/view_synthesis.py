@@ -23,7 +23,8 @@ from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
-from iibr_core.rendering.ray_set import CELL_PX, NO_MARGINS, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_cells import CELL_PX
+from iibr_core.rendering.ray_set import NO_MARGINS, OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
 from iibr_core.rendering.resampling import resample_colors
 from iibr_core.rendering.specks import measure_detail, without_specks

@@ -4,7 +4,8 @@ import pytest
 from iibr_core.rendering import candidates as candidates_module
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import SETTLED_PX, find_coherent_cells, land_marked
-from iibr_core.rendering.ray_set import CELL_PX, RaySet
+from iibr_core.rendering.ray_cells import CELL_PX
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import ImageSize, ViewOffset, image_size

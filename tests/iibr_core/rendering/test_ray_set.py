@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from iibr_core.rendering.ray_set import CELL_PX, DOUBTED_PX, HIGHEST_LEVEL, IN_FRONT_PX, SMOOTH_SHARE, RaySet
+from iibr_core.rendering.ray_cells import CELL_PX
+from iibr_core.rendering.ray_set import DOUBTED_PX, HIGHEST_LEVEL, IN_FRONT_PX, SMOOTH_SHARE, RaySet
 from iibr_core.types import ImageSize, Margins, ViewOffset
 
 SURFACE_STEP = 0.6
