@@ -88,8 +88,9 @@ class FullPicture:
         """The same as `draw`, of what was loaded for a picture of the same photo."""
         from iibr_core.exports.large_lens import large_lens
         from iibr_core.rendering.large_views import Part, whole
-        from iibr_core.rendering.lens_light import draw_large, mean_of_areas
+        from iibr_core.rendering.lens_light import draw_large
         from iibr_core.rendering.renderer import open_renderer
+        from iibr_core.rendering.resized_light import mean_of_areas
 
         height, width = photo.size
         lens = large_lens(self.optics, self.scene, width / self.scene.width)

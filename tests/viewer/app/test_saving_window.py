@@ -17,7 +17,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.rendering.lens_light import mean_of_areas
+from iibr_core.rendering.resized_light import mean_of_areas
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene

@@ -250,7 +250,7 @@ def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
 ) -> None:
     from iibr_core.color import linear_from_srgb, srgb_from_linear
     from iibr_core.formats.images.photo import read_photo
-    from iibr_core.rendering.lens_light import mean_of_areas
+    from iibr_core.rendering.resized_light import mean_of_areas
     from iibr_core.types import ImageSize
 
     full, usual, half = (tmp_path / f"{name}.png" for name in ("full", "usual", "half"))
