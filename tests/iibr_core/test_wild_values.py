@@ -520,6 +520,8 @@ FINITE_BY_CONTRACT = {
     "generation.free_views.steered": "of a Camera; the window keeps the rest within limits",
     "generation.free_views.depths_of": "of what `inverse_depth_of` gave",
     "rendering.free_view.disparity_space": "of a Camera",
+    "rendering.landed_squares.rows_landed_on": "as `render_free_view` calls it",
+    "rendering.landed_squares.draw_rays": "as `render_free_view` calls it",
     "rendering.free_view.render_free_view": "as `generation.free_views.FreeViews` calls it",
     "inpainting.diffusion.DiffusionInpainter": "of rendered views only; what a model paints is made finite",
     "inpainting.disparity_by_color.nearness": "of constants only",

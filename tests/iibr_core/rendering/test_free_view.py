@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from iibr_core.generation.free_views import FreeViews
-from iibr_core.rendering import free_view
-from iibr_core.rendering.free_view import CORNERS, SAMPLES, render_free_view, target_from_photo
+from iibr_core.rendering import free_view, landed_squares
+from iibr_core.rendering.free_view import render_free_view, target_from_photo
+from iibr_core.rendering.landed_squares import CORNERS, SAMPLES
 from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
 from iibr_core.runtime.tiling import Cancelled
@@ -100,8 +101,8 @@ def test_samples_see_what_a_slow_twin_sees(turn, rounding):
     matrix = target_from_photo(photo, target, 8.0)
     rays = rays_of_photo(np.zeros((6, 7, 3), np.float32), disparity.astype(np.float32), 1.0, 0)
     flat = tuple(map(float, matrix.ravel()))
-    landing = [free_view._landing(rays, 0, flat, lambda: False)]
-    nearest, source = free_view._draw(rays, [flat], landing, 0.5, rounding, (0, 4), 5)
+    landing = [landed_squares.rows_landed_on(rays, 0, flat, lambda: False)]
+    nearest, source = landed_squares.draw_rays(rays, [flat], landing, 0.5, rounding, (0, 4), 5)
     slow = drawn_slowly(rays.arrays.disparity[0], matrix, target.size, rounding)
     # Samples on the very side of a triangle belong to either.
     differ = ~np.isclose(nearest, slow, atol=1e-4)
@@ -262,5 +263,5 @@ def test_what_is_made_up_must_lie_clearly_before_what_the_photo_shows(shown, is_
     corners = np.array([[[-1.0, -1.0, 1.2], [2.0, -1.0, 1.2], [2.0, 2.0, 1.2], [-1.0, 2.0, 1.2]]])
     nearest, source = np.full((SAMPLES, SAMPLES), 1.0, np.float32), np.full((SAMPLES, SAMPLES), shown, np.uint8)
     for ahead in (0.5, 0.1):
-        free_view._draw_squares(corners, np.ones(1, np.bool_), np.ones(1), 2, 1, ahead, 0, nearest, source)
+        landed_squares._draw_squares(corners, np.ones(1, np.bool_), np.ones(1), 2, 1, ahead, 0, nearest, source)
         assert (source == (3 if is_hidden or ahead < 0.2 else shown)).all()
