@@ -21,9 +21,9 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.free_view import render_free_view, target_from_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.rendered_view import RenderedView
-from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import (

@@ -21,10 +21,10 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_inpainter, require_inpainter
 from iibr_core.rendering.hypotheses import AmbiguousRays
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
 from iibr_core.rendering.renderer import open_renderer
-from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import (

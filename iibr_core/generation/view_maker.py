@@ -13,10 +13,11 @@ from iibr_core.generation.outer_views import farthest_views, margins_beyond_fram
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer, open_renderer
-from iibr_core.rendering.view_synthesis import rays_of_photo, settled_view
+from iibr_core.rendering.view_synthesis import settled_view
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, Quality, ViewOffset
 

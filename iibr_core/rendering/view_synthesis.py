@@ -15,64 +15,28 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background, goes_on_in_front
-from iibr_core.inpainting.beyond_frame import extend_beyond_frame
 from iibr_core.inpainting.protocol import Inpainter
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
-from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
 from iibr_core.rendering.ray_cells import CELL_PX
-from iibr_core.rendering.ray_set import NO_MARGINS, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.specks import measure_detail, without_specks
+from iibr_core.rendering.specks import without_specks
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
-from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
+from iibr_core.types import FloatImage, ViewOffset
 
-EDGE_PX = 1.0
-"""A step of disparity mixes two surfaces if it opens a gap of at least this many pixels in the outermost view."""
 EVERY_COST = 8
 """How many times as long a band takes where the transformer is asked for every ray."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
-
-def rays_of_photo(
-    colors: FloatImage,
-    disparity: FloatImage,
-    farthest_views: float,
-    more: int,
-    should_stop: ShouldStop = never,
-    margins: Margins = NO_MARGINS,
-    stages: Stages = ALL_STAGES,
-) -> RaySet:
-    """The ray set of a photo: its own rays, and the fringe of its mixed pixels, with room for `more` images.
-
-    farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
-    margins: so far beyond its frame the photo is continued. stages: that are on, here and in all views of these rays.
-    Raises Cancelled once should_stop is true.
-    """
-    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop, stages)
-    centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
-    detail = measure_detail(colors, should_stop)
-    size, surface_step = image_size(disparity), OWN_SURFACE_PX / farthest_views
-    rays = RaySet(2 + more, size, surface_step, farthest_views, margins, detail, stages)
-    everywhere = np.ones_like(disparity)
-    if not stages.split_mixed_pixels:
-        rays.add(centre, colors, disparity, everywhere, should_stop)
-        return rays
-    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
-    rays.add(centre, own, disparity, everywhere, should_stop)
-    if coverage.any():
-        rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
-    return rays
 
 
 class ViewSynthesis:

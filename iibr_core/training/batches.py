@@ -19,9 +19,9 @@ from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import SHARE, AmbiguousRays, find_ambiguous_rays, hypothesis_colors
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import heaviest_candidate
-from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training.degradation import degrade
 from iibr_core.training.losses import EpiShape, color_loss, to_perceptual

@@ -25,7 +25,7 @@ from benchmarks.trained_variants import (
 from iibr_core.formats.weights import read_weights
 from iibr_core.rendering.ambiguous_rays import PLAIN
 from iibr_core.rendering.hypotheses import FEATURES, SHARE
-from iibr_core.rendering.view_synthesis import rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.training.batches import ambiguous_rays_of_view, training_batch
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render

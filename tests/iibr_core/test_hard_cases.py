@@ -23,7 +23,8 @@ from iibr_core.inpainting.exemplars import MOST_FINE
 from iibr_core.ray_transformer.inference import SHAPES, TrainedWeights
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.types import Disparity, GridShape, ImageSize, ViewOffset
 from tests.iibr_core.scenes import by_index, disparity_of, photo_of, smooth_texture, square_before_wall

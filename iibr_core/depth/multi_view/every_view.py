@@ -16,8 +16,8 @@ from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.agreement import reconcile
 from iibr_core.depth.multi_view.estimate import FINDING, estimate_disparity, map_work, refine_disparity, sweep_steps
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.renderer import open_renderer
-from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress, image_size
 

@@ -7,7 +7,8 @@ from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.generation.dense_field import BESIDE_WEIGHT, GivenView, densify, require_steps
 from iibr_core.generation.light_field import generate
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset

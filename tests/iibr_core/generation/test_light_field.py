@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from iibr_core.generation.light_field import generate
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime import tiling
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core import red_inpainter

@@ -7,7 +7,8 @@ import pytest
 
 from iibr_core.generation.outer_views import farthest_views, outer_views, outer_views_of_grid
 from iibr_core.generation.update_loop import complete_ray_set, render_outer_views
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.red_inpainter import paint_red

@@ -14,7 +14,8 @@ from iibr_core.inpainting.beyond_frame import (
     _level,
     extend_beyond_frame,
 )
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
 from tests.iibr_core.inpainting.test_background import along_line, line_slowly

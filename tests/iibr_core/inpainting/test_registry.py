@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, MODEL_INPAINTERS, load_inpainter
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import square_before_wall

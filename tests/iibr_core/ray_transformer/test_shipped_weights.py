@@ -13,8 +13,8 @@ from iibr_core.rendering.ambiguous_rays import LEAST_WEIGHT
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import blend_hypotheses, find_ambiguous_rays
 from iibr_core.rendering.occlusion import WHOLE, covered_share
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.view_synthesis import rays_of_photo
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training.degradation import blur, degrade
 from iibr_core.training.scenes.random_scene import cast, random_scene, render

@@ -26,9 +26,10 @@ from iibr_core.rendering.hypotheses import (
     find_ambiguous_rays,
     hypothesis_colors,
 )
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.training.degradation import blur
 from iibr_core.types import ViewOffset

@@ -11,8 +11,9 @@ from iibr_core.generation.free_views import FreeViews
 from iibr_core.rendering import free_view, landed_squares
 from iibr_core.rendering.free_view import render_free_view, target_from_photo
 from iibr_core.rendering.landed_squares import CORNERS, SAMPLES
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import Camera, ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall

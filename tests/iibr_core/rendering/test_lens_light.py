@@ -10,9 +10,10 @@ from iibr_core.generation.light_field import ray_set
 from iibr_core.rendering import large_views
 from iibr_core.rendering.large_views import AROUND_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.rendering.lens_light import LargeLens, LensSample, draw_large
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.resized_light import bring_to, mean_of_areas
 from iibr_core.rendering.specks import without_specks
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import Disparity, ImageSize, Photo, ViewOffset, image_size
 from tests.iibr_core.scenes import literal_plan, smooth_texture, square_before_wall

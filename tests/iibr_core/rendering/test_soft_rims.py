@@ -5,7 +5,8 @@ import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.generation.update_loop import render_outer_views
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.types import ViewOffset
 from tests.iibr_core.red_inpainter import paint_red
 

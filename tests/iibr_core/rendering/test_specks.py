@@ -7,6 +7,7 @@ import pytest
 from scipy import ndimage
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.specks import (
     GAP_PX,
@@ -16,7 +17,7 @@ from iibr_core.rendering.specks import (
     measure_detail,
     without_specks,
 )
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 

@@ -16,8 +16,9 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.rendering.disparity_statistics import find_soft_edges, measure_disparity
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import ViewSynthesis, rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import Cancelled, in_bands, in_pieces
 from iibr_core.types import ImageSize, Photo, ViewOffset

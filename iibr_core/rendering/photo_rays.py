@@ -1,0 +1,47 @@
+"""The ray set that a photo begins with: its own rays, those beyond its frame, and the fringe of its mixed pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from iibr_core.inpainting.beyond_frame import extend_beyond_frame
+from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.rendering.ray_set import NO_MARGINS, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.specks import measure_detail
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
+
+EDGE_PX = 1.0
+"""A step of disparity mixes two surfaces if it opens a gap of at least this many pixels in the outermost view."""
+
+
+def rays_of_photo(
+    colors: FloatImage,
+    disparity: FloatImage,
+    farthest_views: float,
+    more: int,
+    should_stop: ShouldStop = never,
+    margins: Margins = NO_MARGINS,
+    stages: Stages = ALL_STAGES,
+) -> RaySet:
+    """The ray set of a photo: its own rays, and the fringe of its mixed pixels, with room for `more` images.
+
+    farthest_views: the largest view offset that will be rendered; it decides which steps of disparity are depth edges.
+    margins: so far beyond its frame the photo is continued. stages: that are on, here and in all views of these rays.
+    Raises Cancelled once should_stop is true.
+    """
+    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop, stages)
+    centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
+    detail = measure_detail(colors, should_stop)
+    size, surface_step = image_size(disparity), OWN_SURFACE_PX / farthest_views
+    rays = RaySet(2 + more, size, surface_step, farthest_views, margins, detail, stages)
+    everywhere = np.ones_like(disparity)
+    if not stages.split_mixed_pixels:
+        rays.add(centre, colors, disparity, everywhere, should_stop)
+        return rays
+    own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
+    rays.add(centre, own, disparity, everywhere, should_stop)
+    if coverage.any():
+        rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
+    return rays
