@@ -17,7 +17,7 @@ from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer, open_renderer
-from iibr_core.rendering.view_synthesis import settled_view
+from iibr_core.rendering.specks import settled_view
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, Quality, ViewOffset
 

@@ -17,7 +17,7 @@ from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer
-from iibr_core.rendering.view_synthesis import settled_view
+from iibr_core.rendering.specks import settled_view
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size

@@ -8,12 +8,14 @@ within one surface or was inpainted.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.ray_set import HIGHEST_LEVEL, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ViewOffset, image_size
@@ -69,6 +71,18 @@ def without_specks(
         image_size(disparity), should_stop, threads,
     )  # fmt: skip
     return cast(Colors, settled.astype(colors.dtype, copy=False))
+
+
+def settled_view(
+    rays: RaySet,
+    offset: ViewOffset,
+    view: RenderedView,
+    should_stop: ShouldStop = never,
+    threads: int | None = None,
+) -> RenderedView:
+    """A view made of the rays of a photo, without its specks. Arguments as of `without_specks`."""
+    colors = without_specks(rays, offset, view.colors, view.disparity, view.inpainted, should_stop, threads)
+    return replace(view, colors=colors)
 
 
 @kernel

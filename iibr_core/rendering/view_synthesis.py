@@ -25,7 +25,6 @@ from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.specks import without_specks
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
@@ -294,15 +293,3 @@ def _composite(front: FloatImage, back: FloatImage, share: FloatImage) -> FloatI
     """Colours (N, 3) of a front that covers these shares (N) of its pixels, over a back; summed in linear light."""
     light = linear_from_srgb(back) + share[:, None] * (linear_from_srgb(front) - linear_from_srgb(back))
     return np.asarray(srgb_from_linear(light), np.float32)
-
-
-def settled_view(
-    rays: RaySet,
-    offset: ViewOffset,
-    view: RenderedView,
-    should_stop: ShouldStop = never,
-    threads: int | None = None,
-) -> RenderedView:
-    """A view made of the rays of a photo, without its specks. Arguments as of `without_specks`."""
-    colors = without_specks(rays, offset, view.colors, view.disparity, view.inpainted, should_stop, threads)
-    return replace(view, colors=colors)

@@ -53,7 +53,8 @@ from iibr_core.rendering import (
 from iibr_core.rendering.gloss import environment, geometry, shading, surface
 from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface, of_maps
 from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis, settled_view
+from iibr_core.rendering.specks import settled_view
+from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime.tiling import never
 from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
@@ -445,7 +446,7 @@ FINITE = {
     ),
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
     "rendering.photo_rays.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
-    "rendering.view_synthesis.settled_view": lambda v, _: settled_view(
+    "rendering.specks.settled_view": lambda v, _: settled_view(
         rays(v), ViewOffset(0.5, 1.0), rendered(ViewOffset(0.5, 1.0), v)
     ),
     "types.Disparity": lambda v, _: Disparity(depths(v), "wild"),
