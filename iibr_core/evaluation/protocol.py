@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
@@ -26,6 +25,16 @@ from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
 from iibr_core.evaluation.metrics import Mask, bounded_psnr, flip, ssim
 from iibr_core.evaluation.reference_warp import WarpedView
 from iibr_core.evaluation.refocus import FocalStack, RefocusResult, foci_of, lens_focus, score_methods
+from iibr_core.evaluation.results import (
+    IDENTITY,
+    REFERENCE,
+    TRUTH,
+    Bytes,
+    EvaluationResult,
+    Figures,
+    Pictures,
+    row_of,
+)
 from iibr_core.evaluation.trial_views import PlaneViews, TrialViews, trial_views
 from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Trial, TrialInput, trial_input, trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
@@ -36,7 +45,6 @@ from iibr_core.types import (
     DEFAULT_QUALITY,
     Disparity,
     FloatImage,
-    ImageSize,
     Quality,
     ReportProgress,
     ViewOffset,
@@ -48,13 +56,9 @@ if TYPE_CHECKING:
     from iibr_core.evaluation.lpips import Lpips
 
 QUALITIES: tuple[Quality, ...] = get_args(Quality)
-IDENTITY, REFERENCE, TRUTH = "identity", "reference warp", "truth"
 SAME_ROW = 0.05
 """Views whose rows differ by less, in view steps, make an EPI together."""
 LEAST_EPI_VIEWS = 3
-
-Bytes = NDArray[np.uint8]
-"""(H, W, 3), sRGB-encoded."""
 
 
 @dataclass(frozen=True)
@@ -73,62 +77,6 @@ class Options:
     with_consistency: bool = True
     with_refocus: bool = True
     stages: Stages = ALL_STAGES
-
-
-@dataclass(frozen=True)
-class Figures:
-    """PSNR in dB of the frame, of what the given view sees, and of holes; SSIM, FLIP and LPIPS of the frame; time."""
-
-    full_db: float
-    visible_db: float
-    hole_db: float
-    ssim: float
-    flip: float
-    lpips: float
-    ms: float
-
-
-@dataclass(frozen=True)
-class Row:
-    """One method: means over the views (of holes over those that have any), the worst view, figures of each view."""
-
-    method: str
-    mean: Figures
-    worst_view: str
-    worst_db: float
-    of_views: Mapping[str, Figures]
-
-
-@dataclass(frozen=True, eq=False)
-class Pictures:
-    """To look at: one view by every method and as it is, and EPIs of one row of pixels, (views, W, 3) each."""
-
-    view: str
-    by_method: Mapping[str, Bytes]
-    epis: Mapping[str, Bytes]
-    epi_row: int
-
-
-@dataclass(frozen=True, eq=False)
-class EvaluationResult:
-    """One trial with one disparity map. consistency: by quality, and of the truth's EPIs where it has a row of views.
-
-    refocus: of grids, from the centre view. hole_share: of the pixels, mean over views. seconds: for everything.
-    """
-
-    scene: str
-    layout: str
-    trial: str
-    given: str
-    size: ImageSize
-    disparity: str
-    rows: tuple[Row, ...]
-    consistency: Mapping[str, Consistency]
-    refocus: tuple[RefocusResult, ...]
-    pictures: Pictures
-    hole_share: float
-    notes: tuple[str, ...]
-    seconds: float
 
 
 def evaluate(
@@ -217,7 +165,7 @@ class _Evaluator:
             agreement = {}
             if options.with_consistency and isinstance(views, PlaneViews):
                 agreement = self._consistency(views)
-        rows = tuple(_row(method, of_views) for method, of_views in self.figures.items())
+        rows = tuple(row_of(method, of_views) for method, of_views in self.figures.items())
         return EvaluationResult(
             scene.name,
             scene.layout,
@@ -328,14 +276,6 @@ class _Evaluator:
             rms, off_px = line_straightness(self.given.photo, self.given.judge.values, self.lines)
             found[TRUTH] = Consistency(math.nan, math.nan, rms, off_px, 0)
         return found
-
-
-def _row(method: str, of_views: Mapping[str, Figures]) -> Row:
-    worst = min(of_views, key=lambda name: of_views[name].full_db)
-    table = np.array([list(vars(figures).values()) for figures in of_views.values()])
-    known = np.isfinite(table)
-    means = np.where(known, table, 0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
-    return Row(method, Figures(*(float(mean) for mean in means)), worst, of_views[worst].full_db, of_views)
 
 
 def _row_to_show(disparity: FloatImage) -> int:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from iibr_core.evaluation.page import page_of
-from iibr_core.evaluation.protocol import EvaluationResult
 from iibr_core.evaluation.refocus import RefocusResult
 from iibr_core.evaluation.report_folder import FILES
+from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.evaluation.tables import (
     ABOUT_CONSISTENCY,
     Table,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from iibr_core.evaluation import protocol
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import flip, psnr, ssim
+from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.interface.pictures import encoded
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -45,7 +46,7 @@ def evaluate(
     report_progress: ReportProgress = ignore_progress,
     stages: Stages = ALL_STAGES,
     **options: Any,
-) -> list[protocol.EvaluationResult]:
+) -> list[EvaluationResult]:
     """Judge views against those of a data set: a folder of one scene, or of several, as `iibr evaluate` takes it.
 
     stages: between map and view, that are on. options: other fields of `iibr_core.evaluation.protocol.Options`. Raises

@@ -19,9 +19,10 @@ from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation import report
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.protocol import EvaluationResult, Options, evaluate
+from iibr_core.evaluation.protocol import Options, evaluate
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.report_folder import FILES, require_report_folder
+from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
 from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input, trials_of
 from iibr_core.formats.images.photo import read_photo

@@ -20,9 +20,10 @@ from iibr_core.evaluation import report
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.lens_picture import read_lens_picture
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.evaluation.protocol import EvaluationResult, Options, evaluate
+from iibr_core.evaluation.protocol import Options, evaluate
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.refocus import LENS, FocalStack, Focus, foci_of, lens_focus, shear, weight_of, within
+from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.generation.light_field import generate
 from iibr_core.types import Disparity, FloatImage, InputError, ViewOffset
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
