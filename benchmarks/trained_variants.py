@@ -26,8 +26,9 @@ from benchmarks.stages import Views, judge, make_views, report
 from iibr_core.formats.weights import save_weights
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import PLAIN, UndecidedRays
+from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays, describe_rays
+from iibr_core.rendering.laid_hypotheses import PLAIN
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.stages import Stages
 from iibr_core.training.batches import AS_RENDERED, RayChoice, training_batch

@@ -12,16 +12,10 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ambiguous_rays import (
-    HYPOTHESES,
-    LEAST_WEIGHT,
-    PLAIN,
-    REACH_PX,
-    UndecidedRays,
-    find_undecided_rays,
-)
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.disparity_statistics import SOFT
+from iibr_core.rendering.laid_hypotheses import LEAST_WEIGHT, PLAIN, REACH_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import ShownRays, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar

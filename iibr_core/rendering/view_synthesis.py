@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background, goes_on_in_front
 from iibr_core.inpainting.protocol import Inpainter
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX, UndecidedRays, find_undecided_rays
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
+from iibr_core.rendering.laid_hypotheses import REACH_PX
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet

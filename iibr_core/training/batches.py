@@ -16,9 +16,10 @@ from torch import Tensor
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, REACH_PX
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import SHARE, AmbiguousRays, find_ambiguous_rays, hypothesis_colors
+from iibr_core.rendering.laid_hypotheses import REACH_PX
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import heaviest_candidate

@@ -679,6 +679,7 @@ READS_OR_TELLS = {
     "depth.embedded.picture": "photo_in_focus rotate_estimate",
     "depth.search": "ask_model estimator_of read_shown_photo",
     "rendering.ambiguous_rays": "UndecidedRays",
+    "rendering.laid_hypotheses": "Hypotheses Landed",
     "rendering.candidates": "Candidates",
     "rendering.disparity_statistics": "DisparityStatistics",
     "rendering.large_views": "Part tiles_of whole",

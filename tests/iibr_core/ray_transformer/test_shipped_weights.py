@@ -9,9 +9,9 @@ import pytest
 from iibr_core.generation.light_field import transformer_for
 from iibr_core.generation.outer_views import outer_views
 from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.rendering.ambiguous_rays import LEAST_WEIGHT
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import blend_hypotheses, find_ambiguous_rays
+from iibr_core.rendering.laid_hypotheses import LEAST_WEIGHT
 from iibr_core.rendering.occlusion import WHOLE, covered_share
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.resampling import resample_colors
