@@ -18,14 +18,7 @@ if TYPE_CHECKING:
     from iibr_core.exports.options import ANIMATIONS, USUAL_OPTIONS, AnimationKind, ExportOptions
     from iibr_core.exports.photo_folder import FolderOrder, FolderPhoto, first_photo, in_order, list_photos
     from iibr_core.exports.registry import export_path, require_export_place, writer_of
-    from iibr_core.exports.render_settings import (
-        WHOLE,
-        WHOLE_PICTURE,
-        PictureCell,
-        RenderSettings,
-        TargetWindow,
-        require_size,
-    )
+    from iibr_core.exports.render_settings import RenderSettings, require_size
     from iibr_core.exports.settings import MOST_FRAMES, RATE_LIMITS, ExportSettings, settle, size_of_width
     from iibr_core.exports.source import ExportSource
 else:

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear
-from iibr_core.exports.render_settings import WHOLE_PICTURE, RenderSettings, TargetWindow
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.generation.memory_model import budget_of, require_own_size
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import Optics
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace, FloatImage, ImageSize, InputError, ReportProgress, ignore_progress, image_size
@@ -41,7 +42,7 @@ class FullPicture:
     optics: Optics
     size: ScreenSize
     smaller: FloatImage | None = None
-    part: TargetWindow = WHOLE_PICTURE
+    part: Rect = WHOLE
 
     @property
     def smaller_settings(self) -> RenderSettings:
@@ -94,7 +95,7 @@ class FullPicture:
 
         height, width = photo.size
         lens = large_lens(self.optics, self.scene, width / self.scene.width)
-        top, left = self.part.top * height, self.part.left * width
+        top, left = self.part.y * height, self.part.x * width
         down, across = self.part.height * height, self.part.width * width
         pixels = Part(math.floor(top), math.ceil(top + down), math.floor(left), math.ceil(left + across))
         pixels = pixels.grown(0, whole(photo.size))

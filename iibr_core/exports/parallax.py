@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from iibr_core.exports.render_settings import RenderSettings, TargetWindow
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.settings import shear_margin
+from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError, ViewOffset
 
@@ -41,7 +42,7 @@ def side_pictures(scene: Scene, settings: RenderSettings, count: int, span_views
         replace(
             settings,
             optics=replace(optics, eye=ViewOffset(optics.eye.t, float(s))),
-            part=TargetWindow(margin + float(shear), 0.0, width, 1.0),
+            part=Rect(margin + float(shear), 0.0, width, 1.0),
         )
         for s, shear in zip(places, shears)
     ]

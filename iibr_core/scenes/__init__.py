@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         scene_of_photo,
         sketch_of,
     )
+    from iibr_core.scenes.rect import WHOLE, Rect
     from iibr_core.scenes.scene import (
         AS_FOUND,
         DepthSettings,

@@ -17,6 +17,7 @@ from iibr_core.rendering import CENTRE
 from iibr_core.scenes import (
     DepthSettings,
     Progress,
+    Rect,
     Scene,
     SceneReady,
     SceneRequest,
@@ -38,7 +39,7 @@ from viewer.model.inspection_request import (
     beside_of,
     make_inspection_request,
 )
-from viewer.model.layout import BACKGROUND, Layout, Rect, layout_of, letterbox
+from viewer.model.layout import BACKGROUND, Layout, layout_of, letterbox
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import SetInspection

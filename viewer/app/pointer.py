@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from iibr_core.scenes import Scene, focus_limits
+from iibr_core.scenes import Rect, Scene, focus_limits
 from iibr_core.types import ViewOffset
 from viewer.model.actions import Action, EndGesture, ReturnHome, SetHover
 from viewer.model.inspection_request import view_at
-from viewer.model.layout import Layout, Rect, pixel_at
+from viewer.model.layout import Layout, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush

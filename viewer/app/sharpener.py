@@ -12,16 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.exports import FullPicture, is_full, needs_smaller
-from iibr_core.scenes import LoadedPhoto, ScreenSize
+from iibr_core.scenes import WHOLE, LoadedPhoto, ScreenSize
 from iibr_core.types import FloatImage
 from viewer.background.jobs import Failed
 from viewer.background.sharpening import SharpeningWorker, SharpPart
-from viewer.display.scene_view import SceneView, window_of
+from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.model.actions import Action, Notify
-from viewer.model.layout import WHOLE
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.notices import Notice
 
@@ -86,8 +85,7 @@ class Sharpener:
         is_finer = picture.size_px.width / picture.part.width > scene.width
         if not is_finer or loaded is self._refused or not is_full(scene, picture.optics, scene.own_size):
             return None
-        part = window_of(picture.part)
-        return FullPicture(scene, scene.plan, loaded, picture.optics, ScreenSize(*picture.size_px), part=part)
+        return FullPicture(scene, scene.plan, loaded, picture.optics, ScreenSize(*picture.size_px), part=picture.part)
 
     def _start(self, request: FullPicture) -> None:
         if not needs_smaller(request.optics):

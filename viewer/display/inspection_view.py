@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.exports import RenderSettings
-from iibr_core.scenes import Scene, ScreenSize
+from iibr_core.scenes import WHOLE, Rect, Scene, ScreenSize
 from iibr_core.types import DEFAULT_QUALITY, ViewUpdate
 from viewer.background.comparison_worker import ComparisonInputs, ComparisonResult, EntropyReady, PairReady, PairScored
 from viewer.background.jobs import Failed
-from viewer.display.scene_view import SceneView, window_of
+from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
-from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle, SheetCell
+from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model.actions import Action, Notify
@@ -32,7 +32,7 @@ from viewer.model.inspection_request import (
     sheet_cells,
     view_near,
 )
-from viewer.model.layout import WHOLE, Layout, Rect
+from viewer.model.layout import Layout, PixelRect
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
 from viewer.model.state.notices import Notice
@@ -267,7 +267,7 @@ class InspectionView:
             return {}
         record = base.generation, base.views, base.previews, optics, size_px, part
         if self._kept is None or self._kept[0] != record:
-            self._kept = record, self._scene_view.picture(RenderSettings(optics, size_px, window_of(part)))
+            self._kept = record, self._scene_view.picture(RenderSettings(optics, size_px, part))
         kept = self._kept[1]
         if kind == "kept":
             return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}
@@ -316,6 +316,6 @@ def _comparison_of(request: InspectionRequest) -> Comparison:
     return request.kind
 
 
-def _whole(cell: Rect) -> SheetCell:
+def _whole(cell: Rect) -> PixelRect:
     left, top = round(cell.x), round(cell.y)
-    return SheetCell(left, top, max(round(cell.x + cell.width) - left, 1), max(round(cell.y + cell.height) - top, 1))
+    return PixelRect(left, top, max(round(cell.x + cell.width) - left, 1), max(round(cell.y + cell.height) - top, 1))

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import RenderSettings, TargetWindow
+from iibr_core.exports import RenderSettings
 from iibr_core.rendering import CENTRE, Optics
 from iibr_core.rendering.gloss import Gloss
-from iibr_core.scenes import GlossFound, GlossRequest, LoadedPhoto, Scene, SceneReady, ScreenSize
+from iibr_core.scenes import WHOLE, GlossFound, GlossRequest, LoadedPhoto, Rect, Scene, SceneReady, ScreenSize
 from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
@@ -25,7 +25,6 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.layout import WHOLE, Rect
 from viewer.model.state.app_state import AppState, DrawReport, Picture
 
 VIEW_REFRESH_S = 0.25
@@ -227,10 +226,10 @@ class SceneView:
         if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)
             if is_still and self.renderer.passes_shown:  # it is seen on, and must not become softer
-                self.renderer.renew(wanted.optics, wanted.size_px, window_of(part))
+                self.renderer.renew(wanted.optics, wanted.size_px, part)
             else:
                 budget_s = STILL_BUDGET_S if is_still else budget_s
-                self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, window_of(part))
+                self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, part)
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
             self._drawn = replace(wanted, samples=self.report.samples)
@@ -354,8 +353,3 @@ def _box_around(marks: NDArray[np.bool_]) -> Box:
     """The least rows and columns that hold all marks, of which there are some."""
     rows, columns = (np.flatnonzero(marks.any(axis)) for axis in (1, 0))
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
-
-
-def window_of(part: Rect) -> TargetWindow:
-    """A part of the picture, as the renderer wants it."""
-    return TargetWindow(part.x, part.y, part.width, part.height)

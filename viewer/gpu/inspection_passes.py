@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, srgb_from_linear
 from iibr_core.rendering import Optics
 from iibr_core.rendering.gloss import Gloss
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes import WHOLE, Rect, ScreenSize
 from iibr_core.types import SRGB, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
-from viewer.model.layout import WHOLE, Rect
+from viewer.model.layout import PixelRect
 
 MAX_VIEWS = 128
 """As in shaders/epi.frag: of one row or column of the grid."""
@@ -48,15 +48,6 @@ class Line(NamedTuple):
     at: float
     is_upright: bool = False
     span: tuple[float, float] = (0.0, 1.0)
-
-
-class SheetCell(NamedTuple):
-    """A rectangle of the sheet in pixels, rows counted from the top."""
-
-    x: int
-    y: int
-    width: int
-    height: int
 
 
 class InspectionPasses:
@@ -105,12 +96,12 @@ class InspectionPasses:
         self._ctx.clear(0.0, 0.0, 0.0, 1.0)
         return texture
 
-    def draw_on_sheet(self, field: LightFieldTexture, row: int, column: int, cell: SheetCell, exposure: float) -> None:
+    def draw_on_sheet(self, field: LightFieldTexture, row: int, column: int, cell: PixelRect, exposure: float) -> None:
         """Draw one view, or that it is not there, into its cell of the sheet."""
         _, framebuffer = self._images["sheet"]
         framebuffer.use()
-        framebuffer.viewport = cell.x, cell.y, cell.width, cell.height
-        self._draw_stored(field, _layer(field, row, column), ScreenSize(cell.width, cell.height), exposure)
+        framebuffer.viewport = cell
+        self._draw_stored(field, _layer(field, row, column), cell.size, exposure)
         framebuffer.viewport = (0, 0, *framebuffer.size)
 
     def draw_view(
@@ -172,7 +163,7 @@ class InspectionPasses:
         program.set_uniforms(search_steps=min(max(math.ceil(distance * (near - far)), 2), MAX_SEARCH_STEPS))
         colors = [tuple(value / 255 for value in color) for color in style.color_map]
         program.set_uniforms(color_map=colors, map_ends=style.map_ends, opacity=style.opacity)
-        program.set_uniforms(part=(part.x, part.y, part.width, part.height))
+        program.set_uniforms(part=part)
         if values is not None:
             self._texture("values", np.ascontiguousarray(values)[..., None]).use(2)
             program.set_uniforms(values=2)

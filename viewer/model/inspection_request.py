@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iibr_core.scenes import Scene
+from iibr_core.scenes import Rect, Scene
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.layout import Beside, Rect
+from viewer.model.layout import Beside
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Comparison, GroundTruth, ViewIndex
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes import WHOLE, Rect, ScreenSize
 from viewer.model.zoom import MOST_ZOOM, Zoom
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0
@@ -30,36 +30,6 @@ class PixelRect(NamedTuple):
         """Of the part."""
         return ScreenSize(self.width, self.height)
 
-
-class Rect(NamedTuple):
-    """A rectangle: its upper left corner and its size."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-
-    def contains(self, x: float, y: float) -> bool:
-        """Whether the point lies inside."""
-        return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
-
-    def within(self, other: Rect) -> Rect:
-        """What of it lies in another one."""
-        x, y = max(self.x, other.x), max(self.y, other.y)
-        far_x, far_y = (
-            min(self.x + self.width, other.x + other.width),
-            min(self.y + self.height, other.y + other.height),
-        )
-        return Rect(x, y, max(far_x - x, 0.0), max(far_y - y, 0.0))
-
-    def part(self, inner: Rect) -> Rect:
-        """A part of it. inner: as shares of it."""
-        left, top = self.x + inner.x * self.width, self.y + inner.y * self.height
-        return Rect(left, top, inner.width * self.width, inner.height * self.height)
-
-
-WHOLE = Rect(0.0, 0.0, 1.0, 1.0)
-"""All of the picture, as a share of it."""
 
 MINIMAP_SIDE = 150.0
 """The longer side of the small picture that says which part is seen."""

@@ -8,7 +8,8 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
-from viewer.model.layout import BACKGROUND, Rect
+from iibr_core.scenes import Rect
+from viewer.model.layout import BACKGROUND
 from viewer.model.state.preferences import Theme
 
 FONT_SIZE = 16.0

@@ -61,9 +61,9 @@ def test_parts_that_are_held_still_are_as_wide_as_may_be(source: ExportSource) -
     """The first and the last reach the picture's two borders."""
     both = RenderSettings(Optics(focus_disparity=1.5), ScreenSize(96, 64))
     parts = [eye.part for eye in side_pictures(source.scene, both, 3, 2.0)]
-    assert max(part.left + part.width for part in parts) == pytest.approx(1)
-    assert min(part.left for part in parts) == pytest.approx(0)
-    assert all((part.top, part.height) == (0, 1) for part in parts)
+    assert max(part.x + part.width for part in parts) == pytest.approx(1)
+    assert min(part.x for part in parts) == pytest.approx(0)
+    assert all((part.y, part.height) == (0, 1) for part in parts)
 
 
 def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:

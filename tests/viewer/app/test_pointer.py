@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.rect import Rect as R
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.pointer import (
@@ -20,7 +21,6 @@ from viewer.app.pointer import (
 )
 from viewer.model.actions import EndGesture, ReturnHome, SetHover
 from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
-from viewer.model.layout import Rect as R
 from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.history import History

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import NEAR, Driver, Opener
-from viewer.model.layout import Rect
 from viewer.model.state.optics import MoveEye, SetAperture
 from viewer.model.zoom import SetZoom, Zoom
 

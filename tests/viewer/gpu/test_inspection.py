@@ -12,10 +12,11 @@ from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
-from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, InspectionPasses, Line, OverlayStyle, SheetCell
+from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.model.colormap import VIRIDIS, map_color
+from viewer.model.layout import PixelRect
 
 GRID = GridShape(5, 7)
 SCENE = TwoPlanes()
@@ -143,7 +144,7 @@ def test_the_sheet_shows_each_view_in_its_cell_and_grey_where_none_is(
     renderer: Renderer, passes: InspectionPasses
 ) -> None:
     field = middle_only(renderer)
-    cells = SheetCell(2, 3, 48, 36), SheetCell(60, 3, 48, 36)
+    cells = PixelRect(2, 3, 48, 36), PixelRect(60, 3, 48, 36)
     passes.start_sheet((110, 60))
     passes.draw_on_sheet(field, *GRID.centre, cells[0], 1.0)
     passes.draw_on_sheet(field, 0, 0, cells[1], 1.0)

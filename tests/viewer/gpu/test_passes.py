@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from iibr_core.color import srgb_from_linear
-from iibr_core.exports.render_settings import WHOLE
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms
 from viewer.gpu.refocus.lens import Lens, lens_of
 from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps
+from viewer.gpu.refocus.picture_cells import WHOLE_CELL
 from viewer.gpu.refocus.renderer import Renderer
 from viewer.gpu.refocus.view_sampling import pinhole_sources
 from viewer.gpu.render_targets import RenderTargets
@@ -76,14 +76,14 @@ def test_no_search_ends_outside_its_tiles_span(
     field, view = renderer.field, lens(renderer, Optics(eye))
     assert field is not None
     field.range_px = -10.0, 11.0  # wider than what is there: something can be saved
-    passes._find_march_intervals(field, view, WHOLE, WHOLE, targets)
+    passes._find_march_intervals(field, view, WHOLE_CELL, WHOLE_CELL, targets)
     spans = np.concatenate([read(texture) for texture in targets.spans.textures], axis=-1)
     flat = spans[..., 1] < 0
     assert 0.1 < flat.mean() < 0.9
     for i, (row, column, _) in enumerate(pinhole_sources(eye, GRID, field.present)):
         there = GRID.offset(row, column)
         _, disparity = SCENE.view(there)
-        steps = _search_steps(field, view, there, WHOLE)
+        steps = _search_steps(field, view, there, WHOLE_CELL)
         delta = np.array([there.s - eye.s, there.t - eye.t])
         found = first_step_that_finds(disparity, delta, steps, field.range_px)
         tiles = found.reshape(SIZE[1] // TILE_PX, TILE_PX, SIZE[0] // TILE_PX, TILE_PX).swapaxes(1, 2)

@@ -9,10 +9,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import EndGesture, ShowTiltHandles
-from viewer.model.layout import Rect
 from viewer.model.lens.focal_plane import (
     CLOSEST_HANDLES,
     focus_on,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover
@@ -23,7 +24,7 @@ from viewer.model.inspection_request import (
     view_near,
     view_to_compare,
 )
-from viewer.model.layout import Beside, Rect, layout_of
+from viewer.model.layout import Beside, layout_of
 from viewer.model.reducers.inspection import KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.scenes.rect import WHOLE
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
 from viewer.model.actions import OpenPath, SceneOpened
-from viewer.model.layout import WHOLE, Beside, Layout, layout_of, pixel_at
+from viewer.model.layout import Beside, Layout, layout_of, pixel_at
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.zoom import MOST_ZOOM, SetZoom, Zoom

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import Action, Notify, SetHover, ToggleSection
 from viewer.model.inspection_request import beside_of, sheet_cells
-from viewer.model.layout import PANEL_WIDTH, Layout, Rect, layout_of
+from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import OVERLAYS, Compare, MoveDivider, OverlayKind, SetInspection, SetOverlay
 from viewer.model.state.notices import Notice

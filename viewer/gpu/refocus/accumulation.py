@@ -10,13 +10,13 @@ from dataclasses import field as dataclass_field
 
 import moderngl
 
-from iibr_core.exports import WHOLE, PictureCell
 from iibr_core.scenes import ScreenSize, clamp_to_grid
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.lens import Lens
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
+from viewer.gpu.refocus.picture_cells import WHOLE_CELL, PictureCell
 from viewer.gpu.refocus.view_sampling import ApertureSample, nearest_present
 from viewer.gpu.render_targets import RenderTarget, RenderTargets
 
@@ -242,7 +242,7 @@ def _row_bands(target: RenderTarget, pixels: float) -> list[PictureCell]:
     """The rows of a target in bands of so many pixels, at least LEAST_ROWS each, in texture coordinates of it."""
     width, height = target.framebuffer.size
     if width * height <= pixels:
-        return [WHOLE]
+        return [WHOLE_CELL]
     rows = max(int(pixels / width), LEAST_ROWS)
     return [PictureCell(0.0, top / height, 1.0, min(top + rows, height) / height) for top in range(0, height, rows)]
 

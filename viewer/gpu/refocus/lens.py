@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import WHOLE_PICTURE, TargetWindow
 from iibr_core.rendering import Optics
+from iibr_core.scenes import WHOLE, Rect
 from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
@@ -51,7 +51,7 @@ class Lens:
     highlight_gain: float
     exposure: float
     most_sources: int
-    part: TargetWindow = WHOLE_PICTURE
+    part: Rect = WHOLE
     color_space: ColorSpace = SRGB
 
     @property

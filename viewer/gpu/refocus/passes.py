@@ -10,12 +10,12 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from iibr_core.exports import WHOLE_PICTURE, PictureCell
+from iibr_core.scenes import WHOLE
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
 from viewer.gpu.refocus.lens import Lens
-from viewer.gpu.refocus.picture_cells import cells_between_views, covering_pixels, pixels_of
+from viewer.gpu.refocus.picture_cells import PictureCell, cells_between_views, covering_pixels, pixels_of
 from viewer.gpu.refocus.view_sampling import (
     MAX_SOURCES,
     ApertureSample,
@@ -75,7 +75,7 @@ class Passes:
         target = targets.sum_of(lens.keeps_layers)
         size_px = target.framebuffer.size
         for cell in cells_between_views(field.grid, lens):
-            drawn = lens.part.in_target(cell).within(rows)
+            drawn = cell.in_target(lens.part).within(rows)
             if drawn is None:
                 continue
             if "FLAT" in kinds:
@@ -359,7 +359,7 @@ def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
         "RANGE" if lens.focus_range > 0 else "",
         "HIGHLIGHTS" if lens.highlight_gain > 0 else "",
         "CAT_EYE" if lens.optics.aperture_shape.kind == "cat_eye" else "",
-        "PART" if lens.part != WHOLE_PICTURE else "",
+        "PART" if lens.part != WHOLE else "",
     )
     return tuple(str(name) for name in (*names, *by_lens) if name)
 

@@ -5,18 +5,43 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from iibr_core.exports import WHOLE, PictureCell
+from iibr_core.scenes import Rect
 from iibr_core.types import GridShape
 from viewer.gpu.refocus.lens import Lens
+
+
+class PictureCell(NamedTuple):
+    """A part of the picture in texture coordinates."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def within(self, rows: PictureCell) -> PictureCell | None:
+        """What of it lies in these rows, None if nothing."""
+        top, bottom = max(self.top, rows.top), min(self.bottom, rows.bottom)
+        return PictureCell(self.left, top, self.right, bottom) if top < bottom else None
+
+    def in_target(self, part: Rect) -> PictureCell:
+        """The same in texture coordinates of targets that hold this part of the picture, as far as they do."""
+        x = ((edge - part.x) / part.width for edge in (self.left, self.right))
+        y = ((edge - part.y) / part.height for edge in (self.top, self.bottom))
+        (left, right), (top, bottom) = ((min(max(edge, 0.0), 1.0) for edge in edges) for edges in (x, y))
+        return PictureCell(left, top, right, bottom)
+
+
+WHOLE_CELL = PictureCell(0.0, 0.0, 1.0, 1.0)
 
 
 def cells_between_views(grid: GridShape, lens: Lens) -> Iterator[PictureCell]:
     """Parts of the picture whose rays cross one cell of the grid each; the whole picture without dolly."""
     if not lens.has_dolly:
-        yield WHOLE
+        yield WHOLE_CELL
         return
     first, last = grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)
     across = _crossings(lens.eye.s, lens.dolly[0], first.s, last.s)

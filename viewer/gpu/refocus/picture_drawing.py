@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import TargetWindow
 from iibr_core.types import ColorSpace
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
@@ -105,7 +104,7 @@ class PictureDrawing:
         self.is_done = True
 
     def _draw_tile(self, tile: PictureTile, targets: RenderTargets, target: RenderTarget) -> Generator[None]:
-        lens = replace(self._whole.lens, part=self._whole.lens.part.window(TargetWindow(*tile.window)))
+        lens = replace(self._whole.lens, part=self._whole.lens.part.part(tile.window))
         self._under_way = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
         pixels = STEP_S / self._gl.seconds_per_fetch if self._is_in_steps else math.inf
         yield from self._accumulator.sum_up_in_steps(self._field, accumulation, targets, pixels)

@@ -15,9 +15,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import WHOLE_PICTURE, RenderSettings, TargetWindow
+from iibr_core.exports import RenderSettings
 from iibr_core.rendering import Optics
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes import WHOLE, Rect, ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
@@ -155,7 +155,7 @@ class Renderer:
         size_px: ScreenSize,
         framebuffer: moderngl.Framebuffer | None = None,
         level: QualityLevel = BEST_QUALITY,
-        part: TargetWindow = WHOLE_PICTURE,
+        part: Rect = WHOLE,
     ) -> None:
         """Draw the picture at once, stretched to size_px = (width, height), with every view the aperture sees.
 
@@ -174,7 +174,7 @@ class Renderer:
         optics: Optics,
         size_px: ScreenSize,
         budget_s: float,
-        part: TargetWindow = WHOLE_PICTURE,
+        part: Rect = WHOLE,
     ) -> None:
         """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
 
@@ -198,7 +198,7 @@ class Renderer:
             self.passes_shown = 0
         self._learn(drawn, seconds)
 
-    def renew(self, optics: Optics, size_px: ScreenSize, part: TargetWindow = WHOLE_PICTURE) -> None:
+    def renew(self, optics: Optics, size_px: ScreenSize, part: Rect = WHOLE) -> None:
         """Begin the picture that is shown again, as its views have changed: `refine` draws it.
 
         What is shown stays until the new one is made of as many passes; it has a texture of its own already. Views that
@@ -314,7 +314,7 @@ class Renderer:
         optics: Optics,
         size_px: ScreenSize,
         level: QualityLevel,
-        part: TargetWindow = WHOLE_PICTURE,
+        part: Rect = WHOLE,
         field: LightFieldTexture | None = None,
     ) -> ProgressiveAccumulation:
         field = self.drawn_field if field is None else field
@@ -335,7 +335,7 @@ class Renderer:
         self._screen.show(targets)
         self.passes_shown = self._current().pass_index
 
-    def _work(self, optics: Optics, size_px: ScreenSize, part: TargetWindow, level: QualityLevel) -> DrawCost:
+    def _work(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> DrawCost:
         field = self.drawn_field
         lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), self.prefilter, level)
         samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes import WHOLE, Rect, ScreenSize
 
 PART_PX = 2048
 """A part is no larger than this: its targets take about 70 bytes a pixel."""
@@ -22,14 +22,14 @@ class PictureTile:
     """A rectangle of a picture that is drawn, and what of it is kept.
 
     first_px, size_px: (x, y) and (width, height) of what is drawn. kept_from_px, kept_to_px: (x, y) in the picture.
-    window: (left, top, width, height) of what is drawn, in texture coordinates of the picture.
+    window: what is drawn, as a share of the picture.
     """
 
     first_px: tuple[int, int]
     size_px: ScreenSize
     kept_from_px: tuple[int, int]
     kept_to_px: tuple[int, int]
-    window: tuple[float, float, float, float]
+    window: Rect
 
     @property
     def kept(self) -> tuple[slice, slice]:
@@ -50,7 +50,7 @@ def picture_tiles(size_px: ScreenSize, largest_px: int) -> list[PictureTile]:
     """
     side = min(PART_PX, largest_px)
     if max(size_px) <= side:
-        return [PictureTile((0, 0), size_px, (0, 0), size_px, (0.0, 0.0, 1.0, 1.0))]
+        return [PictureTile((0, 0), size_px, (0, 0), size_px, WHOLE)]
     (width, height), columns, rows = size_px, _spans(size_px[0], side), _spans(size_px[1], side)
     return [
         PictureTile(
@@ -58,7 +58,7 @@ def picture_tiles(size_px: ScreenSize, largest_px: int) -> list[PictureTile]:
             ScreenSize(drawn_x, drawn_y),
             (from_x, from_y),
             (to_x, to_y),
-            (x / width, y / height, drawn_x / width, drawn_y / height),
+            Rect(x / width, y / height, drawn_x / width, drawn_y / height),
         )
         for (y, drawn_y, from_y, to_y), (x, drawn_x, from_x, to_x) in product(rows, columns)
     ]

@@ -10,8 +10,7 @@ import math
 from dataclasses import replace
 
 from iibr_core.rendering import Optics
-from iibr_core.scenes import Scene
-from viewer.model.layout import Rect
+from iibr_core.scenes import Rect, Scene
 from viewer.model.state.app_state import TiltHandles
 
 Place = tuple[float, float]

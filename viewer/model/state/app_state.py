@@ -9,9 +9,8 @@ from dataclasses import dataclass, field, replace
 
 from iibr_core.depth.editing import UNEDITED, DepthEdits, Stroke
 from iibr_core.rendering import Optics
-from iibr_core.scenes import AS_FOUND, DepthSettings, FilledField, Progress, Scene, ScreenSize, Source
+from iibr_core.scenes import AS_FOUND, WHOLE, DepthSettings, FilledField, Progress, Rect, Scene, ScreenSize, Source
 from viewer.model.free_camera import FreeCamera, Poses
-from viewer.model.layout import WHOLE, Rect
 from viewer.model.state.depth_editing import Brush
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History

@@ -7,8 +7,9 @@ from pathlib import PurePath
 
 from imgui_bundle import imgui
 
+from iibr_core.scenes import Rect
 from viewer.model.actions import Action
-from viewer.model.layout import Layout, Rect
+from viewer.model.layout import Layout
 from viewer.model.reducers.folder import filmstrip_range, place_of_photo
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ScrollFilmstrip, StepPhoto, Thumbnail

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from iibr_core.scenes import Scene
+from iibr_core.scenes import Rect, Scene
 from iibr_core.types import ViewOffset
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.inspection_request import (
@@ -15,7 +15,7 @@ from viewer.model.inspection_request import (
     view_label,
     view_near,
 )
-from viewer.model.layout import Layout, Rect
+from viewer.model.layout import Layout
 from viewer.model.lens.photographic_units import metres, metres_text
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Comparison, Probe

@@ -8,8 +8,8 @@ from imgui_bundle import imgui
 
 from iibr_core.depth.editing import DEPTH_TOOLS, BrushTool
 from iibr_core.rendering import Optics
-from iibr_core.scenes import Scene, aperture_limit
-from viewer.model.layout import Layout, Rect
+from iibr_core.scenes import Rect, Scene, aperture_limit
+from viewer.model.layout import Layout
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
 from viewer.model.state.app_state import AppState, Hover, TiltHandles

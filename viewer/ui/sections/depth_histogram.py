@@ -7,10 +7,10 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing import DepthEdits, Levels, invert_tone_curve, tone_curve
-from iibr_core.scenes import Scene
+from iibr_core.scenes import Rect, Scene
 from viewer.model.actions import Action
 from viewer.model.colormap import map_color
-from viewer.model.layout import Layout, Rect
+from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import SetTone
 from viewer.ui.style import corners, pack_color, palette_of

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from iibr_core.scenes import Scene, eye_limits
+from iibr_core.scenes import Rect, Scene, eye_limits
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action
-from viewer.model.layout import Layout, Rect
+from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics import MoveEye
 from viewer.ui.style import Palette, corners, pack_color, palette_of
