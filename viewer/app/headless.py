@@ -219,7 +219,7 @@ class HeadlessViewer:
         )
         prepare_gloss(self._scene_view, self.state.optics.gloss)
         has_picture = layout.frame_px and self._scene_view.converge(self.state, layout.frame_px.size, layout.part)
-        texture = self._scene_view.texture if has_picture else None
+        texture = self._scene_view.renderer.image_texture if has_picture else None
         textures = self._draw_inspection(layout) if has_picture else NO_INSPECTION_TEXTURES
         target = self._gl.ctx.simple_framebuffer(size, 4)
         ui = UiHost(look)

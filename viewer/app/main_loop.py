@@ -151,7 +151,7 @@ class App:
         actions += gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
-        texture = sharp or (self.scene_view.texture if picture else None)
+        texture = sharp or (self.scene_view.renderer.image_texture if picture else None)
         actions += build_screen(self.state, layout, texture, textures, thumbnails)
         actions += self._input(pointer, layout)
         self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))

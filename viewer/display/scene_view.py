@@ -52,7 +52,8 @@ class SceneView:
     """Holds the renderer and the views of the scene that is shown.
 
     generation: whose views these are. previews: of edited depth, gloss, free cameras, shown so far. views_uploaded: so
-    far, those that came twice counted twice. pictures_drawn: how often the picture was drawn.
+    far, those that came twice counted twice. pictures_drawn: how often the picture was drawn. picture_drawn: the record
+    of the last, None before the first. centre: the centre view as it came, None before anything is open.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -64,22 +65,17 @@ class SceneView:
         self.pictures_drawn = 0
         self.previews = 0
         self._scene: Scene | None = None
-        self._centre: ViewUpdate | None = None
+        self.centre: ViewUpdate | None = None
         self._stand_in: ViewUpdate | None = None
         self._gloss: GlossFound | None = None
         self._is_preview = self._is_edited = False
         self._waiting: deque[ViewUpdate] = deque()
         self._is_final: dict[tuple[int, int], bool] = {}
         self._disparities: dict[ViewOffset, FloatImage] = {}
-        self._drawn: Picture | None = None
+        self.picture_drawn: Picture | None = None
         self._drawn_at = 0.0
         self._unprepared = list(USUAL_NEXT)
         self._view_came_at = 0.0
-
-    @property
-    def centre(self) -> ViewUpdate | None:
-        """The centre view as it came, None before anything is open."""
-        return self._centre
 
     def open(self, ready: SceneReady) -> None:
         """Show this scene from now on. Raises InputError where it does not fit the graphics card; the old one stays.
@@ -95,7 +91,7 @@ class SceneView:
             self._gloss = known
             raise
         self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
-        self.generation, self.loaded, self._scene, self._centre = ready.generation, ready.loaded, scene, ready.centre
+        self.generation, self.loaded, self._scene, self.centre = ready.generation, ready.loaded, scene, ready.centre
         self._is_preview, self._is_edited = True, False
         self.views_uploaded, self._is_final = 1, {scene.grid.centre: ready.centre.is_final}
         self._waiting.clear()
@@ -107,7 +103,7 @@ class SceneView:
 
         Raises InputError where the graphics card has no room.
         """
-        scene, centre, field = self._scene, self._centre, self.renderer.field
+        scene, centre, field = self._scene, self.centre, self.renderer.field
         assert scene is not None
         assert centre is not None
         assert field is not None
@@ -134,17 +130,17 @@ class SceneView:
 
     def gloss_request(self, gloss: Gloss | None) -> GlossRequest | None:
         """What is to be found out before this gloss can be shown on the scene; None where nothing is."""
-        if gloss is None or self._scene is None or self._centre is None:
+        if gloss is None or self._scene is None or self.centre is None:
             return None
         known = self._gloss
-        if known is not None and known.request.is_for(gloss, self._centre):
+        if known is not None and known.request.is_for(gloss, self.centre):
             return None
         normals = known.maps.normals if known is not None and known.maps is not None else None
-        return GlossRequest(gloss, self._scene, self._centre, normals)
+        return GlossRequest(gloss, self._scene, self.centre, normals)
 
     def take_gloss(self, found: GlossFound) -> None:
         """Show gloss with these maps from now on, unless they are of another scene."""
-        if found.request.centre is self._centre:
+        if found.request.centre is self.centre:
             self._gloss = found
             self.renderer.set_gloss(found.maps)
             self.previews += 1
@@ -156,9 +152,9 @@ class SceneView:
         if (view.row, view.column) == scene.grid.centre:
             self._is_final[scene.grid.centre] = view.is_final
             return  # there since the scene was opened
-        if self._is_preview and self._centre is not None:
+        if self._is_preview and self.centre is not None:
             self._open_field(scene, scene.grid)
-            self.renderer.upload_view(*scene.grid.centre, self._centre.colors, self._centre.disparity)
+            self.renderer.upload_view(*scene.grid.centre, self.centre.colors, self.centre.disparity)
             self._is_preview = False
         self._waiting.append(view)
         self._view_came_at = time.perf_counter()
@@ -168,21 +164,6 @@ class SceneView:
     def has_room(self) -> bool:
         """Whether more views may come; else they wait at the worker, who then pauses."""
         return len(self._waiting) < WAITING_VIEWS
-
-    @property
-    def views_present(self) -> int:
-        """How many different views were uploaded so far."""
-        return len(self._is_final)
-
-    @property
-    def picture_drawn(self) -> Picture | None:
-        """The record of the picture drawn last, None before the first."""
-        return self._drawn
-
-    @property
-    def texture(self) -> int:
-        """GL name of the texture that holds the picture, rows bottom-up."""
-        return self.renderer.image_texture
 
     def upload(self, budget_s: float) -> bool:
         """Upload waiting views until the time is spent, at least one. True where some still wait.
@@ -223,7 +204,7 @@ class SceneView:
             self.generation, self.views_uploaded, state.shown_optics, size_px, previews=self.previews, part=part
         )
         budget_s = self._gl.frame_budget_s
-        if self._drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
+        if self.picture_drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)
             if is_still and self.renderer.passes_shown:  # it is seen on, and must not become softer
                 self.renderer.renew(wanted.optics, wanted.size_px, part)
@@ -232,19 +213,19 @@ class SceneView:
                 self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, part)
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
-            self._drawn = replace(wanted, samples=self.report.samples)
+            self.picture_drawn = replace(wanted, samples=self.report.samples)
         elif self.renderer.is_renewing or (self._is_same(wanted) and self._refines()):
             self.renderer.refine(budget_s)
-            self._drawn = replace(self._drawn, samples=self._drawn.samples + 1)
+            self.picture_drawn = replace(self.picture_drawn, samples=self.picture_drawn.samples + 1)
         if self._unprepared and self._is_same(wanted) and self._drawn_at < time.perf_counter() - PREPARED_AFTER_S:
             self.renderer.prepare(self._unprepared.pop())
-        return self._drawn
+        return self.picture_drawn
 
     def converge(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
         """Like `draw`, with every sample the picture will ever get, however long that takes."""
         if self.draw(state, size_px, part) is not None:
             self.renderer.refine()
-        return self._drawn
+        return self.picture_drawn
 
     def picture(self, settings: RenderSettings) -> NDArray[Any]:
         """The converged picture of any size. Before the first view it is black. The window's own picture stays."""
@@ -264,10 +245,10 @@ class SceneView:
 
     def snapshot(self) -> SceneSnapshot | None:
         """What is shown now, to be released; None before anything is open."""
-        if self._scene is None or self._centre is None:
+        if self._scene is None or self.centre is None:
             return None
         is_free, field = self._stand_in is not None, self.renderer.drawn_field.share()
-        return SceneSnapshot(self._scene, self.loaded, self._centre, field, self._gloss, is_free)
+        return SceneSnapshot(self._scene, self.loaded, self.centre, field, self._gloss, is_free)
 
     def snapshot_of(self, ready: SceneReady) -> SceneSnapshot:
         """A scene that is not shown, with its centre view; the others are to be stored in its field.
@@ -292,18 +273,13 @@ class SceneView:
         return field is not None and field.colors is snapshot.field.colors
 
     @property
-    def note(self) -> str:
-        """What of the scene the graphics card has no room for, a sentence for people; empty where it holds all."""
-        return self.renderer.note
-
-    @property
     def report(self) -> DrawReport:
         """What is known of the picture drawn last."""
         return self.renderer.report
 
     def shows_all_views(self) -> bool:
         """Whether the picture last drawn knows every view uploaded."""
-        return self._drawn is None or self._drawn.views_uploaded == self.views_uploaded
+        return self.picture_drawn is None or self.picture_drawn.views_uploaded == self.views_uploaded
 
     def _open_field(self, scene: Scene, grid: GridShape) -> None:
         self.renderer.open_field(
@@ -322,13 +298,13 @@ class SceneView:
         return is_new and self._differs_by_views_only(wanted)
 
     def _differs_by_views_only(self, wanted: Picture) -> bool:
-        if self._drawn is None:
-            return False
-        return replace(wanted, views_uploaded=self._drawn.views_uploaded, samples=self._drawn.samples) == self._drawn
+        drawn = self.picture_drawn
+        return drawn is not None and self._is_same(replace(wanted, views_uploaded=drawn.views_uploaded))
 
     def _is_same(self, wanted: Picture) -> bool:
         """Whether the picture drawn last is this one, however far it has come."""
-        return self._drawn is not None and replace(wanted, samples=self._drawn.samples) == self._drawn
+        drawn = self.picture_drawn
+        return drawn is not None and replace(wanted, samples=drawn.samples) == drawn
 
     def _refines(self) -> bool:
         """Whether there is more to draw, and time for it: while views are being made, the processor has none."""

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -83,7 +81,7 @@ def create_osmesa() -> GLContext:
 def _open_null_window() -> Any | None:
     """An OSMesa window of GLFW's null platform (of the running platform, where GLFW is in use); None where it fails."""
     global _null_windows
-    with _quiet_glfw():
+    with warnings.catch_warnings(action="ignore"):  # GLFW reports failures as warnings; here one is an answer
         glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_NULL)
         ready = glfw.init()
         glfw.init_hint(glfw.PLATFORM, glfw.ANY_PLATFORM)
@@ -112,11 +110,3 @@ def _close_null_window(window: Any | None) -> None:
     _null_windows -= 1
     if _null_windows == 0 and glfw.get_platform() == glfw.PLATFORM_NULL:
         glfw.terminate()
-
-
-@contextmanager
-def _quiet_glfw() -> Iterator[None]:
-    """GLFW reports failures as warnings; here a failure is an answer."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield

@@ -16,6 +16,7 @@ from iibr_core.scenes import WHOLE, Rect, ScreenSize
 from iibr_core.types import SRGB, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
+from viewer.gpu.render_targets import RenderTarget, unbind
 from viewer.model.layout import PixelRect
 
 MAX_VIEWS = 128
@@ -56,7 +57,7 @@ class InspectionPasses:
     def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
         self._ctx = ctx
         self._programs = programs
-        self._images: dict[str, tuple[moderngl.Texture, moderngl.Framebuffer]] = {}
+        self._images: dict[str, RenderTarget] = {}
         self._textures: dict[str, moderngl.Texture] = {}
 
     def release(self) -> None:
@@ -97,8 +98,8 @@ class InspectionPasses:
         return texture
 
     def draw_on_sheet(self, field: LightFieldTexture, row: int, column: int, cell: PixelRect, exposure: float) -> None:
-        """Draw one view, or that it is not there, into its cell of the sheet."""
-        _, framebuffer = self._images["sheet"]
+        """Draw one view, or that it is not there, into its cell of the sheet; y counts from the top."""
+        framebuffer = self._images["sheet"].framebuffer
         framebuffer.use()
         framebuffer.viewport = cell
         self._draw_stored(field, _layer(field, row, column), cell.size, exposure)
@@ -125,11 +126,11 @@ class InspectionPasses:
         if layer < 0:
             return None
         texture = self._ctx.texture((field.width, field.height), 3, dtype="f2" if field.hdr else "f1")
-        framebuffer = self._ctx.framebuffer([texture])
-        framebuffer.use()
+        target = RenderTarget(self._ctx, [texture])
+        target.use()
         self._draw_stored(field, layer, ScreenSize(*texture.size), 1.0, as_stored=True)
         read = texture.read(alignment=1)
-        self._release(texture, framebuffer)
+        self._release(target)
         root = np.frombuffer(read, np.float16) if field.hdr else np.frombuffer(read, np.uint8)
         encoded = _encoded_from_root(root).reshape(field.height, field.width, 3)
         if field.color_space == SRGB:
@@ -193,7 +194,7 @@ class InspectionPasses:
         )
         self._use_image("seen_in", ScreenSize(columns, rows))
         quad.render(moderngl.TRIANGLES, vertices=3)
-        read = self._images["seen_in"][1].read(components=1, alignment=1)
+        read = self._images["seen_in"].framebuffer.read(components=1, alignment=1)
         return np.frombuffer(read, np.uint8).reshape(rows, columns) > 0
 
     def show(self, name: str, pixels: NDArray[np.uint8]) -> int:
@@ -202,8 +203,8 @@ class InspectionPasses:
 
     def read(self, name: str) -> NDArray[np.uint8]:
         """An image drawn here (H, W, 4)."""
-        texture, framebuffer = self._images[name]
-        width, height = texture.size
+        framebuffer = self._images[name].framebuffer
+        width, height = framebuffer.size
         return np.frombuffer(framebuffer.read(components=4, alignment=1), np.uint8).reshape(height, width, 4)
 
     def _draw_stored(
@@ -227,14 +228,13 @@ class InspectionPasses:
 
     def _use_image(self, name: str, size_px: ScreenSize) -> int:
         """Draw into this image from now on; a new size makes it anew."""
-        if name not in self._images or self._images[name][0].size != size_px:
+        if name not in self._images or self._images[name].framebuffer.size != size_px:
             self._drop(name)
-            texture = self._ctx.texture(size_px, 4)
-            self._images[name] = texture, self._ctx.framebuffer([texture])
-        texture, framebuffer = self._images[name]
-        framebuffer.use()
+            self._images[name] = RenderTarget(self._ctx, [self._ctx.texture(size_px, 4)])
+        target = self._images[name]
+        target.use()
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
-        return texture.glo
+        return target.textures[0].glo
 
     def _texture(self, name: str, pixels: NDArray[np.uint8] | NDArray[np.float32]) -> moderngl.Texture:
         """A texture with these (H, W, C) pixels."""
@@ -252,12 +252,11 @@ class InspectionPasses:
 
     def _drop(self, name: str) -> None:
         if name in self._images:
-            self._release(*self._images.pop(name))
+            self._release(self._images.pop(name))
 
-    def _release(self, texture: moderngl.Texture, framebuffer: moderngl.Framebuffer) -> None:
-        self._ctx.detect_framebuffer(0).use()  # moderngl binds what was last used again, and that must still exist
-        framebuffer.release()
-        texture.release()
+    def _release(self, target: RenderTarget) -> None:
+        unbind(self._ctx)
+        target.release()
 
 
 def _layer(field: LightFieldTexture, row: int, column: int) -> int:

@@ -15,36 +15,30 @@ from iibr_core.scenes import ScreenSize
 
 
 class RenderTarget:
-    """Textures of one size that a pass draws into together."""
+    """Textures of one size that a pass draws into together.
+
+    holds_sum: whether what comes next is to be added to what is here; to replace it costs less than to clear it.
+    """
 
     def __init__(self, ctx: moderngl.Context, textures: list[moderngl.Texture]) -> None:
         self.textures = textures
         self.framebuffer = ctx.framebuffer(textures)
         self._ctx = ctx
-        self._holds_sum = False
+        self.holds_sum = False
 
     def use(self) -> None:
         """Draw here from now on."""
         self.framebuffer.use()
 
-    @property
-    def holds_sum(self) -> bool:
-        """Whether the next `add` keeps what is here."""
-        return self._holds_sum
-
-    def start_sum(self) -> None:
-        """The next `add` replaces what is here: blending and clearing cost time."""
-        self._holds_sum = False
-
-    def add(self, keeps: bool | None = None) -> None:
-        """Add what is drawn from now on to what is here. keeps: False replaces it, None as `holds_sum` says."""
+    def add(self, keeps: bool) -> None:
+        """Add what is drawn from now on to what is here, or, unless it keeps that, put it in its place."""
         self.framebuffer.use()
-        if self._holds_sum if keeps is None else keeps:
+        if keeps:
             self._ctx.enable(moderngl.BLEND)
             self._ctx.blend_func = moderngl.ONE, moderngl.ONE
         else:
             self._ctx.disable(moderngl.BLEND)
-        self._holds_sum = True
+        self.holds_sum = True
 
     def read(self, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
         """What was drawn, (H, W, 3), bytes or floats, row 0 at the top."""

@@ -74,7 +74,7 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
     viewer.until(lambda app: app.state.stroke is None and is_made(app))
     viewer.until_idle()
     assert viewer.app.state.generation == 2
-    assert viewer.app.scene_view.views_present == 9
+    assert viewer.app.scene_view.renderer.field.present.sum() == 9
     made = disparity_of(viewer.app)
     assert made.max() == pytest.approx(NEAR + (NEAR - FAR), abs=0.2)
     far = given == FAR

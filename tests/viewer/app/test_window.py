@@ -44,7 +44,7 @@ def shown_focus(viewer: Driver, given: float) -> float:
 def test_the_first_picture_comes_before_the_views(open_window: Opener, photo_path: Path) -> None:
     driver = open_window(photo_path)
     driver.until(lambda app: app.scene_view.pictures_drawn > 0)
-    assert driver.app.scene_view.views_present <= WAITING_VIEWS
+    assert driver.app.scene_view.renderer.field.present.sum() <= WAITING_VIEWS
     assert driver.image().std() > 10
 
 
@@ -285,11 +285,11 @@ def test_edges_are_sharpened_nearest_first_to_where_the_user_looks_then(open_win
 def test_a_drafted_picture_is_not_called_final_and_changes_when_it_is(open_window: Opener, photo_path: Path) -> None:
     driver = open_window(photo_path, grid=GridShape(9, 9))
     driver.app.do(MoveEye(ViewOffset(2.5, -3.0)))
-    driver.until(lambda app: len(app.state.views_there) == 81 and app.scene_view.views_present == 81)
+    driver.until(lambda app: len(app.state.views_there) == 81 and app.scene_view.renderer.field.present.sum() == 81)
     uploaded = driver.app.scene_view.views_uploaded
     driver.until_idle()
     assert driver.app.scene_view.views_uploaded > uploaded
     assert driver.app.scene_view.shows_all_views()
     assert driver.app.scene_view.picture_drawn is not None
     assert driver.app.scene_view.picture_drawn.views_uploaded == driver.app.scene_view.views_uploaded
-    assert driver.app.scene_view.views_present == 81
+    assert driver.app.scene_view.renderer.field.present.sum() == 81

@@ -250,9 +250,9 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
     driver.until(lambda app: app.state.progress.done > 3)
     driver.app.do(StopWork())
     driver.until(lambda app: rests(app))
-    made = driver.app.scene_view.views_present
+    made = driver.app.scene_view.renderer.field.present.sum()
     assert 3 < made < 41 * 41
-    assert driver.app.scene_view.views_present == made == len(driver.app.state.views_there)
+    assert driver.app.scene_view.renderer.field.present.sum() == made == len(driver.app.state.views_there)
     assert "stopped at" in driver.app.state.progress.doing
     driver.press("Resume")
     driver.until(lambda app: app.scene_view.generation == 2)

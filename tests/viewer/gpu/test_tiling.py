@@ -33,17 +33,18 @@ def test_every_pixel_is_kept_once_and_no_part_is_too_large(width: int, height: i
         kept[part.kept] += 1
         assert kept[part.kept].shape == (rows.stop - rows.start, columns.stop - columns.start)
         left, top, across, down = part.window
-        assert (left * width, top * height) == pytest.approx(part.first_px)
+        first_px = part.kept[1].start - columns.start, part.kept[0].start - rows.start
+        assert (left * width, top * height) == pytest.approx(first_px)
         assert (across * width, down * height) == pytest.approx(part.size_px)
     assert (kept == 1).all()
 
 
 def test_parts_overlap_as_far_as_light_is_spread() -> None:
     for part in picture_tiles((6000, 3000), 16384):
-        for axis, length in ((0, 6000), (1, 3000)):
-            first, last = part.first_px[axis], part.first_px[axis] + part.size_px[axis]
-            assert part.kept_from_px[axis] - first == (0 if first == 0 else MARGIN_PX)
-            assert last - part.kept_to_px[axis] >= MARGIN_PX or last >= length
+        for axis, length in ((0, 3000), (1, 6000)):
+            kept, of_drawn, size = part.kept[axis], part.kept_of_drawn[axis], part.size_px[1 - axis]
+            assert of_drawn.start == (0 if kept.start == 0 else MARGIN_PX)
+            assert size - of_drawn.stop >= MARGIN_PX or kept.start - of_drawn.start + size >= length
 
 
 OPTICS = [

@@ -133,7 +133,8 @@ class Accumulator:
         end = time.perf_counter() + budget_s
         at_once = int(min(max(budget_s / max(seconds_per_sample, 1e-9), 1), MAX_SAMPLES))
         while accumulation.pass_index < passes:
-            self._draw_some(field, accumulation, targets, at_once)
+            for _ in self._batch_steps(field, accumulation, targets, at_once, math.inf):
+                pass
             if budget_s < math.inf:
                 self._ctx.finish()  # a driver that queues its work tells no time before that
             if time.perf_counter() >= end:
@@ -174,13 +175,6 @@ class Accumulator:
             self.passes.smooth(lens, targets, narrowing)
         framebuffer.use()
         self.passes.present(lens, targets, narrowing, is_linear, color_space)
-
-    def _draw_some(
-        self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets, count: int
-    ) -> None:
-        """Draw the next samples at once."""
-        for _ in self._batch_steps(field, accumulation, targets, count, math.inf):
-            pass
 
     def _batch_steps(
         self,
@@ -231,7 +225,7 @@ class Accumulator:
             )
         if accumulation.pass_index > 0:
             return
-        targets.sum_of(lens.keeps_layers).start_sum()
+        targets.sum_of(lens.keeps_layers).holds_sum = False
         if lens.has_dolly:
             self.passes.update_fallback_views(field)
         if lens.keeps_layers:

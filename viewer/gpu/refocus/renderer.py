@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -153,20 +152,17 @@ class Renderer:
         self,
         optics: Optics,
         size_px: ScreenSize,
-        framebuffer: moderngl.Framebuffer | None = None,
         level: QualityLevel = BEST_QUALITY,
         part: Rect = WHOLE,
     ) -> None:
-        """Draw the picture at once, stretched to size_px = (width, height), with every view the aperture sees.
+        """Draw the picture (`image_texture`, `read_image`) at once, with every view the aperture sees.
 
-        framebuffer: drawn into its current viewport, which should have that size; None draws into the renderer's own
-        image (`image_texture`, `read_image`). level: what to leave out, except for its scale. part: what of the picture
-        is drawn, stretched to size_px. Before the first view the
-        picture is black. The framebuffer stays bound.
+        level: what to leave out, except for its scale. part: what of the picture is drawn, stretched to size_px =
+        (width, height). Before the first view the picture is black. Its framebuffer stays bound.
         """
         self._accumulation, self._shown_from_pass = self._accumulation_of(optics, size_px, level, part), 0
         self._draw(math.inf, passes=1)
-        self._finish(framebuffer)
+        self._finish()
         self._errors.begin(level)
 
     def render_in_time(
@@ -219,7 +215,7 @@ class Renderer:
         pass_before, done_before, programs_before = accumulation.pass_index, accumulation.done, len(self.programs)
         self._draw(budget_s, passes=len(accumulation.places))
         if accumulation.pass_index > pass_before and not self.is_renewing:
-            self._finish(None)
+            self._finish()
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs_before:
@@ -329,9 +325,9 @@ class Renderer:
         targets = self._screen.targets_of(accumulation.size_px)
         self._accumulator.sum_up(self.drawn_field, accumulation, targets, passes, budget_s, sample_s)
 
-    def _finish(self, framebuffer: moderngl.Framebuffer | None) -> None:
+    def _finish(self) -> None:
         targets = self._screen.targets_of(self._current().size_px)
-        self._accumulator.finish(self._current(), targets, framebuffer or targets.image.framebuffer, is_linear=False)
+        self._accumulator.finish(self._current(), targets, targets.image.framebuffer, is_linear=False)
         self._screen.show(targets)
         self.passes_shown = self._current().pass_index
 

@@ -21,26 +21,14 @@ ALIGNED_PX = 16
 class PictureTile:
     """A rectangle of a picture that is drawn, and what of it is kept.
 
-    first_px, size_px: (x, y) and (width, height) of what is drawn. kept_from_px, kept_to_px: (x, y) in the picture.
-    window: what is drawn, as a share of the picture.
+    size_px: (width, height) of what is drawn. window: where that is, as a share of the picture. kept, kept_of_drawn:
+    rows and columns in the picture, and in what is drawn.
     """
 
-    first_px: tuple[int, int]
     size_px: ScreenSize
-    kept_from_px: tuple[int, int]
-    kept_to_px: tuple[int, int]
     window: Rect
-
-    @property
-    def kept(self) -> tuple[slice, slice]:
-        """Rows and columns in the picture."""
-        return slice(self.kept_from_px[1], self.kept_to_px[1]), slice(self.kept_from_px[0], self.kept_to_px[0])
-
-    @property
-    def kept_of_drawn(self) -> tuple[slice, slice]:
-        """Rows and columns in what is drawn."""
-        (x, y), (left, top), (right, bottom) = self.first_px, self.kept_from_px, self.kept_to_px
-        return slice(top - y, bottom - y), slice(left - x, right - x)
+    kept: tuple[slice, slice]
+    kept_of_drawn: tuple[slice, slice]
 
 
 def picture_tiles(size_px: ScreenSize, largest_px: int) -> list[PictureTile]:
@@ -50,22 +38,22 @@ def picture_tiles(size_px: ScreenSize, largest_px: int) -> list[PictureTile]:
     """
     side = min(PART_PX, largest_px)
     if max(size_px) <= side:
-        return [PictureTile((0, 0), size_px, (0, 0), size_px, WHOLE)]
+        whole = slice(0, size_px[1]), slice(0, size_px[0])
+        return [PictureTile(size_px, WHOLE, whole, whole)]
     (width, height), columns, rows = size_px, _spans(size_px[0], side), _spans(size_px[1], side)
     return [
         PictureTile(
-            (x, y),
-            ScreenSize(drawn_x, drawn_y),
-            (from_x, from_y),
-            (to_x, to_y),
-            Rect(x / width, y / height, drawn_x / width, drawn_y / height),
+            ScreenSize(across, down),
+            Rect(x / width, y / height, across / width, down / height),
+            (kept_rows, kept_columns),
+            (_moved(kept_rows, -y), _moved(kept_columns, -x)),
         )
-        for (y, drawn_y, from_y, to_y), (x, drawn_x, from_x, to_x) in product(rows, columns)
+        for (y, down, kept_rows), (x, across, kept_columns) in product(rows, columns)
     ]
 
 
-def _spans(length: int, side: int) -> list[tuple[int, int, int, int]]:
-    """Along one axis: where what is drawn begins, how long it is, and where what is kept begins and ends."""
+def _spans(length: int, side: int) -> list[tuple[int, int, slice]]:
+    """Along one axis: where what is drawn begins, how long it is, and what is kept."""
     side -= side % ALIGNED_PX
     margin = min(MARGIN_PX, side // 4 // ALIGNED_PX * ALIGNED_PX)
     spans = []
@@ -73,5 +61,9 @@ def _spans(length: int, side: int) -> list[tuple[int, int, int, int]]:
         kept_to = min(kept_from + side - 2 * margin, length)
         first = max(kept_from - margin, 0)
         drawn = min(-(-(kept_to + margin - first) // ALIGNED_PX) * ALIGNED_PX, length - first)
-        spans.append((first, drawn, kept_from, kept_to))
+        spans.append((first, drawn, slice(kept_from, kept_to)))
     return spans
+
+
+def _moved(span: slice, steps: int) -> slice:
+    return slice(span.start + steps, span.stop + steps)
