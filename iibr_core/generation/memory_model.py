@@ -182,18 +182,13 @@ def pixels_within(budget: Budget, grid: GridShape | None, keeps_views: bool = Tr
     """
     views = min(math.prod(grid or USUAL_GRID), math.prod(USUAL_GRID))
     each = PHOTO_BYTES + (views * STORED_BYTES if keeps_views else 0)
+    room = (budget.bytes - process_bytes(keeps_views)) / HEADROOM
     if views == 1:
-        return max(int(_room(budget, keeps_views) / max(each, READING_BYTES)), LEAST_PIXELS)
+        return max(int(room / max(each, READING_BYTES)), LEAST_PIXELS)
     # Of photos larger than a band, all but the bands' share grows with their pixels.
     least, more = (making_bytes(Making.usual(count * MOST_BAND_PIXELS)) for count in (1, 2))
     growing = (more - least) / MOST_BAND_PIXELS
-    room = _room(budget, keeps_views) - (2 * least - more)
-    return max(int(room / (each + growing)), LEAST_PIXELS)
-
-
-def _room(budget: Budget, keeps_views: bool) -> float:
-    """For arrays."""
-    return (budget.bytes - process_bytes(keeps_views)) / HEADROOM
+    return max(int((room - (2 * least - more)) / (each + growing)), LEAST_PIXELS)
 
 
 def largest_side(budget: Budget, needed_beside: int, each_view: int) -> int:
