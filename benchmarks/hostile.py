@@ -233,16 +233,9 @@ def cases() -> Iterator[Case]:
 
 def _poses() -> Iterator[Case]:
     """Frames that are no cameras."""
-    endless = [[1e999] * 4] * 4
     good = {"transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], "w": 32, "h": 24, "fl_x": 50}
-    bad: dict[str, object] = {
-        "transform_matrix": endless,
-        "w": -1,
-        "h": 1e300,
-        "fl_x": 0,
-        "cx": "x",
-        "cy": [],
-    }
+    endless = [[1e999] * 4] * 4
+    bad: dict[str, object] = {"transform_matrix": endless, "w": -1, "h": 1e300, "fl_x": 0, "cx": "x", "cy": []}
     for name, value in (*bad.items(), *((name, None) for name in bad), *((name, {"a": 1}) for name in bad)):
         text = json.dumps({"frames": [{**good, name: value}]}).encode()
         words = ("generate", "photo.png", "--disparity", "map.pfm", "--out", "new", "--poses", "in.json")
