@@ -134,8 +134,9 @@ def shade(
         around = NO_ENVIRONMENT if environment is None else environment
         in_bands(
             lambda first, last: _add_lobes(
-                colors, disparity, near, maps.disparity, maps.normals, maps.mask, t, s, maps.geometry.focal_px,
-                light, width2, disc, gloss.reflectance, environment is not None, around, first, last,
+                colors, disparity, near, maps.disparity, maps.normals, maps.mask[..., None], t, s,
+                maps.geometry.focal_px, light, width2, disc, gloss.reflectance, environment is not None, around,
+                first, last,
             ),
             size, should_stop,
         )  # fmt: skip
@@ -176,23 +177,10 @@ def _add_lobes(
             ):
                 continue
             v, u = min(max(v, 0.0), height - 1.0), min(max(u, 0.0), width - 1.0)
-            top, left = int(v), int(u)
-            below, right = min(top + 1, height - 1), min(left + 1, width - 1)
-            a, b = v - top, u - left
-            marked = (1 - a) * ((1 - b) * mask[top, left] + b * mask[top, right]) + a * (
-                (1 - b) * mask[below, left] + b * mask[below, right]
-            )
+            marked = _bilinear(mask, v, u, 0)
             if not marked > 0:
                 continue
-            nx = (1 - a) * ((1 - b) * normals[top, left, 0] + b * normals[top, right, 0]) + a * (
-                (1 - b) * normals[below, left, 0] + b * normals[below, right, 0]
-            )
-            ny = (1 - a) * ((1 - b) * normals[top, left, 1] + b * normals[top, right, 1]) + a * (
-                (1 - b) * normals[below, left, 1] + b * normals[below, right, 1]
-            )
-            nz = (1 - a) * ((1 - b) * normals[top, left, 2] + b * normals[top, right, 2]) + a * (
-                (1 - b) * normals[below, left, 2] + b * normals[below, right, 2]
-            )
+            nx, ny, nz = _bilinear(normals, v, u, 0), _bilinear(normals, v, u, 1), _bilinear(normals, v, u, 2)
             length = max(sqrt(nx * nx + ny * ny + nz * nz), 1e-12)
             nx, ny, nz = nx / length, ny / length, nz / length
             # from the point to the eye, in view steps
