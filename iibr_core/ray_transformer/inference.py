@@ -61,6 +61,25 @@ def _add_product(inputs, w, outputs, lanes):
 
 
 @kernel
+def _add_prior(score, share, start, weights):
+    """Weights (R, K) of rays whose hypotheses have these scores and shares, those of ray r in [start[r], start[r + 1]).
+
+    The closed form as prior: its weights are added as logarithms. Softmax, less the highest score against overflow.
+    """
+    for r in range(len(weights)):
+        highest, total = np.float32(-np.inf), np.float32(0.0)
+        for lane in range(start[r], start[r + 1]):
+            prior = min(max(share[lane], np.float32(0.0)), np.float32(1.0)) + np.float32(LEAST_PRIOR)
+            score[lane] += np.float32(np.log(prior))
+            highest = max(highest, score[lane])
+        for lane in range(start[r], start[r + 1]):
+            weights[r, lane - start[r]] = np.exp(score[lane] - highest)
+            total += weights[r, lane - start[r]]
+        for a in range(start[r + 1] - start[r]):
+            weights[r, a] /= total
+
+
+@kernel
 def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weights):
     """Arrays are (unit, lane). The hypotheses of a block's rays lie one after the other in lanes [start, end)."""
     rays, most = mask.shape
@@ -111,17 +130,4 @@ def _weigh(features, mask, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weigh
         for j in range(WIDTH):
             for lane in range(lanes):
                 score[lane] += max(hidden[j, lane], zero) * w_score[j, 0]
-        # The closed form as prior: its weights are added as logarithms. Softmax, less the highest score against
-        # overflow.
-        for r in range(count):
-            highest, total = np.float32(-np.inf), zero
-            for lane in range(start[r], start[r + 1]):
-                score[lane] += np.float32(
-                    np.log(min(max(inputs[SHARE, lane], zero), np.float32(1.0)) + np.float32(LEAST_PRIOR))
-                )
-                highest = max(highest, score[lane])
-            for lane in range(start[r], start[r + 1]):
-                weights[first + r, lane - start[r]] = np.exp(score[lane] - highest)
-                total += weights[first + r, lane - start[r]]
-            for a in range(start[r + 1] - start[r]):
-                weights[first + r, a] /= total
+        _add_prior(score, inputs[SHARE], start[: count + 1], weights[first : first + count])
