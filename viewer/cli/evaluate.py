@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -15,14 +16,77 @@ from iibr_core.formats import is_file
 from iibr_core.runtime import require_extra
 from iibr_core.stages import STAGE_NAMES, stages_without
 from iibr_core.types import InputError, Quality, ReportProgress
+from viewer.cli.option_records import with_option_records
 from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, inputs_of_command, quality_from_text, require_model
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
-    from iibr_core.evaluation import DisparityFrom
+    from iibr_core.evaluation import DisparityFrom, Options
     from iibr_core.stages import Stages
 
 
+@dataclass(frozen=True)
+class _Judging:
+    """How views are judged, as typed."""
+
+    disparity: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|gt|estimate|FILE",
+            help="Of the given view: the data set's (gt), estimated from the photo, a file (px per view step; LLFF: per"
+            " mean distance of neighbours); auto: gt if there is one.",
+        ),
+    ] = "auto"
+    quality: Annotated[
+        list[Any] | None,
+        typer.Option(
+            "--quality",
+            parser=quality_from_text,
+            metavar="|".join(get_args(Quality)),
+            help="Judge this one; may be given several times.",
+            show_default="both",
+        ),
+    ] = None
+    depth_model: DepthModel = None
+    refine: Refine = 1.0
+    views: Annotated[
+        int | None, typer.Option(min=1, help="Judge at most so many views of a scene.", show_default="all")
+    ] = None
+    max_pixels: MaxPixels = None
+    lpips: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="LPIPS too: its alex.pth and torchvision's alexnet-*.pth.", show_default=False
+        ),
+    ] = None
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="STAGE",
+            help=f"Leave out a stage between map and view; may be given several times: {', '.join(STAGE_NAMES)}.",
+            show_default=False,
+        ),
+    ] = None
+
+    def inputs(self) -> tuple[Path, ...]:
+        """The files it names; else they are words, and names of models."""
+        named = (os.path.expanduser(name) for name in (self.disparity, self.depth_model) if name is not None)
+        return tuple(Path(name) for name in named if os.path.lexists(name))
+
+    def options(self, stages: Stages) -> Options:
+        """The same as a record of the core. Raises InputError for a model or a map that is not there."""
+        from iibr_core.evaluation import QUALITIES, Options
+        from iibr_core.formats import DEFAULT_MAX_PIXELS
+
+        chosen: tuple[Quality, ...] = tuple(dict.fromkeys(self.quality)) if self.quality else QUALITIES
+        choice = DepthChoice(model=self.depth_model, refine=self.refine)
+        require_model(choice)
+        max_pixels = self.max_pixels or DEFAULT_MAX_PIXELS
+        source = _disparity_source(self.disparity)
+        return Options(source, choice, chosen, max_pixels, self.views, self.lpips, stages=stages)
+
+
+@with_option_records
 def evaluate(
     context: typer.Context,
     datasets: Annotated[
@@ -34,70 +98,25 @@ def evaluate(
         ),
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report (JSON, Markdown, HTML).")],
-    disparity: Annotated[
-        str,
-        typer.Option(
-            metavar="auto|gt|estimate|FILE",
-            help="Of the given view: the data set's (gt), estimated from the photo, a file (px per view step; LLFF: per"
-            " mean distance of neighbours); auto: gt if there is one.",
-        ),
-    ] = "auto",
-    quality: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--quality",
-            parser=quality_from_text,
-            metavar="|".join(get_args(Quality)),
-            help="Judge this one; may be given several times.",
-            show_default="both",
-        ),
-    ] = None,
-    depth_model: DepthModel = None,
-    refine: Refine = 1.0,
-    views: Annotated[
-        int | None, typer.Option(min=1, help="Judge at most so many views of a scene.", show_default="all")
-    ] = None,
-    max_pixels: MaxPixels = None,
-    lpips: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR", help="LPIPS too: its alex.pth and torchvision's alexnet-*.pth.", show_default=False
-        ),
-    ] = None,
-    without: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="STAGE",
-            help=f"Leave out a stage between map and view; may be given several times: {', '.join(STAGE_NAMES)}.",
-            show_default=False,
-        ),
-    ] = None,
+    judging: _Judging,
     force: Force = False,
 ) -> None:
     """Judge views against data sets whose true views are known, beside a plain warp and beside doing nothing.
 
     Example: iibr evaluate hci/dino hci/cotton --out report
     """
-    stages = _stages_without(without or [])
+    stages = _stages_without(judging.without or [])
     require_extra("evaluate", "scipy", "skimage", "jinja2", "flip_evaluator")
-    if lpips is not None:
+    if judging.lpips is not None:
         require_extra("train", "torch")
     from iibr_core.evaluation import require_report_folder
 
-    named = (os.path.expanduser(name) for name in (disparity, depth_model) if name is not None)
-    found = tuple(Path(name) for name in named if os.path.lexists(name))  # else: words, and names of models
-    require_report_folder(out, inputs_of_command(context) + found, force)
+    require_report_folder(out, inputs_of_command(context) + judging.inputs(), force)
 
-    from iibr_core.evaluation import QUALITIES, Options, find_scenes, summary_line, write_report
     from iibr_core.evaluation import evaluate as evaluate_scene
-    from iibr_core.formats import DEFAULT_MAX_PIXELS
+    from iibr_core.evaluation import find_scenes, summary_line, write_report
 
-    chosen: tuple[Quality, ...] = tuple(dict.fromkeys(quality)) if quality else QUALITIES
-    choice = DepthChoice(model=depth_model, refine=refine)
-    require_model(choice)
-    options = Options(
-        _disparity_source(disparity), choice, chosen, max_pixels or DEFAULT_MAX_PIXELS, views, lpips, stages=stages
-    )
+    options = judging.options(stages)
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
     results = []
     with show_progress("reading") as show:
