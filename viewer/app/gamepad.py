@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from iibr_core.scenes import aperture_limit, focus_span
 from iibr_core.types import ViewOffset
-from viewer.model.actions import Action, ReturnHome
+from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
+from viewer.model.state.motion import ReturnHome
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 
 DEAD_ZONE = 0.15

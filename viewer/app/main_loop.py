@@ -37,17 +37,7 @@ from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
-from viewer.model.actions import (
-    Action,
-    DoTask,
-    OpenPath,
-    PlaceWindow,
-    Quit,
-    SetState,
-    Tick,
-    Touch,
-    WorkerLost,
-)
+from viewer.model.actions import Action, DoTask, OpenPath, Quit, SetState, WorkerLost
 from viewer.model.free_camera import Poses
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
@@ -59,6 +49,8 @@ from viewer.model.layout import Layout, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.inspection import SetInspection
+from viewer.model.state.motion import Tick, Touch
+from viewer.model.state.preferences import PlaceWindow
 from viewer.model.state.tasks import ReadTruthTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths

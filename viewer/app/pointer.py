@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 
 from iibr_core.scenes import Rect, Scene, focus_limits
 from iibr_core.types import ViewOffset
-from viewer.model.actions import Action, EndGesture, ReturnHome, SetHover
+from viewer.model.actions import Action, EndGesture, SetHover
 from viewer.model.inspection_request import view_at
 from viewer.model.layout import Layout, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush
 from viewer.model.state.inspection import MoveDivider
+from viewer.model.state.motion import ReturnHome
 from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
 from viewer.model.zoom import SetZoom
 

@@ -26,7 +26,7 @@ from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.jobs import Failed
 from viewer.background.model_download import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, Notify, OpenPath, ShowPrompt, Sway, TaskTaken, Touch
+from viewer.model.actions import Action, Notify, OpenPath, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportTask
@@ -42,6 +42,7 @@ from viewer.model.state.model_download import (
     ListModelsTask,
     ModelsListed,
 )
+from viewer.model.state.motion import Sway, Touch
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import SetOptics
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iibr_core.depth.editing import DepthEdits
-from iibr_core.exports import LoopKind
 from iibr_core.scenes import Progress, Scene, Source
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport, Hover
@@ -17,62 +16,15 @@ from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
+from viewer.model.state.motion import MotionAction
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import LensAction, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
-from viewer.model.state.preferences import Section, SetPreference
+from viewer.model.state.preferences import PreferencesAction
 from viewer.model.state.prompts import Prompt, Saved
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.tasks import Task
 from viewer.model.zoom import SetZoom
-
-# The viewpoint
-
-
-@dataclass(frozen=True)
-class ReturnHome:
-    """Glide back to the middle viewpoint. takes_back_click: by a double click, whose first click set the focus."""
-
-    takes_back_click: bool = False
-
-
-@dataclass(frozen=True)
-class SetLoop:
-    """Move the viewpoint along this path, over and over; None stops it where it is."""
-
-    kind: LoopKind | None
-
-
-@dataclass(frozen=True)
-class SetSpeed:
-    """Speed of loops, turns per second."""
-
-    turns_per_second: float
-
-
-@dataclass(frozen=True)
-class PauseMotion:
-    """Hold the motion, or let it go on."""
-
-    is_paused: bool
-
-
-@dataclass(frozen=True)
-class Sway:
-    """Let the viewpoint sway, where the demo waits for that and nobody has touched it yet."""
-
-
-@dataclass(frozen=True)
-class Touch:
-    """The user has pressed a button or a key, or turned the wheel, whatever that was for: the demo holds still."""
-
-
-@dataclass(frozen=True)
-class Tick:
-    """The clock shows this many seconds: a motion goes on."""
-
-    now_s: float
-
 
 # The lens as a whole, and undo
 
@@ -248,20 +200,6 @@ class DismissNotice:
 
 
 @dataclass(frozen=True)
-class ToggleSection:
-    """Open or close a section of the panel."""
-
-    section: Section
-
-
-@dataclass(frozen=True)
-class PlaceWindow:
-    """The window is here: x, y, width, height in screen units; None: where it was, while it fills the screen."""
-
-    place: tuple[int, int, int, int] | None
-
-
-@dataclass(frozen=True)
 class ShowBefore:
     """Show the photo as it was taken, to compare; or the picture again, as any edit of the lens does."""
 
@@ -282,9 +220,7 @@ class EditsSaved:
     edits: DepthEdits
 
 
-MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Sway | Touch | Tick
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
-PreferencesAction = SetPreference | ToggleSection | PlaceWindow
 
 Action = (
     LensAction

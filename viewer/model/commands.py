@@ -19,17 +19,13 @@ from viewer.model.actions import (
     DoTask,
     Notify,
     OpenPath,
-    PauseMotion,
     Quit,
     Redo,
-    ReturnHome,
-    SetLoop,
     SetState,
     ShowBefore,
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
-    ToggleSection,
     Undo,
 )
 from viewer.model.demo import demo_photo
@@ -52,9 +48,10 @@ from viewer.model.state.inspection import (
     SetOverlay,
 )
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
+from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetOptics
-from viewer.model.state.preferences import SECTIONS, SetPreference
+from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask

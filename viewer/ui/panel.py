@@ -10,13 +10,13 @@ from imgui_bundle import imgui
 from iibr_core.runtime import about_left
 from iibr_core.scenes import Progress, Scene, Source, aperture_limit, source_beside
 from iibr_core.types import DEFAULT_QUALITY
-from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork, ToggleSection
+from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState, DrawReport
 from viewer.model.state.optics import ApplyPreset
-from viewer.model.state.preferences import SECTIONS, Section
+from viewer.model.state.preferences import SECTIONS, Section, ToggleSection
 from viewer.ui.sections.depth import depth_line, depth_section
 from viewer.ui.sections.gloss import gloss_section
 from viewer.ui.sections.inspect import inspect_section

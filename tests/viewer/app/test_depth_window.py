@@ -15,12 +15,12 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model.actions import AskToSave, EndGesture, Notify, SetDepthStrength, ShowPrompt, ToggleSection
+from viewer.model.actions import AskToSave, EndGesture, Notify, SetDepthStrength, ShowPrompt
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
-from viewer.model.state.preferences import SECTIONS, SetPreference
+from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")

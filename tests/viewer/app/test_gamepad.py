@@ -10,9 +10,9 @@ import pytest
 from iibr_core.types import ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.gamepad import ACROSS_S, LONGEST_STEP_S, Gamepad, actions_from_gamepad
-from viewer.model.actions import ReturnHome
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
+from viewer.model.state.motion import ReturnHome
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
 
 STATE = state_with(scene_of())

@@ -20,11 +20,13 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.main_loop import App, initial_state
-from viewer.model.actions import OpenPath, SetLoop, ToggleSection
+from viewer.model.actions import OpenPath
 from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
+from viewer.model.state.motion import SetLoop
 from viewer.model.state.optics import MoveEye
+from viewer.model.state.preferences import ToggleSection
 from viewer.model.state.tasks import ReadTruthTask
 
 GRID = GridShape(5, 5)

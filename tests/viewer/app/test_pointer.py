@@ -19,11 +19,12 @@ from viewer.app.pointer import (
     gesture_start,
     units_per_view,
 )
-from viewer.model.actions import EndGesture, ReturnHome, SetHover
+from viewer.model.actions import EndGesture, SetHover
 from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
 from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.history import History
+from viewer.model.state.motion import ReturnHome
 from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, SetFocus
 from viewer.model.zoom import SetZoom, Zoom
 

@@ -13,13 +13,13 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.app.window_slot import STEP
-from viewer.model.actions import AskToSave, Notify, OpenPath, SetState, ShowPrompt, StopWork, ToggleSection
+from viewer.model.actions import AskToSave, Notify, OpenPath, SetState, ShowPrompt, StopWork
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SetPreference
+from viewer.model.state.preferences import SetPreference, ToggleSection
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from iibr_core.exports.loops import LOOPS, LoopKind, point_on_loop
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.actions import PauseMotion, ReturnHome, SetLoop, SetSpeed, Tick
 from viewer.model.reducers.camera_motion import HOME_S, LONGEST_STEP_S, ease
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop, SetSpeed, Tick
 from viewer.model.state.optics import MoveEye, ResetOptics, SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 

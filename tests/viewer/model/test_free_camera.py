@@ -15,7 +15,7 @@ from iibr_core.types import Camera, ImageSize
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model.actions import Action, AskToSave, OpenPath, ReturnHome
+from viewer.model.actions import Action, AskToSave, OpenPath
 from viewer.model.free_camera import (
     FORWARD_LIMITS,
     LEAST_SEEN,
@@ -32,6 +32,7 @@ from viewer.model.free_camera import (
 from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import ReturnHome
 from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetFocus
 from viewer.model.state.prompts import SavePrompt
 

@@ -15,18 +15,16 @@ from viewer.model.actions import (
     EndGesture,
     OpenPath,
     Redo,
-    ReturnHome,
     SceneOpened,
     SetDepthStrength,
-    SetLoop,
     ShowTiltHandles,
-    Tick,
     Undo,
 )
 from viewer.model.reducers.history import EDITS_KEPT
 from viewer.model.reducers.lens import APERTURE_OPENED
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import ReturnHome, SetLoop, Tick
 from viewer.model.state.optics import (
     ApplyPreset,
     FocusOn,

@@ -11,21 +11,11 @@ from iibr_core.scenes.lens_limits import FIRST_APERTURE
 from iibr_core.scenes.scene import Progress, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_reducers import SOURCE, scene_of
-from viewer.model.actions import (
-    Action,
-    OpenPath,
-    PauseMotion,
-    ProgressMade,
-    RestoreSession,
-    SceneOpened,
-    SetLoop,
-    Sway,
-    Tick,
-    Touch,
-)
+from viewer.model.actions import Action, OpenPath, ProgressMade, RestoreSession, SceneOpened
 from viewer.model.reducers.camera_motion import SWAY_TURN_S, SWAY_TURNS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import PauseMotion, SetLoop, Sway, Tick, Touch
 from viewer.model.state.optics import MoveEye, SetFocus
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.tasks import MaySwayTask

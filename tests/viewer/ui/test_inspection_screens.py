@@ -12,14 +12,14 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import Action, Notify, SetHover, ToggleSection
+from viewer.model.actions import Action, Notify, SetHover
 from viewer.model.inspection_request import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import OVERLAYS, Compare, MoveDivider, OverlayKind, SetInspection, SetOverlay
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
-from viewer.model.state.preferences import SetPreference, Theme
+from viewer.model.state.preferences import SetPreference, Theme, ToggleSection
 
 SIZE = 640, 760
 GRID = GridShape(3, 3)

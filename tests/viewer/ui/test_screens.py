@@ -22,19 +22,18 @@ from viewer.model.actions import (
     OpenPath,
     ProgressMade,
     SetHover,
-    SetLoop,
     SetState,
     ShowPrompt,
     ShowTiltHandles,
-    ToggleSection,
 )
 from viewer.model.layout import PANEL_WIDTH, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
+from viewer.model.state.motion import SetLoop
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import SetAperture, SetOptics
-from viewer.model.state.preferences import SECTIONS, Section, SetPreference
+from viewer.model.state.preferences import SECTIONS, Section, SetPreference, ToggleSection
 from viewer.model.state.prompts import PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings
 from viewer.ui.overlays.progress_rows import job_text

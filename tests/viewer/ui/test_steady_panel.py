@@ -13,9 +13,10 @@ from iibr_core.rendering.optics import APERTURE_KINDS, ApertureMask, ApertureSha
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.model.actions import Action, SetLoop, ShowTiltHandles
+from viewer.model.actions import Action, ShowTiltHandles
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
 from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
+from viewer.model.state.motion import SetLoop
 from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
 from viewer.model.state.preferences import SECTIONS
 

@@ -17,47 +17,37 @@ from viewer.model.actions import (
     DoTask,
     EditsSaved,
     EndGesture,
-    MotionAction,
     Notify,
     OpenPath,
-    PauseMotion,
-    PlaceWindow,
-    PreferencesAction,
     Quit,
     Redo,
     RestoreSession,
     ResumeWork,
-    ReturnHome,
     SetDepthStrength,
     SetHover,
-    SetLoop,
-    SetSpeed,
     SetState,
     ShowBefore,
     ShowPrompt,
     ShowTiltHandles,
     StopWork,
-    Sway,
     TakeSettings,
     TaskTaken,
-    Tick,
-    ToggleSection,
-    Touch,
     Undo,
     WorkerEvent,
     WorkerLost,
 )
 from viewer.model.free_camera import FreeCameraAction
-from viewer.model.reducers.camera_motion import advance_motion, start_motion
 from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
 from viewer.model.reducers.depth_models import reduce_models
-from viewer.model.reducers.exporting import ask_to_export
+from viewer.model.reducers.exporting import ask_to_export, ask_to_save
 from viewer.model.reducers.folder import list_folder, photo_after, scroll_filmstrip
 from viewer.model.reducers.free_camera import reduce_free_camera
 from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
-from viewer.model.reducers.lens import reduce_lens, take_back_opening, with_focus_of
+from viewer.model.reducers.lens import reduce_lens, with_focus_of
+from viewer.model.reducers.motion import reduce_motion, touch
 from viewer.model.reducers.notices import add_notice
+from viewer.model.reducers.preferences import reduce_preferences
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction
@@ -67,14 +57,13 @@ from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOr
 from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
-from viewer.model.state.motion import Motion
+from viewer.model.state.motion import Motion, MotionAction
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetGlossBrush, SetOptics
 from viewer.model.state.photo_facts import FactsRead
-from viewer.model.state.preferences import SECTIONS, Preferences, SetPreference
-from viewer.model.state.prompts import Saved, SavePrompt
-from viewer.model.state.saving import SavedSettings, path_beside
-from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT, FONT_SCALE_LIMITS, SPEED_LIMITS
+from viewer.model.state.preferences import PreferencesAction
+from viewer.model.state.saving import SavedSettings
+from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
@@ -85,7 +74,7 @@ LOST = "The worker stopped unexpectedly. Whatever you open or change next starts
 def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
     if isinstance(action, LensAction):
-        state = _touch(state) if state.awaits_touch else state
+        state = touch(state) if state.awaits_touch else state
         state = replace(state, shows_before=False) if state.shows_before else state
         state = replace(state, free_camera=None) if isinstance(action, ResetOptics) else state
         kind = action.field if isinstance(action, SetOptics) else type(action).__name__
@@ -96,7 +85,7 @@ def reduce(state: AppState, action: Action) -> AppState:
         is_click = isinstance(action, FocusOn) and state.scene is not None
         return record_edit(state, edited, kind, always=is_click)
     if isinstance(action, MotionAction):
-        return _reduce_motion(state, action)
+        return reduce_motion(state, action)
     if isinstance(action, FreeCameraAction):
         return reduce_free_camera(state, action)
     if isinstance(action, WorkerEvent):
@@ -108,7 +97,7 @@ def reduce(state: AppState, action: Action) -> AppState:
     if isinstance(action, ModelAction):
         return reduce_models(state, action)
     if isinstance(action, PreferencesAction):
-        return replace(state, preferences=_reduce_preferences(state.preferences, action))
+        return replace(state, preferences=reduce_preferences(state.preferences, action))
     match action:
         case SetDepthStrength():
             return record_edit(state, _set_depth_strength(state, action), "SetDepthStrength")
@@ -178,11 +167,8 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
     match action:
         case ShowPrompt(prompt):
             return replace(state, prompt=prompt)
-        case AskToSave(what) if state.scene is not None and (what == "picture" or state.scene.plan is not None):
-            scene = state.scene
-            is_full = scene.own_size is not None and state.optics.dolly == 0 and state.free_camera is None
-            size = scene.own_size if is_full and scene.own_size is not None else scene.size
-            return replace(state, prompt=SavePrompt(_path_beside(state, what), size, what=what))
+        case AskToSave(what):
+            return ask_to_save(state, what)
         case AskToExport():
             return ask_to_export(state)
         case JobsChanged(jobs):
@@ -263,48 +249,6 @@ def _leave_field(state: AppState) -> FinishedField | None:
     return FinishedField(state.progress, state.depth_strength, state.depth) if is_finished else None
 
 
-def _reduce_motion(state: AppState, action: MotionAction) -> AppState:
-    motion, scene = state.motion, state.scene
-    if isinstance(action, Touch):
-        return _touch(state)
-    if scene is None:
-        return state
-    match action:
-        case ReturnHome(takes_back_click):
-            state = replace(_without_click(state) if takes_back_click else state, free_camera=None)
-            gliding = replace(state, motion=start_motion(motion, "home", state.optics))
-            return record_edit(state, gliding, "ReturnHome", always=True)
-        case SetLoop(kind):
-            return record_edit(
-                state, replace(state, motion=start_motion(motion, kind, state.optics)), "SetLoop", always=True
-            )
-        case SetSpeed(speed) if math.isfinite(speed):
-            return replace(state, motion=replace(motion, speed=clamp(speed, *SPEED_LIMITS)))
-        case PauseMotion(is_paused):
-            return replace(state, motion=replace(motion, is_paused=is_paused, ticked_s=None))
-        case Sway() if state.awaits_touch and motion.kind is None:
-            return replace(state, motion=start_motion(motion, "sway", state.optics))
-        case Tick(now_s):
-            motion, optics = advance_motion(motion, state.optics, scene.grid, now_s)
-            return replace(state, motion=motion, optics=clamp_optics(optics, scene))
-    return state
-
-
-def _touch(state: AppState) -> AppState:
-    """The demo holds still where it is, and stays so."""
-    motion = Motion(speed=state.motion.speed) if state.motion.kind == "sway" else state.motion
-    return replace(state, awaits_touch=False, motion=motion)
-
-
-def _without_click(state: AppState) -> AppState:
-    """A double click is a click first, and that has set the focus: take it back."""
-    history = state.history
-    if history.last != "FocusOn" or not history.past:
-        return state
-    before = replace(state, optics=history.past[-1].optics, history=replace(history, past=history.past[:-1], last=""))
-    return take_back_opening(before)
-
-
 def _set_depth_strength(state: AppState, action: SetDepthStrength) -> AppState:
     if not math.isfinite(action.strength):
         return state
@@ -320,7 +264,7 @@ def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
         return state
     optics = clamp_optics(settings.optics, state.scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
-    return replace(_touch(state), optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
+    return replace(touch(state), optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
 
 
 def _restore(state: AppState, settings: SavedSettings) -> AppState:
@@ -340,32 +284,3 @@ def _restore(state: AppState, settings: SavedSettings) -> AppState:
         restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
         restored = replace(restored, generation=state.next_generation, saved_edits=settings.depth_edits)
     return add_notice(restored, Notice(AS_LEFT))
-
-
-def _reduce_preferences(preferences: Preferences, action: PreferencesAction) -> Preferences:
-    match action:
-        case SetPreference("font_scale", float(scale)):
-            scale = clamp(scale, *FONT_SCALE_LIMITS) if math.isfinite(scale) else preferences.font_scale
-            return replace(preferences, font_scale=scale)
-        case SetPreference(field, value):
-            change: dict[str, Any] = {field: value}
-            return replace(preferences, **change)
-        case ToggleSection(section):
-            is_open = preferences.open_sections
-            return replace(preferences, open_sections=tuple(s for s in SECTIONS if (s in is_open) != (s == section)))
-        case PlaceWindow(place):
-            return replace(preferences, window=place or preferences.window, is_maximized=place is None)
-    return preferences
-
-
-def _path_beside(state: AppState, what: Saved) -> str:
-    """Where it is saved unless the user says otherwise: beside the photo. A map is found there the next time, unless
-    one was given for it.
-    """
-    assert state.source is not None
-    assert state.scene is not None
-    origin = state.scene.depth_origin
-    ending = "-iibr.png" if what == "picture" else "_disparity.pfm"
-    if what == "map" and origin is not None and origin.kind == "file":
-        ending = "-edited.pfm"
-    return path_beside(state.source.path, f"{state.scene.name}{ending}")

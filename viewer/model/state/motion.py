@@ -33,3 +33,51 @@ class Motion:
     def is_running(self) -> bool:
         """Whether the picture changes without anybody touching it."""
         return self.kind is not None and not self.is_paused
+
+
+@dataclass(frozen=True)
+class ReturnHome:
+    """Glide back to the middle viewpoint. takes_back_click: by a double click, whose first click set the focus."""
+
+    takes_back_click: bool = False
+
+
+@dataclass(frozen=True)
+class SetLoop:
+    """Move the viewpoint along this path, over and over; None stops it where it is."""
+
+    kind: LoopKind | None
+
+
+@dataclass(frozen=True)
+class SetSpeed:
+    """Speed of loops, turns per second."""
+
+    turns_per_second: float
+
+
+@dataclass(frozen=True)
+class PauseMotion:
+    """Hold the motion, or let it go on."""
+
+    is_paused: bool
+
+
+@dataclass(frozen=True)
+class Sway:
+    """Let the viewpoint sway, where the demo waits for that and nobody has touched it yet."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The user has pressed a button or a key, or turned the wheel, whatever that was for: the demo holds still."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """The clock shows this many seconds: a motion goes on."""
+
+    now_s: float
+
+
+MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Sway | Touch | Tick

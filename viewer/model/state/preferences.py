@@ -43,3 +43,20 @@ class SetPreference:
 
     field: Literal["theme", "font_scale", "units", "shows_filmstrip", "told_sessions", "estimates_depth"]
     value: Theme | float | Units | bool
+
+
+@dataclass(frozen=True)
+class ToggleSection:
+    """Open or close a section of the panel."""
+
+    section: Section
+
+
+@dataclass(frozen=True)
+class PlaceWindow:
+    """The window is here: x, y, width, height in screen units; None: where it was, while it fills the screen."""
+
+    place: tuple[int, int, int, int] | None
+
+
+PreferencesAction = SetPreference | ToggleSection | PlaceWindow

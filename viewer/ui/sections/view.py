@@ -6,10 +6,11 @@ from imgui_bundle import imgui
 
 from iibr_core.exports import LOOPS
 from iibr_core.scenes import Scene, dolly_limit
-from viewer.model.actions import Action, PauseMotion, ReturnHome, SetLoop, SetSpeed
+from viewer.model.actions import Action
 from viewer.model.commands import LOOP_WORDS
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop, SetSpeed
 from viewer.model.state.optics import SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import PAD_SIDE, pad
