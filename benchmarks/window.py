@@ -100,7 +100,7 @@ def drag(app: App) -> Drag:
             frames.append(turn - since + 1)
             milliseconds.append((time.perf_counter() - read_at) * 1e3)
         if app.scene_view.pictures_drawn > drawn:
-            draws.append(app.scene_view.report.draw_ms)
+            draws.append(app.scene_view.renderer.report.draw_ms)
         if app.state.optics.eye != eye:
             waiting[app.state.optics.eye] = turn, began
     left_over = 0

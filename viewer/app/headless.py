@@ -163,7 +163,7 @@ class HeadlessViewer:
             pixels = encode_light(light, is_linear, color_space, scene.color_space)
         else:
             settings = RenderSettings(self.state.optics, box_size, is_linear=is_linear, color_space=color_space)
-            pixels = self._scene_view.picture(settings)
+            pixels = self._scene_view.renderer.converged_picture(settings)
         if box_size == (width, height):
             return pixels
         image = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
@@ -178,7 +178,7 @@ class HeadlessViewer:
         assert scene.plan is not None
         full = FullPicture(scene, scene.plan, loaded, optics, size)
         if needs_smaller(optics):
-            full = full.with_smaller(self._scene_view.picture(full.smaller_settings))
+            full = full.with_smaller(self._scene_view.renderer.converged_picture(full.smaller_settings))
         return full.draw(report_progress=report_progress)
 
     @property

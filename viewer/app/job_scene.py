@@ -20,7 +20,7 @@ from iibr_core.types import ViewUpdate
 from viewer.app.job import Job
 from viewer.background.window_work import Result, Steps, WindowWork
 from viewer.display.scene_view import SceneView
-from viewer.display.snapshot import SceneSnapshot
+from viewer.display.snapshot import SceneSnapshot, snapshot_of
 
 MAKING_VIEWS = "making views"
 DRAWING = "drawing"
@@ -94,7 +94,7 @@ class JobScenes:
 
     def _open(self, job: Job, ready: SceneReady) -> SceneSnapshot:
         """In the window's thread, which also releases it."""
-        job.snapshot = self._scene_view.snapshot_of(ready)
+        job.snapshot = snapshot_of(self._scene_view.renderer.gl, ready)
         return job.snapshot
 
     def _make_views(
@@ -118,11 +118,11 @@ class JobScenes:
         if known is not None and known.request.is_for(gloss, snapshot.centre):
             return
         found = answer(GlossRequest(gloss, snapshot.scene, snapshot.centre), job.should_stop)
-        self._run(job, _in_one_step(lambda: self._scene_view.add_gloss(snapshot, found)))
+        self._run(job, _in_one_step(lambda: snapshot.take_gloss(found)))
 
     def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
         """In the window's thread. Exports count their pictures themselves."""
-        drawing = self._scene_view.start_picture(settings, snapshot.field)
+        drawing = self._scene_view.renderer.start_picture(settings, snapshot.field)
         try:
             while True:
                 drawing.advance(budget_s=0.0)

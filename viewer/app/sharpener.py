@@ -94,7 +94,7 @@ class Sharpener:
         if self._smaller is not None and self._wanted is not None and self._smaller[0] == _whole(self._wanted):
             self._worker.submit(request.with_smaller(self._smaller[1]))  # another part of the same picture
             return
-        self._drawing = self._scene_view.start_picture(request.smaller_settings)
+        self._drawing = self._scene_view.renderer.start_picture(request.smaller_settings)
 
     def _draw_smaller(self, request: FullPicture, drawing: PictureDrawing, budget_s: float) -> None:
         """What of the picture is blurred, from the views."""

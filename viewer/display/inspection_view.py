@@ -110,7 +110,7 @@ class InspectionView:
             state.optics,
             self._scene_view.generation,
             self._scene_view.views_uploaded,
-            self._scene_view.report,
+            self._scene_view.renderer.report,
         )
         if self._probed[0] != asked:
             self._probed = asked, self._probe_at(hover, state, scene, field)
@@ -267,7 +267,7 @@ class InspectionView:
             return {}
         record = base.generation, base.views, base.previews, optics, size_px, part
         if self._kept is None or self._kept[0] != record:
-            self._kept = record, self._scene_view.picture(RenderSettings(optics, size_px, part))
+            self._kept = record, self._scene_view.renderer.converged_picture(RenderSettings(optics, size_px, part))
         kept = self._kept[1]
         if kind == "kept":
             return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}

@@ -81,7 +81,7 @@ class SceneDrawer:
         assert self._view is not None
         require_size(settings.size_px)
         prepare_gloss(self._view, settings.optics.gloss)
-        return self._view.picture(settings)
+        return self._view.renderer.converged_picture(settings)
 
     def _make_view(self) -> SceneView:
         gl = create_headless("auto")

@@ -9,12 +9,10 @@ import math
 import time
 from collections import deque
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import RenderSettings
 from iibr_core.rendering import CENTRE, Optics
 from iibr_core.rendering.gloss import Gloss
 from iibr_core.scenes import WHOLE, GlossFound, GlossRequest, LoadedPhoto, Rect, Scene, SceneReady, ScreenSize
@@ -22,10 +20,9 @@ from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewU
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
-from viewer.gpu.refocus.picture_drawing import PictureDrawing
+from viewer.gpu.light_field_texture import Box
 from viewer.gpu.refocus.renderer import Renderer
-from viewer.model.state.app_state import AppState, DrawReport, Picture
+from viewer.model.state.app_state import AppState, Picture
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
@@ -213,7 +210,7 @@ class SceneView:
                 self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, part)
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
-            self.picture_drawn = replace(wanted, samples=self.report.samples)
+            self.picture_drawn = replace(wanted, samples=self.renderer.report.samples)
         elif self.renderer.is_renewing or (self._is_same(wanted) and self._refines()):
             self.renderer.refine(budget_s)
             self.picture_drawn = replace(self.picture_drawn, samples=self.picture_drawn.samples + 1)
@@ -226,14 +223,6 @@ class SceneView:
         if self.draw(state, size_px, part) is not None:
             self.renderer.refine()
         return self.picture_drawn
-
-    def picture(self, settings: RenderSettings) -> NDArray[Any]:
-        """The converged picture of any size. Before the first view it is black. The window's own picture stays."""
-        return self.renderer.converged_picture(settings)
-
-    def start_picture(self, settings: RenderSettings, field: LightFieldTexture | None = None) -> PictureDrawing:
-        """The same, to be drawn a step at a time. field: of a snapshot, by default what is shown."""
-        return self.renderer.start_picture(settings, field)
 
     @property
     def is_whole(self) -> bool:
@@ -250,32 +239,10 @@ class SceneView:
         is_free, field = self._stand_in is not None, self.renderer.drawn_field.share()
         return SceneSnapshot(self._scene, self.loaded, self.centre, field, self._gloss, is_free)
 
-    def snapshot_of(self, ready: SceneReady) -> SceneSnapshot:
-        """A scene that is not shown, with its centre view; the others are to be stored in its field.
-
-        Raises InputError where it does not fit the graphics card.
-        """
-        scene, centre = ready.scene, ready.centre
-        size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
-        field, _ = field_that_fits(self._gl.ctx, scene.grid, *size)
-        field.color_space = scene.color_space
-        field.upload(*scene.grid.centre, centre.colors, centre.disparity)
-        return SceneSnapshot(scene, ready.loaded, centre, field)
-
-    def add_gloss(self, snapshot: SceneSnapshot, found: GlossFound) -> None:
-        """Have a snapshot drawn with this gloss."""
-        snapshot.field.set_gloss(found.maps)
-        snapshot.gloss = found
-
     def is_shown(self, snapshot: SceneSnapshot) -> bool:
         """Whether these are the views on the screen: then they take no memory of their own."""
         field = self.renderer.field
         return field is not None and field.colors is snapshot.field.colors
-
-    @property
-    def report(self) -> DrawReport:
-        """What is known of the picture drawn last."""
-        return self.renderer.report
 
     def shows_all_views(self) -> bool:
         """Whether the picture last drawn knows every view uploaded."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.scenes import GlossFound, LoadedPhoto, Scene
+from iibr_core.scenes import GlossFound, LoadedPhoto, Scene, SceneReady
 from iibr_core.types import ViewUpdate
-from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.context import GLContext
+from viewer.gpu.light_field_texture import LightFieldTexture, field_that_fits
 
 
 @dataclass(eq=False)
@@ -22,6 +23,24 @@ class SceneSnapshot:
     gloss: GlossFound | None = None
     is_free_view: bool = False
 
+    def take_gloss(self, found: GlossFound) -> None:
+        """Have it drawn with this gloss from now on."""
+        self.field.set_gloss(found.maps)
+        self.gloss = found
+
     def release(self) -> None:
         """Let the views go. Only in the thread of the window."""
         self.field.release()
+
+
+def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
+    """A scene that is not shown, with its centre view; the others are to be stored in its field.
+
+    Raises InputError where it does not fit the graphics card.
+    """
+    scene, centre = ready.scene, ready.centre
+    size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
+    field, _ = field_that_fits(gl.ctx, scene.grid, *size)
+    field.color_space = scene.color_space
+    field.upload(*scene.grid.centre, centre.colors, centre.disparity)
+    return SceneSnapshot(scene, ready.loaded, centre, field)

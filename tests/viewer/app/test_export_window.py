@@ -88,7 +88,9 @@ def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: 
     viewer.app.do(DoTask(ExportTask("numbered-grid", str(tmp_path / "field"))))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(viewer.app) == [f"Exported {tmp_path / 'field'}"]
-    shown = viewer.app.scene_view.picture(RenderSettings(viewer.app.state.optics, ScreenSize(96, 64))).astype(int)
+    shown = viewer.app.scene_view.renderer.converged_picture(
+        RenderSettings(viewer.app.state.optics, ScreenSize(96, 64))
+    ).astype(int)
     view = np.asarray(Image.open(tmp_path / "field" / "v01_u01.png")).astype(int)
     assert np.abs(view - shown).max() <= 2
 

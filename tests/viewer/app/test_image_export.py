@@ -89,7 +89,7 @@ def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
     scene_view, size_px = opened._scene_view, (WIDTH, HEIGHT)
     scene_view.converge(opened.state, size_px)
     shown, drawn = scene_view.renderer.read_image(), scene_view.pictures_drawn
-    scene_view.picture(RenderSettings(opened.state.optics, (40, 30)))
+    scene_view.renderer.converged_picture(RenderSettings(opened.state.optics, (40, 30)))
     assert np.array_equal(scene_view.renderer.read_image(), shown)
     scene_view.converge(opened.state, size_px)
     assert scene_view.pictures_drawn == drawn
@@ -106,12 +106,14 @@ def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: P
     with headless_with_scene(tmp_path) as viewer:
         viewer.do(MoveEye(ViewOffset(0.3, -0.7)))
         scene_view, state, woken = viewer._scene_view, viewer.state, threading.Event()
-        expected = scene_view.picture(RenderSettings(state.optics, (90, 60)))
+        expected = scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60)))
         jobs = JobQueue(scene_view, woken.set)
         actions: list[Action] = []
         assert add_save(SaveTask(str(out), (90, 60)), state, (), jobs) == []
         scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
-        assert not np.array_equal(scene_view.picture(RenderSettings(state.optics, (90, 60))), expected)
+        assert not np.array_equal(
+            scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60))), expected
+        )
         while JobsChanged(()) not in actions:
             actions += jobs.advance(state, 0.0)
             assert woken.wait(60)

@@ -68,7 +68,9 @@ def texts(viewer: Driver) -> list[str]:
 def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: Path, name: str) -> None:
     app, out = viewer.app, tmp_path / name
     asked = app.state
-    expected = app.scene_view.picture(RenderSettings(asked.optics, SIZE, is_linear=name.endswith("exr")))
+    expected = app.scene_view.renderer.converged_picture(
+        RenderSettings(asked.optics, SIZE, is_linear=name.endswith("exr"))
+    )
     expected = srgb_from_linear(expected) if name.endswith("exr") else expected
     app.do(DoTask(SaveTask(str(out), SIZE)))
     app.step()
@@ -178,7 +180,7 @@ def test_a_picture_waits_for_the_views(open_window: Opener, photo_path: Path, tm
     asked = app.state.optics
     viewer.until(lambda app: not app.state.jobs)
     assert app.state.progress.is_complete
-    expected = app.scene_view.picture(RenderSettings(asked, SIZE))
+    expected = app.scene_view.renderer.converged_picture(RenderSettings(asked, SIZE))
     np.testing.assert_array_equal(np.rint(read_photo(out).pixels * 255), expected)
 
 
@@ -254,7 +256,7 @@ def test_a_picture_is_saved_at_the_photos_own_size(
     if aperture == 0:
         np.testing.assert_allclose(saved, photo, atol=1.01 / 255)
     assert app.state.scene is not None
-    shown = app.scene_view.picture(RenderSettings(app.state.optics, app.state.scene.size))
+    shown = app.scene_view.renderer.converged_picture(RenderSettings(app.state.optics, app.state.scene.size))
     shown = linear_from_srgb(shown / np.float32(255))
     smaller = mean_of_areas(linear_from_srgb(saved), image_size(shown))
     assert np.abs(smaller - shown).mean() < 0.01

@@ -43,9 +43,13 @@ def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path, eye):
         assert viewer.state.scene.color_space == DISPLAY_P3
         assert np.abs(middles(viewer.picture()) - IN_SRGB).max() <= 2
         size = viewer.state.scene.size
-        kept = viewer._scene_view.picture(RenderSettings(viewer.state.optics, size, color_space=DISPLAY_P3))
+        kept = viewer._scene_view.renderer.converged_picture(
+            RenderSettings(viewer.state.optics, size, color_space=DISPLAY_P3)
+        )
         assert np.abs(middles(kept) - PATCHES).max() <= 1
-        light = middles(viewer._scene_view.picture(RenderSettings(viewer.state.optics, size, is_linear=True)))
+        light = middles(
+            viewer._scene_view.renderer.converged_picture(RenderSettings(viewer.state.optics, size, is_linear=True))
+        )
         assert light.min() < -0.01, "light that sRGB lacks is not cut off where nothing asks for it"
         stored = viewer._inspection_view._passes.read_view(viewer._scene_view.renderer.field, 0, 0)
         assert np.abs(middles(stored) - IN_SRGB).max() <= 3

@@ -44,7 +44,7 @@ def a_view_comes(view: SceneView) -> None:
 def test_a_view_that_comes_costs_no_frame_all_passes(opened: HeadlessViewer) -> None:
     view = opened._scene_view
     passes, before = view.renderer.passes_shown, view.renderer.read_image()
-    samples_in_all = view.report.samples
+    samples_in_all = view.renderer.report.samples
     assert passes > 1
     a_view_comes(view)
     frames = 0
@@ -60,7 +60,7 @@ def test_a_view_that_comes_costs_no_frame_all_passes(opened: HeadlessViewer) -> 
 
 def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: HeadlessViewer) -> None:
     view = opened._scene_view
-    before, samples_in_all = view.renderer.read_image(), view.report.samples
+    before, samples_in_all = view.renderer.read_image(), view.renderer.report.samples
     for _ in range(2 * samples_in_all):
         a_view_comes(view)
         view.renderer._refining_s = 1.0
@@ -70,7 +70,7 @@ def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: Headless
         view.draw(opened.state, SIZE)
     view.renderer.refine()
     shown = view.renderer.read_image().astype(int)
-    assert np.abs(shown - view.picture(RenderSettings(opened.state.optics, SIZE))).max() <= 1
+    assert np.abs(shown - view.renderer.converged_picture(RenderSettings(opened.state.optics, SIZE))).max() <= 1
 
 
 def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: HeadlessViewer) -> None:

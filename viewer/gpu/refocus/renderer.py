@@ -9,7 +9,7 @@ import math
 import time
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,7 +239,7 @@ class Renderer:
         whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
         return PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
 
-    def converged_picture(self, settings: RenderSettings) -> NDArray[np.uint8 | np.float32]:
+    def converged_picture(self, settings: RenderSettings) -> NDArray[Any]:
         """The picture of `start_picture`, at once."""
         drawing = self.start_picture(settings)
         drawing.advance()
