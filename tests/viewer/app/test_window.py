@@ -19,7 +19,7 @@ from viewer.app.main_loop import App
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
-from viewer.model.actions import SetDepthStrength
+from viewer.model.actions import DismissNotice, SetDepthStrength
 from viewer.model.state.optics import MoveEye
 
 
@@ -46,6 +46,17 @@ def test_the_first_picture_comes_before_the_views(open_window: Opener, photo_pat
     driver.until(lambda app: app.scene_view.pictures_drawn > 0)
     assert driver.app.scene_view.renderer.field.present.sum() <= WAITING_VIEWS
     assert driver.image().std() > 10
+
+
+def test_views_that_the_graphics_card_has_no_room_for_are_told_of(
+    open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver = open_window(photo_path, grid=GridShape(5, 5))
+    monkeypatch.setitem(driver.app.scene_view.renderer.ctx.info, "GL_MAX_ARRAY_TEXTURE_LAYERS", 10)
+    driver.until(lambda app: app.state.progress.is_complete)
+    told = [notice.text for notice in driver.app.state.notices]
+    assert any("every 2nd view across and down" in text for text in told), told
+    driver.app.do(DismissNotice(None))
 
 
 def test_a_drag_moves_the_viewpoint_and_the_picture(viewer: Driver) -> None:
