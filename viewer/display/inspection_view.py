@@ -32,7 +32,7 @@ from viewer.model.inspection_request import (
     sheet_cells,
     view_near,
 )
-from viewer.model.layout import Layout, PixelRect
+from viewer.model.layout import Layout, whole_pixels
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
 from viewer.model.state.notices import Notice
@@ -84,20 +84,15 @@ class InspectionView:
         scene, field = state.scene, self._scene_view.renderer.field
         if scene is None or field is None or layout.frame_px is None or not field.present.any():
             return NO_INSPECTION_TEXTURES
-        exposure = 2.0**state.optics.exposure_stops
-        base = _ViewImage(
-            self._scene_view.generation, self._scene_view.views_uploaded, exposure, self._scene_view.previews
-        )
-        if field.grid != scene.grid:  # only the photo's own view is there, or what is being done to its depth
-            names = {"overlay": self._overlay(state, scene, field, layout, base)}
-            names["minimap"] = self._minimap(field, layout, base)
-            return self._textures(names)
-        names = self._strips(state, scene, field, layout, base)
+        view = self._scene_view
+        base = _ViewImage(view.generation, view.views_uploaded, 2.0**state.optics.exposure_stops, view.previews)
+        names = {"overlay": self._overlay(state, scene, field, layout, base)}
         names["minimap"] = self._minimap(field, layout, base)
-        names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
-        names["overlay"] = self._overlay(state, scene, field, layout, base)
-        names |= self._comparison_images(state, scene, field, base)
-        names |= self._kept_images(state, layout.frame_px.size, layout.part, base)
+        if field.grid == scene.grid:  # else: only the photo's own view is there, or what is being done to its depth
+            names |= self._strips(state, scene, field, layout, base)
+            names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
+            names |= self._comparison_images(state, scene, field, base)
+            names |= self._kept_images(state, layout.frame_px.size, layout.part, base)
         return self._textures(names)
 
     def probe(self, state: AppState) -> Probe | None:
@@ -105,32 +100,23 @@ class InspectionView:
         scene, hover, field = state.scene, state.hover, self._scene_view.renderer.field
         if scene is None or hover is None or field is None or not state.inspection.shows_values:
             return None
-        asked = (
-            hover,
-            state.optics,
-            self._scene_view.generation,
-            self._scene_view.views_uploaded,
-            self._scene_view.renderer.report,
-        )
+        view = self._scene_view
+        asked = hover, state.optics, view.generation, view.views_uploaded, view.renderer.report
         if self._probed[0] != asked:
             self._probed = asked, self._probe_at(hover, state, scene, field)
         return self._probed[1]
 
     def inputs(self, request: InspectionRequest | None, state: AppState) -> ComparisonInputs | None:
         """What this request is made from; None while that is not there."""
-        scene, scene_view = state.scene, self._scene_view
-        if (
-            request is None
-            or scene is None
-            or scene_view.generation != request.generation
-            or scene_view.renderer.field is None
-        ):
+        scene, view = state.scene, self._scene_view
+        field = view.renderer.field
+        if request is None or scene is None or field is None or view.generation != request.generation:
             return None
-        if scene_view.loaded is not None and scene.plan is not None:
-            return ComparisonInputs(scene.plan.quality, scene_view.loaded, scene.plan, inpaint=scene.source.inpaint)
-        if scene_view.renderer.field.grid != scene.grid:
+        if view.loaded is not None and scene.plan is not None:
+            return ComparisonInputs(scene.plan.quality, view.loaded, scene.plan, inpaint=scene.source.inpaint)
+        if field.grid != scene.grid:
             return None
-        stored = self._passes.read_view(scene_view.renderer.field, *request.view)
+        stored = self._passes.read_view(field, *request.view)
         return None if stored is None else ComparisonInputs(DEFAULT_QUALITY, stored=stored)
 
     def take(self, result: ComparisonResult) -> list[Action]:
@@ -202,7 +188,7 @@ class InspectionView:
             view = divmod(i, field.grid.columns)
             upload = view, int(field.uploads[view])
             if is_new or (upload in there and upload not in self._on_sheet):
-                self._passes.draw_on_sheet(field, *view, _whole(cell), base.exposure)
+                self._passes.draw_on_sheet(field, *view, whole_pixels(cell), base.exposure)
         self._on_sheet = there
         self._drawn["sheet"] = (record, there), name
         return name
@@ -213,12 +199,10 @@ class InspectionView:
         assert layout.frame_px is not None
         size_px, part = layout.frame_px.size, layout.part
         kind, optics = state.inspection.overlay, state.optics
-        row, column = view_near(optics.eye, field.grid)
-        view: ViewIndex = tuple(nearest_present(field.present)[row, column].tolist())
+        view: ViewIndex = tuple(nearest_present(field.present)[view_near(optics.eye, field.grid)].tolist())
         if kind is None or not field.has_disparity[view] or (kind != "disparity" and field.grid != scene.grid):
             return None
-        values: NDArray[np.uint8] | None = None
-        looked_up = None
+        values, looked_up = None, None
         if kind == "inpainted":
             values = self._mask_of(view, field)
         elif kind == "entropy":
@@ -299,8 +283,7 @@ class InspectionView:
         if scene.plan is None:
             return "stored view"
         eye = state.optics.eye
-        row, column = view_near(eye, scene.grid if field.grid == scene.grid else field.grid)
-        view: ViewIndex = tuple(nearest_present(field.present)[row, column].tolist())
+        view: ViewIndex = tuple(nearest_present(field.present)[view_near(eye, field.grid)].tolist())
         packed = self._inpainted.get(view)
         if packed is not None and hover.disparity is not None:
             t, s = scene.grid.offset(*view)
@@ -314,8 +297,3 @@ class InspectionView:
 def _comparison_of(request: InspectionRequest) -> Comparison:
     assert request.kind != "entropy"  # the kept state is compared without a request
     return request.kind
-
-
-def _whole(cell: Rect) -> PixelRect:
-    left, top = round(cell.x), round(cell.y)
-    return PixelRect(left, top, max(round(cell.x + cell.width) - left, 1), max(round(cell.y + cell.height) - top, 1))

@@ -158,6 +158,12 @@ class Layout:
         return PixelRect(x, y, max(width, 1), max(height, 1))
 
 
+def whole_pixels(rect: Rect) -> PixelRect:
+    """A rectangle in pixels, rounded so that neighbours still touch, at least one pixel each way."""
+    left, top = round(rect.x), round(rect.y)
+    return PixelRect(left, top, max(round(rect.x + rect.width) - left, 1), max(round(rect.y + rect.height) - top, 1))
+
+
 def layout_of(
     window_size: ScreenSize,
     picture_size: ScreenSize | None,
