@@ -19,9 +19,7 @@ class Stages:
     refill_between_surfaces: bool = True
     """Lone disparities between two surfaces are filled anew by what looks like them."""
     label_edge_bands: bool = True
-    """Pixels beside a depth edge go to the side whose colours they have."""
-    dilate_foreground: bool = True
-    """Foregrounds grow over boundaries that are defocused in the photo."""
+    """Pixels beside a depth edge, or a defocused boundary, go to the side whose colours they have."""
     extrapolate_beyond_frame: bool = True
     """The photo is continued beyond its frame, once for all views."""
     lines_beyond_frame: bool = True

@@ -24,7 +24,6 @@ CASES = {
     "fit_to_blur": "soft",
     "refill_between_surfaces": "resampled",
     "label_edge_bands": "resampled",
-    "dilate_foreground": "defocused",
     "connect_slopes": "slope",
 }
 """Of those that an exact map of a drawn scene does not need."""
@@ -40,11 +39,6 @@ def scene(case: str) -> tuple[FloatImage, FloatImage]:
         return photo, blur(exact, 2.0)
     if case == "resampled":
         return photo, resampled(exact)
-    if case == "defocused":
-        disc = np.hypot(*(np.indices(SIZE) - np.array(SIZE)[:, None, None] / 2)) < 24
-        share = cv2.GaussianBlur(disc.astype(np.float32), (0, 0), 2.5)[..., None]
-        photo = (np.float32([0.9, 0.2, 0.1]) * share + np.float32([0.1, 0.3, 0.8]) * (1 - share)).astype(np.float32)
-        return photo, resampled(np.where(disc, np.float32(4.0), np.float32(0.0)))
     return photo, exact
 
 

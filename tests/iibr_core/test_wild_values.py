@@ -21,7 +21,7 @@ from benchmarks import plucker
 from iibr_core import color
 from iibr_core.depth import pictorial_cues, scaling, search, subject
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.edges import blur_fit, edge_blur, refine, rim_sides, rims, soft_outlines
+from iibr_core.depth.edges import blur_fit, edge_blur, edge_labels, refine, rims
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
@@ -328,18 +328,14 @@ FINITE = {
         blur_fit.fit_to_blur(image(v), depths(1.0), depths(0.5), soft_cells(), 0.1),
         blur_fit.fit_to_blur(image(0.5), np.nan_to_num(depths(v)), np.nan_to_num(depths(v)), soft_cells(), 0.1),
     ],
-    "depth.edges.soft_outlines.widen_fronts": lambda v, _: [
-        soft_outlines.widen_fronts(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, never),
-        soft_outlines.widen_fronts(image(v), mixed_between_surfaces(), 0.5, never),
-    ],
     "depth.edges.rims.settle_rims": lambda v, _: [
         rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),
         rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
     ],
-    "depth.edges.rim_sides.step_distance": lambda v, _: rim_sides.step_distance(depths(v), 0.5),
-    "depth.edges.rim_sides.choose_sides": lambda v, _: [
-        rim_sides.choose_sides(scene()[0].pixels, np.nan_to_num(known(v)), np.isnan(known(v)), 0.5, never),
-        rim_sides.choose_sides(image(v), mixed_between_surfaces(), np.ones(SIZE, np.bool_), 0.5, never),
+    "depth.edges.edge_labels.step_distance": lambda v, _: edge_labels.step_distance(depths(v), 0.5),
+    "depth.edges.edge_labels.label_edges": lambda v, _: [
+        edge_labels.label_edges(scene()[0].pixels, np.nan_to_num(known(v)), np.isnan(known(v)), 0.5, never),
+        edge_labels.label_edges(image(v), mixed_between_surfaces(), np.ones(SIZE, np.bool_), 0.5, never),
     ],
     "depth.edges.refine.refine": lambda v, _: [
         refine.refine(image(0.5), depths(v)),

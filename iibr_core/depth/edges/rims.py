@@ -1,7 +1,7 @@
-"""Rims: in the few pixels beside a depth edge maps err, and the photo's colours tell which side a pixel belongs to.
+"""Edge bands: beside a depth edge maps err, and the photo's colours tell which side a pixel belongs to.
 
-What is left of the front on the back's disparity stays behind as a ghost when the view moves, and disparities between
-both fly about alone. Where colours do not tell the sides apart nothing changes.
+What is left of the foreground on the background's disparity stays behind as a ghost when the view moves, and
+disparities between both appear detached. Where colours do not distinguish the sides nothing changes.
 """
 
 from __future__ import annotations
@@ -9,14 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.edges.rim_sides import RIM_PX, choose_sides, step_distance
-from iibr_core.depth.edges.soft_outlines import widen_fronts
+from iibr_core.depth.edges.edge_labels import label_edges, step_distance
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, image_size
 
+RIM_PX = 2
+"""Disparities between surfaces are counted among pixels with fewer others between them and a step."""
 PLATEAU_SHARE = 0.15
 """A pixel clearly lies between two surfaces if each changes by at most this share of their distance ..."""
 PLATEAU_PX = 2
@@ -26,15 +27,13 @@ MIXED = (0.1, 0.8)
 MIXED_EDGES = 5.0
 """Times the least edge: what lies between nearer surfaces may be a slope."""
 LEAST_MEASURED = 0.025
-"""A map of whose rims a smaller share is clearly between two surfaces, or unknown, is exact: nothing is changed."""
+"""A map of whose rims a smaller share is clearly between two surfaces has none such: they are wires, or slopes."""
 LEAST_LEFT = 0.022
-"""A sharpened map of whose rims a smaller share is still between two surfaces, lost its blur: nothing is changed."""
+"""A sharpened map of whose rims a smaller share is still between two surfaces, lost its blur: likewise."""
 MOST_CLEAR_FELLOWS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_FELLOWS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
-OUTLINE_EDGES = 3.0
-"""Times the least edge: fronts that stand out by more have soft outlines."""
 CROWD_PX = 5
 CROWDED = 0.3
 """Where steps are at so large a share of the pixels within CROWD_PX, as in meshes, a lone value may be a wire's."""
@@ -54,30 +53,21 @@ def settle_rims(
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
     soft: (H, W), where the map was soft before it was sharpened; None: nowhere. stages: that are on.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
-    all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then pixels of
-    rims change sides where the colours say so, and fronts grow over outlines that are soft in the photo. An exact map,
-    which has neither such disparities nor unknown ones in its rims, comes back as it is; so does one that was soft in
-    places, unless sharpening has left disparities between surfaces there. Raises Cancelled once should_stop is true.
+    all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then pixels
+    change sides where the colours say so (`label_edges`). Raises Cancelled once should_stop is true.
     """
     colors = np.ascontiguousarray(photo, np.float32)
-    rim = step_distance(values, least_edge) < RIM_PX
+    rim = step_distance(values, least_edge, RIM_PX, counts_slopes=True) < RIM_PX
     between, clear = _find_between(values, least_edge, should_stop)
-    least = LEAST_MEASURED * np.count_nonzero(rim)
-    is_exact = clear <= least and np.count_nonzero(unknown & rim) <= least
+    is_measured = clear > LEAST_MEASURED * np.count_nonzero(rim)
     is_left = soft is not None and np.count_nonzero(between & soft) > LEAST_LEFT * np.count_nonzero(rim & soft)
-    if is_exact and not is_left:
-        return values
-    settled = values
-    if stages.refill_between_surfaces and (clear > least or is_left):
+    unsure, filled = unknown, values
+    if (is_measured or is_left) and stages.refill_between_surfaces:
         between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
-        known = np.where(between | unknown, np.float32(np.nan), values)
-        settled = fill_disparity_by_color(colors, known, should_stop)
-    if stages.label_edge_bands:
-        settled = choose_sides(colors, settled, between | unknown, least_edge, should_stop)
-    if stages.dilate_foreground:
-        settled = widen_fronts(colors, settled, OUTLINE_EDGES * least_edge, should_stop)
-    # Where the map was not soft, it is exact.
-    return settled if soft is None or not is_exact else np.where(soft, settled, values)
+        # Where a map was not soft that has its disparities between surfaces from softness alone, it is exact.
+        unsure = between | unknown if is_measured or soft is None else (between & soft) | unknown
+        filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values), should_stop)
+    return label_edges(colors, filled, unsure, least_edge, should_stop) if stages.label_edge_bands else filled
 
 
 def _find_between(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> tuple[NDArray[np.bool_], int]:

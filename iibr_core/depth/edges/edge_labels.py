@@ -1,0 +1,341 @@
+"""Which of two surfaces each pixel of an edge band shows: a conditional random field along the depth edges of any map.
+
+A pixel stays on its own surface or takes the nearest other one. Three things count: where the map has it, whose colours
+it has (a kernel density of those around, on either side; mixed colours are the foreground's), and where the neighbours
+are that look like it. How far the map is wrong is measured on the map itself, by how often colours contradict it: in
+front of its edges and behind them, pixel by pixel. So exact maps keep their edges, and dilated, eroded, ragged and
+coarse ones get those of the photo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from math import ceil, exp, log, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.inpainting.disparity_by_color import nearness
+from iibr_core.inpainting.nearest_known import number_pixels
+from iibr_core.runtime import tiling
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
+from iibr_core.types import FloatImage
+
+BAND_PX = 4
+"""Pixels with fewer others between them and a step are labelled; those with as many tell how often colours mislead."""
+SLOPE = 0.25
+"""Of a step, which goes on by so much before and after it, that it is a slope's."""
+REACH_PX, STRIDE_PX, SPREAD_PX = 8, 2, 4.0
+"""Every second pixel within so many, each way, tells both surfaces' colours; standard deviation of their weights by
+distance.
+"""
+NEARNESS = nearness(REACH_PX, SPREAD_PX).astype(np.float32)
+NEARNESS[REACH_PX, REACH_PX] = 0
+"""Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1); the pixel itself, in the middle, tells nothing."""
+TRUST = np.append(np.geomspace(0.1, 1.0, BAND_PX + 1), 1.0).astype(np.float32)
+"""Their weights by how many pixels lie between them and a step: nearer ones are mixed, or on the wrong side."""
+FILLED_TRUST = np.float32(0.2)
+"""Of pixels that were unknown, besides."""
+LIKENESS_STEPS = 64
+LIKENESS = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKENESS_STEPS), 0).astype(np.float32)
+"""Likeness by squared distance of colours, in such steps of a variance, 0 from the last one on."""
+LEAST_WEIGHT = 0.05
+"""Weight of all pixels of a surface together, below which its colours are not known."""
+ALIKE, LIKE_NEIGHBOUR = 0.5, 0.6
+"""Standard deviations of likeness, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
+UNLIKE, UNSEEN_WEIGHT = 0.03, 0.3
+"""Likelihood of a colour that nothing on a surface has; weight of that possibility against what was seen."""
+LEAST_SHARE = 0.05
+"""Of the foreground, from which a mixed pixel is its own, if that is more than a deviation of the background's colours;
+left behind, it would be a ghost, and tint what is filled beside it.
+"""
+COHESION = 1.2
+"""How much a neighbour on the same surface counts, in units of log likelihood."""
+UNLIKE_NEIGHBOUR, DIAGONAL = 0.1, 0.7
+"""Share of that for neighbours that do not look alike; factor for diagonal ones."""
+CLEAR = 1.5
+"""Log likelihood ratio from which colours are clear."""
+LEAST_CLEAR = 0.15
+"""Share of the pixels beside steps whose colours must be clear to tell of the map: both sides of a slope look alike."""
+MIXED = (0.1, 0.25)
+"""Share of the pixels just behind and just in front of exact steps whose colours contradict the map: they are mixed."""
+WRONG = (0.02, 0.9)
+"""Least and largest share of pixels that a map is taken to have on the wrong side."""
+MOST_MISLED = 0.2
+"""Where colours contradict the map inside surfaces in a larger share of what they do beside steps, they tell shade from
+light rather than surfaces.
+"""
+EXACT = 0.1
+"""Where it has a smaller share there everywhere, it stays as it is."""
+RELUCTANCE = 1.5
+"""How much the map counts: factor of the log odds of its being right."""
+SURE = 4.0
+"""Log odds of colours' being right inside surfaces, from which they count in full."""
+MEASURED_PIXELS = 1 << 14
+"""Of the band, at most, tell how far the map is wrong."""
+PASSES = 8
+"""Of mean field (Kraehenbuehl and Koltun 2011)."""
+MOST_PIECE_PIXELS = 1 << 12
+
+
+def label_edges(
+    colors: FloatImage, values: FloatImage, unknown: NDArray[np.bool_], least_edge: float, should_stop: ShouldStop
+) -> FloatImage:
+    """The map (H, W), every pixel beside a step (larger than least_edge) on the side that the photo (H, W, 3) shows.
+
+    unknown: (H, W), where the map says nothing by itself. Outside the band its bits stay, and everywhere where colours
+    contradict the map beside steps no more often than an exact one. Raises Cancelled once should_stop is true.
+    """
+    distance = step_distance(values, least_edge)
+    pixels = np.flatnonzero(distance <= BAND_PX)
+    if not len(pixels):
+        return values
+    contrast = _mean_color_step(colors, pixels)
+    trust = TRUST[distance] * np.where(unknown, FILLED_TRUST, np.float32(1))
+    weigh = partial(_weigh_colors, colors, values, trust, least_edge, ALIKE * contrast)
+    away, own, known = distance.reshape(-1), values.reshape(-1), ~unknown.reshape(-1)
+    few = pixels[:: ceil(len(pixels) / MEASURED_PIXELS)]
+    weighed = _in_parts(weigh, few, should_stop)
+    wrong, sureness = _measure_errors(weighed, own[few], away[few], known[few])
+    if wrong.max() <= EXACT:
+        return values
+    other, evidence = weighed if len(few) == len(pixels) else _in_parts(weigh, pixels, should_stop)
+    away, own, known = away[pixels], own[pixels], known[pixels]
+    odds = np.float32(RELUCTANCE) * np.log((1 - wrong) / wrong)
+    prior = np.where(known, odds[(own > other).astype(np.intp), away], np.float32(0))
+    # The farthest pixels only look on.
+    looks_on = (other == own) | (known & (away == BAND_PX))
+    drive = np.where(looks_on, np.float32(np.inf), np.float32(sureness) * evidence + prior)
+    belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
+    labelled = values.copy()
+    labelled.reshape(-1)[pixels] = np.where(belief < 0.5, other, own)
+    return labelled
+
+
+def step_distance(
+    values: FloatImage, least_edge: float, reach_px: int = BAND_PX, counts_slopes: bool = False
+) -> NDArray[np.uint8]:
+    """(H, W): how many pixels lie between each and the nearest step larger than least_edge; at most reach_px + 1.
+
+    counts_slopes: whether a step counts that goes on before and after it.
+    """
+    distance = np.full(values.shape, reach_px + 1, np.uint8)
+    _measure_distance(values, least_edge, reach_px, counts_slopes, distance)
+    return distance
+
+
+def _mean_color_step(colors: FloatImage, pixels: NDArray[np.int64]) -> float:
+    """Root mean square distance of these pixels' colours (flat indices) from those of the pixels after them."""
+    flat = colors.reshape(-1, 3)
+    steps = flat[pixels] - flat[np.minimum(pixels + 1, len(flat) - 1)]
+    return max(float(np.sqrt(np.nanmean(np.square(steps, dtype=np.float64).sum(axis=1)))), 1e-3)
+
+
+def _in_parts(
+    weigh: Callable[[NDArray[np.int64]], tuple[FloatImage, FloatImage]],
+    pixels: NDArray[np.int64],
+    should_stop: ShouldStop,
+) -> tuple[FloatImage, FloatImage]:
+    """What `_weigh_colors` says of pixels (N, flat indices)."""
+    parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
+    weighed = in_pieces(weigh, parts, should_stop, tiling.THREADS)
+    return np.concatenate([pair[0] for pair in weighed]), np.concatenate([pair[1] for pair in weighed])
+
+
+def _measure_errors(
+    weighed: tuple[FloatImage, FloatImage], own: FloatImage, away: NDArray[np.uint8], known: NDArray[np.bool_]
+) -> tuple[FloatImage, float]:
+    """(2, BAND_PX + 1): the share of pixels that a map has on the wrong side, behind and in front of a step, by how
+    many pixels lie between; and how much colours count, 0..1.
+    """
+    other, evidence = weighed
+    clear, in_front = known & (np.abs(evidence) > CLEAR), own > other
+    wrong = np.empty((2, BAND_PX + 1), np.float32)
+    for side in range(2):
+        misled = _contradicted(evidence[clear & (in_front == side) & (away == BAND_PX)])
+        for k in range(BAND_PX + 1):
+            by_chance = max(misled, MIXED[side]) if k == 0 else misled
+            here = (in_front == side) & (away == k)
+            contradicted = _contradicted(evidence[clear & here], misled)
+            is_told = np.count_nonzero(clear & here) >= LEAST_CLEAR * np.count_nonzero(known & here)
+            tells = is_told and misled <= MOST_MISLED * contradicted
+            wrong[side, k] = (contradicted - by_chance) / max(1 - misled - by_chance, 0.1) if tells else 0.0
+    misled = _contradicted(evidence[clear & (away == BAND_PX)])
+    return np.clip(wrong, *WRONG), min(max(log((1 - misled) / misled) / SURE, 0.0), 1.0)
+
+
+def _contradicted(evidence: FloatImage, expected: float = 0.05) -> float:
+    """Share of these pixels whose colours speak against the map; few pixels leave it near what is expected."""
+    return (np.count_nonzero(evidence < 0) + 20 * expected) / (len(evidence) + 20)
+
+
+def _mean_field(
+    colors: FloatImage,
+    values: FloatImage,
+    pixels: NDArray[np.int64],
+    other: FloatImage,
+    drive: FloatImage,
+    alike: float,
+    should_stop: ShouldStop,
+) -> FloatImage:
+    """(N): how likely each pixel (flat index) is on its own surface rather than on the other."""
+    number = np.empty(values.shape, np.int32)
+    number_pixels(pixels, number)
+    belief = np.ones(len(pixels), np.float32)
+    firsts = range(0, len(pixels), MOST_PIECE_PIXELS)
+    for _ in range(PASSES):
+        believed, belief = belief, np.empty_like(belief)
+        work = partial(_believe, colors, values, pixels, number, other, drive, alike, believed, belief)
+        in_pieces(work, firsts, should_stop, tiling.THREADS)
+    return belief
+
+
+@kernel
+def _is_slope(values, y, x, v, u, step):
+    """Whether the map rises or falls likewise before a pixel (y, x) and after the next one (v, u)."""
+    height, width = values.shape
+    above, left, below, right = 2 * y - v, 2 * x - u, 2 * v - y, 2 * u - x
+    # The border hides one of both.
+    before = values[y, x] - values[above, left] if above >= 0 and left >= 0 else step
+    after = values[below, right] - values[v, u] if below < height and right < width else step
+    least = SLOPE * abs(step)
+    return before * step > 0 and after * step > 0 and min(abs(before), abs(after)) >= least
+
+
+@kernel
+def _measure_distance(values, least_edge, reach, counts_slopes, distance):
+    """What `step_distance` returns, where that is less than distance (H, W) has."""
+    height, width = values.shape
+    for y in range(height):
+        for x in range(width):
+            for v, u in ((y, min(x + 1, width - 1)), (min(y + 1, height - 1), x)):
+                step = values[v, u] - values[y, x]
+                if not abs(step) > least_edge or (not counts_slopes and _is_slope(values, y, x, v, u, step)):
+                    continue
+                for j in range(max(y - reach, 0), min(v + reach + 1, height)):
+                    for i in range(max(x - reach, 0), min(u + reach + 1, width)):
+                        away = np.uint8(max(y - j, j - v, x - i, i - u, 0))
+                        distance[j, i] = min(distance[j, i], away)
+
+
+@kernel
+def _nearest_other(values, y, x, least_edge):
+    """The disparity of the nearest pixel on another surface; the pixel's own where there is none within reach."""
+    height, width = values.shape
+    found, nearest = values[y, x], 2 * (BAND_PX + 1) ** 2 + 1
+    for v in range(max(y - BAND_PX - 1, 0), min(y + BAND_PX + 2, height)):
+        for u in range(max(x - BAND_PX - 1, 0), min(x + BAND_PX + 2, width)):
+            away = (v - y) ** 2 + (u - x) ** 2
+            if away < nearest and abs(values[v, u] - values[y, x]) > least_edge:
+                found, nearest = values[v, u], away
+    return found
+
+
+@kernel
+def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
+    """Of pixels (N, flat indices): the disparity of the other surface (N), and what the colours say (N): the log of
+    the likelihood that the pixel is on its own surface over that of the other. Without another, its own and 0.
+    trust (H, W): how much each pixel tells.
+    """
+    height, width = values.shape
+    others, evidence = np.empty(len(pixels), np.float32), np.zeros(len(pixels), np.float32)
+    # Of its own surface and of the other: weight, likeness, sum of colours, sum of their squares.
+    weight, like, total, squares = np.empty(2), np.empty(2), np.empty((2, 3)), np.empty(2)
+    steps, most = np.float32(LIKENESS_STEPS / (alike * alike)), np.float32(len(LIKENESS) - 1)
+    for n in range(len(pixels)):
+        y, x = pixels[n] // width, pixels[n] % width
+        own, other = values[y, x], _nearest_other(values, y, x, least_edge)
+        others[n] = own
+        if other == own:
+            continue
+        half, disparity = 0.5 * abs(other - own), 0.0
+        weight[:], like[:], total[:], squares[:] = 0.0, 0.0, 0.0, 0.0
+        for v in range(y - min(y, REACH_PX) // STRIDE_PX * STRIDE_PX, min(y + REACH_PX + 1, height), STRIDE_PX):
+            for u in range(x - min(x, REACH_PX) // STRIDE_PX * STRIDE_PX, min(x + REACH_PX + 1, width), STRIDE_PX):
+                to_own, to_other = abs(values[v, u] - own), abs(values[v, u] - other)
+                # A third surface, or none.
+                if not min(to_own, to_other) <= half:
+                    continue
+                side = 0 if to_own <= to_other else 1
+                w = NEARNESS[v - y + REACH_PX, u - x + REACH_PX] * trust[v, u]
+                apart = np.float32(0.0)
+                for c in range(3):
+                    color = colors[v, u, c]
+                    apart += (color - colors[y, x, c]) ** 2
+                    total[side, c] += w * color
+                    squares[side] += w * color * color
+                # Colours that are not finite are like no other.
+                at = apart * steps
+                weight[side] += w
+                like[side] += w * LIKENESS[int(at if at < most else most)]
+                disparity += side * w * (values[v, u] - other)
+        if not weight[1] > LEAST_WEIGHT:
+            continue
+        others[n] = other + disparity / weight[1]
+        back = 0 if other > own else 1
+        for side in range(2):
+            like[side] = (like[side] + UNSEEN_WEIGHT * UNLIKE) / (weight[side] + UNSEEN_WEIGHT)
+        if weight[0] > 0:
+            mixed = _mixed_likelihood(colors[y, x], weight, total, squares[back], back, alike)
+            like[1 - back] = max(like[1 - back], mixed)
+        evidence[n] = log((like[0] + UNLIKE) / (like[1] + UNLIKE))
+    return others, evidence
+
+
+@kernel
+def _mixed_likelihood(color, weight, total, back_squares, back, alike):
+    """How likely a colour is a mixture of both surfaces' mean colours, by all shares alike; 0 where the foreground's
+    share is too little. weight (2), total (2, 3): see `_weigh_colors`; back: which of both is the background.
+    """
+    contrast = along = away = 0.0
+    spread = back_squares / weight[back]
+    for c in range(3):
+        behind = total[back, c] / weight[back]
+        way, off = total[1 - back, c] / weight[1 - back] - behind, color[c] - behind
+        contrast, along, away = contrast + way * way, along + way * off, away + off * off
+        spread -= behind * behind
+    # Colours that are not finite fail the comparison.
+    if not contrast > 1e-9:
+        return 0.0
+    share = along / contrast
+    if not max(LEAST_SHARE, sqrt(max(spread, 0.0) / contrast)) < share < 1.0:
+        return 0.0
+    aside = max(away - along * share, 0.0)
+    return exp(-0.5 * aside / (alike * alike)) * min(sqrt(2.0 * np.pi / contrast) * alike, 1.0)
+
+
+@kernel
+def _believe(colors, values, pixels, number, other, drive, alike, believed, belief, first):
+    """One pass of mean field over MOST_PIECE_PIXELS pixels from the first on: their belief by the neighbours'."""
+    height, width = values.shape
+    for n in range(first, min(first + MOST_PIECE_PIXELS, len(pixels))):
+        y, x = pixels[n] // width, pixels[n] % width
+        own, half = values[y, x], 0.5 * abs(other[n] - values[y, x])
+        belief[n] = 1.0
+        if half == 0:
+            continue
+        total = np.float64(drive[n])
+        for v in range(max(y - 1, 0), min(y + 2, height)):
+            for u in range(max(x - 1, 0), min(x + 2, width)):
+                if v == y and u == x:
+                    continue
+                # On its own surface a neighbour votes for whichever of both that is, on its other one likewise.
+                k = number[v, u]
+                stays, elsewhere = (float(believed[k]), other[k]) if k >= 0 else (1.0, values[v, u])
+                votes = 0.0
+                if abs(values[v, u] - own) <= half:
+                    votes += stays
+                elif abs(values[v, u] - other[n]) <= half:
+                    votes -= stays
+                if abs(elsewhere - own) <= half:
+                    votes += 1.0 - stays
+                elif abs(elsewhere - other[n]) <= half:
+                    votes -= 1.0 - stays
+                apart = np.float32(0.0)
+                for c in range(3):
+                    apart += (colors[v, u, c] - colors[y, x, c]) ** 2
+                like = exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
+                total += COHESION * (like + UNLIKE_NEIGHBOUR) * (1.0 if v == y or u == x else DIAGONAL) * votes
+        belief[n] = 1.0 / (1.0 + exp(-min(max(total, -30.0), 30.0)))

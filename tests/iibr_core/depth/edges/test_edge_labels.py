@@ -1,0 +1,275 @@
+"""Labels of edge bands against a slow, obvious twin of the random field; and what it must leave alone."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from iibr_core.depth.edges import edge_labels
+from iibr_core.depth.edges.edge_labels import label_edges
+from iibr_core.runtime.tiling import Cancelled, never
+from tests.iibr_core.scenes import smooth_texture
+
+EDGE, NEAR, FAR = 0.3, 5.0, 1.0
+
+
+def dilated_square(size=26):
+    """A square before a wall, textures of different brightness; its map, one pixel too large, with a few unknown."""
+    rng = np.random.default_rng(3)
+    truth = np.full((size, size), FAR, np.float32)
+    truth[8:18, 8:18] = NEAR
+    photo = 0.25 * smooth_texture(size, size) + np.where(truth == NEAR, 0.55, 0.1)[..., None].astype(np.float32)
+    given = ndimage.maximum_filter(truth, 3)
+    unknown = rng.random(truth.shape) < 0.03
+    return photo + rng.normal(0, 0.01, photo.shape).astype(np.float32), given, unknown, truth
+
+
+def around(values, y, x, reach):
+    height, width = values.shape
+    for v in range(max(y - reach, 0), min(y + reach + 1, height)):
+        for u in range(max(x - reach, 0), min(x + reach + 1, width)):
+            if (v, u) != (y, x):
+                yield v, u
+
+
+def slow_distance(values):
+    height, width = values.shape
+    steps = [((y, x), (y, x + 1)) for y in range(height) for x in range(width - 1)]
+    steps += [((y, x), (y + 1, x)) for y in range(height - 1) for x in range(width)]
+    beside = [p for pair in steps if abs(values[pair[0]] - values[pair[1]]) > EDGE for p in pair]
+    away = [[min(max(abs(y - v), abs(x - u)) for v, u in beside) for x in range(width)] for y in range(height)]
+    return np.minimum(away, edge_labels.BAND_PX + 1)
+
+
+def slow_mixed(color, colors, weights, behind, alike):
+    """colors, weights: two lists each, of its own surface and the other; behind: which of both is the background."""
+    back, front = (np.average(colors[side], axis=0, weights=weights[side]) for side in (behind, 1 - behind))
+    way = front - back
+    share = (color - back) @ way / (way @ way)
+    spread = np.average(np.sum((np.array(colors[behind]) - back) ** 2, axis=1), weights=weights[behind])
+    if not max(edge_labels.LEAST_SHARE, np.sqrt(spread / (way @ way))) < share < 1:
+        return 0.0
+    aside = np.sum((color - back - share * way) ** 2)
+    return np.exp(-aside / (2 * alike**2)) * min(np.sqrt(2 * np.pi) * alike / np.linalg.norm(way), 1)
+
+
+def slow_weigh(colors, values, unknown, distance, y, x, alike):
+    own = float(values[y, x])
+    others = [p for p in around(values, y, x, edge_labels.BAND_PX + 1) if abs(values[p] - own) > EDGE]
+    if not others:
+        return own, 0.0
+    other = float(values[min(others, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)])
+    weights, seen, likes, disparity = ([], []), ([], []), [0.0, 0.0], 0.0
+    for p in around(values, y, x, edge_labels.REACH_PX):
+        apart = abs(values[p] - own), abs(values[p] - other)
+        if (p[0] - y) % 2 or (p[1] - x) % 2 or min(apart) > 0.5 * abs(other - own):
+            continue
+        side = 0 if apart[0] <= apart[1] else 1
+        w = np.exp(-((p[0] - y) ** 2 + (p[1] - x) ** 2) / (2 * edge_labels.SPREAD_PX**2))
+        w *= edge_labels.TRUST[distance[p]] * (edge_labels.FILLED_TRUST if unknown[p] else 1)
+        weights[side].append(w)
+        seen[side].append(colors[p].astype(np.float64))
+        likes[side] += w * np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2))
+        disparity += side * w * values[p]
+    if sum(weights[1]) <= edge_labels.LEAST_WEIGHT:
+        return own, 0.0
+    unseen, unlike, behind = edge_labels.UNSEEN_WEIGHT, edge_labels.UNLIKE, 0 if other > own else 1
+    on = [(like + unseen * unlike) / (sum(weight) + unseen) for like, weight in zip(likes, weights, strict=True)]
+    if weights[0]:
+        on[1 - behind] = max(on[1 - behind], slow_mixed(colors[y, x], seen, weights, behind, alike))
+    return disparity / sum(weights[1]), np.log((on[0] + unlike) / (on[1] + unlike))
+
+
+def slow_pass(colors, values, other, drive, alike, believed):
+    belief = np.ones(values.shape)
+    for y, x in np.argwhere(other != values):
+        half = 0.5 * abs(other[y, x] - values[y, x])
+
+        def says(d, y=y, x=x, half=half):
+            return 1 if abs(d - values[y, x]) <= half else -1 if abs(d - other[y, x]) <= half else 0
+
+        total = drive[y, x]
+        for p in around(values, y, x, 1):
+            like = np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2)) + edge_labels.UNLIKE_NEIGHBOUR
+            straight = 1 if p[0] == y or p[1] == x else edge_labels.DIAGONAL
+            votes = believed[p] * says(values[p]) + (1 - believed[p]) * says(other[p])
+            total += edge_labels.COHESION * straight * like * votes
+        belief[y, x] = 1 / (1 + np.exp(-np.clip(total, -30, 30)))
+    return belief
+
+
+def slow_errors(evidence, side, distance, known):
+    """By (in front?, distance), and how much colours count."""
+
+    def contradicted(*where, expected=0.05):
+        clear = evidence[np.logical_and.reduce([known, np.abs(evidence) > edge_labels.CLEAR, *where])]
+        return ((clear < 0).sum() + 20 * expected) / (len(clear) + 20)
+
+    wrong, far = {}, edge_labels.BAND_PX
+    for s in (0, 1):
+        misled = contradicted(side == s, distance == far)
+        for k in range(far + 1):
+            chance = max(misled, edge_labels.MIXED[s] if k == 0 else 0)
+            share = contradicted(side == s, distance == k, expected=misled)
+            here = known & (side == s) & (distance == k)
+            is_told = (np.abs(evidence[here]) > edge_labels.CLEAR).mean() >= edge_labels.LEAST_CLEAR
+            share = share - chance if is_told and misled <= edge_labels.MOST_MISLED * share else 0
+            wrong[s, k] = np.clip(share / max(1 - misled - chance, 0.1), *edge_labels.WRONG)
+    misled = contradicted(distance == far)
+    return wrong, np.clip(np.log((1 - misled) / misled) / edge_labels.SURE, 0, 1)
+
+
+def slow_labels(colors, values, unknown):
+    distance = slow_distance(values)
+    band = distance <= edge_labels.BAND_PX
+    contrast = edge_labels._mean_color_step(colors, np.flatnonzero(band))
+    other, evidence = values.astype(np.float64), np.zeros(values.shape)
+    for y, x in np.argwhere(band):
+        other[y, x], evidence[y, x] = slow_weigh(colors, values, unknown, distance, y, x, edge_labels.ALIKE * contrast)
+    side = (values > other).astype(int)
+    wrong, sureness = slow_errors(evidence, side, distance, ~unknown & band)
+    odds = {at: edge_labels.RELUCTANCE * np.log((1 - share) / share) for at, share in wrong.items()}
+    drive = np.full(values.shape, np.inf)
+    for p in map(tuple, np.argwhere(band & (other != values) & (unknown | (distance < edge_labels.BAND_PX)))):
+        drive[p] = sureness * evidence[p] + (0 if unknown[p] else odds[side[p], distance[p]])
+    belief = np.ones(values.shape)
+    for _ in range(edge_labels.PASSES):
+        belief = slow_pass(colors, values, other, drive, edge_labels.LIKE_NEIGHBOUR * contrast, belief)
+    return np.where(belief < 0.5, other, values).astype(np.float32)
+
+
+def test_labels_are_those_of_the_slow_field_and_of_the_truth():
+    photo, given, unknown, truth = dilated_square()
+    labelled = label_edges(photo, given, unknown, EDGE, never)
+    np.testing.assert_allclose(labelled, slow_labels(photo, given, unknown), atol=1e-4)
+    assert (np.abs(given - truth) > 1).sum() == 44
+    assert (np.abs(labelled - truth) > 1).sum() <= 4
+
+
+def test_a_pass_of_the_field_is_the_slow_one():
+    """Beliefs, sides and drives at random: every neighbour's vote counts, for whichever surface, straight or not."""
+    photo, given, _, _ = dilated_square()
+    rng = np.random.default_rng(7)
+    values = rng.choice(np.float32([FAR, 3.0, NEAR]), given.shape)
+    other = np.where(rng.random(given.shape) < 0.6, rng.choice(np.float32([FAR, 3.0, NEAR]), given.shape), values)
+    drive, believed = rng.normal(0, 1, given.shape), rng.random(given.shape)
+    pixels = np.flatnonzero(other != values)
+    believed = np.where(other != values, believed, 1)
+    number = np.full(given.shape, -1, np.int32)
+    number.ravel()[pixels] = np.arange(len(pixels))
+    belief = np.empty(len(pixels), np.float32)
+    others, drives, beliefs = (np.float32(each.ravel()[pixels]) for each in (other, drive, believed))
+    edge_labels._believe(photo, values, pixels, number, others, drives, 0.2, beliefs, belief, 0)
+    expected = slow_pass(photo, values, other, drive, 0.2, believed)
+    np.testing.assert_allclose(belief, expected.ravel()[pixels], atol=1e-5)
+
+
+def test_an_outline_costs_as_much_along_rows_as_along_diagonals():
+    """A pixel of a straight one cuts one straight pair of neighbours and two diagonal ones; a step of a slanted one is
+    longer and cuts two of each.
+    """
+    straight, slanted = 1 + 2 * edge_labels.DIAGONAL, (2 + 2 * edge_labels.DIAGONAL) / np.sqrt(2)
+    assert straight == pytest.approx(slanted, rel=0.01)
+
+
+def square(kind, size=60):
+    """A square before a wall, its exact map and a worse one of this kind."""
+    photo, _, _, _ = dilated_square(size)
+    truth = np.full((size, size), FAR, np.float32)
+    truth[20:41, 20:41] = NEAR
+    photo = 0.25 * photo + np.where(truth == NEAR, 0.55, 0.1)[..., None].astype(np.float32)
+    given = {
+        "dilated": lambda: ndimage.maximum_filter(truth, 5),
+        "eroded": lambda: ndimage.minimum_filter(truth, 5),
+        "coarse": lambda: truth[1::3, 1::3].repeat(3, 0).repeat(3, 1),
+        "exact": lambda: truth,
+    }[kind]()
+    return photo, truth, np.ascontiguousarray(given)
+
+
+@pytest.mark.parametrize("kind", ["dilated", "eroded", "coarse"])
+def test_maps_that_are_wrong_beside_their_edges_get_those_of_the_photo(kind):
+    photo, truth, given = square(kind)
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    assert (np.abs(labelled - truth) > 1).sum() <= 0.1 * (np.abs(given - truth) > 1).sum()
+
+
+def test_exact_maps_keep_their_bits():
+    """Its edges mixed, as a lens and a sensor mix them, or not."""
+    photo, truth, _ = square("exact")
+    nothing = np.zeros(truth.shape, np.bool_)
+    assert label_edges(photo, truth, nothing, EDGE, never) is truth
+    mixed = ndimage.uniform_filter(photo, (2, 2, 1))
+    assert label_edges(mixed, truth, nothing, EDGE, never) is truth
+
+
+def test_a_wire_of_a_dilated_map_stays():
+    photo, truth, _ = square("exact")
+    truth[:, 50], photo[:, 50] = NEAR, (0.1, 0.6, 0.1)
+    given = ndimage.maximum_filter(truth, 3)
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    assert (labelled[:, 50] == NEAR).all()
+    assert (np.abs(labelled[:, [49, 51]] - FAR) < 1).mean() > 0.9
+
+
+def test_what_is_mixed_is_the_foregrounds_several_pixels_wide():
+    """Out of focus, its light reaches pixels that the map has behind it; a share of 0.05 is too little to be told."""
+    weight, total = np.ones(2), np.float64([[0.7, 0.75, 0.8], [0.2, 0.15, 0.1]])
+    squares = (total[0] ** 2).sum()
+
+    def likelihood(share, aside=0.0, back=0):
+        color = (1 - share) * total[back] + share * total[1 - back] + [0, 0, aside]
+        return edge_labels._mixed_likelihood(color, weight, total, (total[back] ** 2).sum(), back, 0.1)
+
+    expected = np.sqrt(2 * np.pi) * 0.1 / np.linalg.norm(total[1] - total[0])
+    assert [likelihood(share) for share in (0.1, 0.5, 0.95)] == pytest.approx([expected] * 3)
+    assert likelihood(0.04) == likelihood(1.02) == 0
+    assert likelihood(0.3, back=1) == pytest.approx(expected)
+    assert likelihood(0.5, aside=0.2) < 0.5 * expected
+    # Shares that the background's own colours have by chance tell nothing.
+    away = 0.2 * np.linalg.norm(total[1] - total[0])
+    color = 0.85 * total[0] + 0.15 * total[1]
+    assert edge_labels._mixed_likelihood(color, weight, total, squares + away**2, 0, 0.1) == 0
+
+
+def test_a_dilated_map_of_a_front_out_of_focus_keeps_what_is_mixed():
+    x = np.broadcast_to(np.arange(60), (60, 60))
+    share = np.clip(0.5 - (x - 29.5) / 4, 0, 1)[..., None]
+    photo = share * np.array([0.2, 0.15, 0.1]) + (1 - share) * np.array([0.7, 0.75, 0.8])
+    photo = (photo + np.random.default_rng(0).normal(0, 0.005, photo.shape)).astype(np.float32)
+    values = np.where(x < 34, NEAR, FAR).astype(np.float32)
+    labelled = label_edges(photo, values, np.zeros(values.shape, np.bool_), EDGE, never)
+    assert (labelled[2:-2, :31] == NEAR).all()
+    assert (labelled[2:-2, 32:] == FAR).all()
+
+
+def test_colours_that_are_not_finite_tell_nothing():
+    photo, truth, _ = square("exact")
+    photo[30, 10:50] = np.nan
+    labelled = label_edges(photo, truth, np.zeros(truth.shape, np.bool_), EDGE, never)
+    np.testing.assert_array_equal(labelled, truth)
+
+
+def test_outside_the_band_bits_stay():
+    photo, _, given = square("dilated")
+    given += np.random.default_rng(1).normal(0, 0.01, given.shape).astype(np.float32)
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    outside = edge_labels.step_distance(given, EDGE) > edge_labels.BAND_PX
+    np.testing.assert_array_equal(labelled[outside], given[outside])
+
+
+def test_shades_that_are_elsewhere_change_hardly_anything():
+    photo, _, unknown, truth = dilated_square()
+    shaded = np.roll(np.roll(photo, 3, axis=1), 3, axis=0)
+    assert (np.abs(label_edges(shaded, truth, unknown, EDGE, never) - truth) > 1).sum() <= 4
+
+
+def test_a_map_without_steps_stays_as_it_is():
+    photo, given, unknown, _ = dilated_square()
+    flat = np.ones_like(given)
+    assert label_edges(photo, flat, unknown, EDGE, never) is flat
+
+
+def test_a_stop_is_heard():
+    photo, given, unknown, _ = dilated_square()
+    with pytest.raises(Cancelled):
+        label_edges(photo, given, unknown, EDGE, lambda: True)
