@@ -43,6 +43,8 @@ LIKENESS = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKE
 """Likeness by squared distance of colours, in such steps of a variance, 0 from the last one on."""
 LEAST_WEIGHT = 0.05
 """Weight of all pixels of a surface together, below which its colours are not known."""
+LEAST_FOREGROUND = 0.7
+"""The same of foregrounds, below which they keep their pixels: they are a pixel thin."""
 ALIKE, LIKE_NEIGHBOUR = 0.5, 0.6
 """Standard deviations of likeness, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
 UNLIKE, UNSEEN_WEIGHT = 0.03, 0.3
@@ -271,7 +273,8 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
                 weight[side] += w
                 like[side] += w * LIKENESS[int(at if at < most else most)]
                 disparity += side * w * (values[v, u] - other)
-        if not weight[1] > LEAST_WEIGHT:
+        # A wire that the map has beside its place would be lost: nothing knows its colours.
+        if not weight[1] > LEAST_WEIGHT or (own > other and weight[0] < LEAST_FOREGROUND):
             continue
         others[n] = other + disparity / weight[1]
         back = 0 if other > own else 1

@@ -72,6 +72,8 @@ def slow_weigh(colors, values, unknown, distance, y, x, alike):
         disparity += side * w * values[p]
     if sum(weights[1]) <= edge_labels.LEAST_WEIGHT:
         return own, 0.0
+    if own > other and sum(weights[0]) < edge_labels.LEAST_FOREGROUND:
+        return own, 0.0
     unseen, unlike, behind = edge_labels.UNSEEN_WEIGHT, edge_labels.UNLIKE, 0 if other > own else 1
     on = [(like + unseen * unlike) / (sum(weight) + unseen) for like, weight in zip(likes, weights, strict=True)]
     if weights[0]:
@@ -208,7 +210,14 @@ def test_a_wire_of_a_dilated_map_stays():
     given = ndimage.maximum_filter(truth, 3)
     labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
     assert (labelled[:, 50] == NEAR).all()
-    assert (np.abs(labelled[:, [49, 51]] - FAR) < 1).mean() > 0.9
+
+
+def test_a_wire_beside_its_place_is_not_lost():
+    photo, truth, _ = square("exact")
+    given = ndimage.maximum_filter(truth, 3)
+    photo[:, 51], given[:, 50] = (0.1, 0.6, 0.1), NEAR
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    assert (labelled[:, 50] == NEAR).all()
 
 
 def test_what_is_mixed_is_the_foregrounds_several_pixels_wide():
