@@ -59,7 +59,7 @@ UNLIKE_NEIGHBOUR, DIAGONAL = 0.1, 0.7
 """Share of that for neighbours that do not look alike; factor for diagonal ones."""
 CLEAR = 1.5
 """Log likelihood ratio from which colours are clear."""
-LEAST_CLEAR = 0.15
+LEAST_CLEAR = 0.2
 """Share of the pixels beside steps whose colours must be clear to tell of the map: both sides of a slope look alike."""
 MIXED = (0.1, 0.25)
 """Share of the pixels just behind and just in front of exact steps whose colours contradict the map: they are mixed."""
