@@ -668,7 +668,8 @@ READS_OR_TELLS = {
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
     "require_dense_field "
-    "require_own_size require_free_views require_matching mebibytes Making making_bytes own_size_bytes bytes_of",
+    "require_own_size require_free_views require_matching mebibytes Making making_bytes own_size_bytes bytes_of "
+    "undecided_bytes ambiguous_bytes",
     "generation.plan_reasons": "grid_reason wild_reasons edge_reasons quality_reason",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands pieces_of",
