@@ -102,7 +102,7 @@ def undecided_bytes() -> int:
     return bytes_of(pixel="i4", number="u1", uncovered="f4") + HYPOTHESES * of_hypothesis
 
 
-def ambiguous_bytes() -> int:
+def _ambiguous_bytes() -> int:
     """The same, of a ray that it is being asked for."""
     from iibr_core.rendering.ambiguous_rays import HYPOTHESES
     from iibr_core.rendering.hypotheses import FEATURES
@@ -116,7 +116,7 @@ def making_bytes(making: Making) -> int:
     """
     pixels, asks = making.pixels, making.quality != "fast"
     band = min(pixels, MOST_BAND_PIXELS)
-    in_flight = THREADS * (pixels * VIEW_BYTES + band * (BAND_BYTES + making.ambiguous_share * ambiguous_bytes()))
+    in_flight = THREADS * (pixels * VIEW_BYTES + band * (BAND_BYTES + making.ambiguous_share * _ambiguous_bytes()))
     filling = pixels * (VIEW_BYTES + making.hole_share * HOLE_BYTES)
     rays = making.images * (RAY_BYTES + (STATISTICS_BYTES if asks else 0)) + DETAIL_BYTES
     return round(making.canvas_pixels * rays + max(in_flight, filling))

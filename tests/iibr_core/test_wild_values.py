@@ -669,7 +669,7 @@ READS_OR_TELLS = {
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
     "require_dense_field "
     "require_own_size require_free_views require_matching mebibytes Making making_bytes own_size_bytes bytes_of "
-    "undecided_bytes ambiguous_bytes",
+    "undecided_bytes",
     "generation.plan_reasons": "grid_reason wild_reasons edge_reasons quality_reason",
     "generation.cost_model": "CostEstimate CostEstimates Workload largest_offset",
     "runtime.tiling": "Cancelled never raise_if_stopped in_pieces in_bands pieces_of",
