@@ -20,15 +20,19 @@ class FieldWork:
     left of a draft.
     """
 
-    def __init__(self, costs: CostEstimates, quality: Quality, views: tuple[int, int], by_model: bool = False) -> None:
-        """costs: of the field. views: outer and inner ones. by_model: a diffusion model fills their holes."""
+    def __init__(
+        self, costs: CostEstimates, quality: Quality, views: tuple[int, int, int], by_model: bool = False
+    ) -> None:
+        """costs: of the field. views: outer ones, those of them that are wanted, and inner ones. by_model: a diffusion
+        model fills their holes.
+        """
         self.quality = quality
         self.inner = costs.of(quality).seconds / costs.fast.seconds if costs.fast.seconds > 0 else 1.0
         self.finish_inner = max(self.inner - 1.0, 0.0)
         self.finish_outer = self.inner if quality == "balanced" else 0.0
         self.outer = OUTER_BY_MODEL if by_model else OUTER_WORK
         self._done = 0.0
-        self._total = views[0] * (self.outer + self.finish_outer) + views[1] * self.inner
+        self._total = views[0] * self.outer + views[1] * self.finish_outer + views[2] * self.inner
 
     def add(self, work: float) -> float:
         """So much more is done: the share of all that is."""

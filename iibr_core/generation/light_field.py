@@ -5,7 +5,7 @@ The outer views come first and complete the ray set (`update_loop`); the remaini
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -49,6 +49,7 @@ def generate(
     inpaint: str = DEFAULT_INPAINTER,
     draft_bytes: int | None = None,
     aids: InpaintingAids | None = None,
+    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
 ) -> Generator[ViewUpdate, None, None]:
     """Yield every view of `plan.grid` once: the photo's own first, then the outer ones, then those nearest to
     `nearest_to()`.
@@ -56,7 +57,8 @@ def generate(
     disparity is the field's (`plan.field_disparity(given)`). should_stop is asked every few milliseconds; once it
     is true the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
     weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray. inpaint: as
-    `load_inpainter` takes it. aids: what it may ask.
+    `load_inpainter` takes it. aids: what it may ask. wanted: asked once, after the photo's own view, which views of the
+    grid are to follow; None: all. They have the pixels that they have among all.
 
     draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
     views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
@@ -73,10 +75,19 @@ def generate(
         require_inpainter(inpaint)
         # A model is not loaded for nothing.
         load = partial(load_inpainter, inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, aids)
-        outer = len(outer_views_of_grid(plan.grid)) if plan.has_disocclusion else 0
-        views = outer, plan.grid.rows * plan.grid.columns - 1 - outer
-        work = FieldWork(plan.costs, quality, views, inpaint not in INPAINTERS)
-        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, load, draft_bytes, work)
+        colors = encode_for_storage(photo.pixels, photo.is_hdr, should_stop)
+        views = [plan.grid.offset(v, u) for v in range(plan.grid.rows) for u in range(plan.grid.columns)]
+        nothing = np.zeros(photo.size, np.bool_)
+        yield ViewUpdate(*plan.grid.centre, colors, disparity.values, nothing, share=float(len(views) == 1))
+        chosen = wanted()
+        views = [at for at in views if at != (0.0, 0.0) and (chosen is None or at in chosen)]
+        if not views:
+            return
+        outer = set(outer_views_of_grid(plan.grid)) if plan.has_disocclusion else set()
+        wanted_outer = len(outer.intersection(views))
+        counts = len(outer), wanted_outer, len(views) - wanted_outer
+        work = FieldWork(plan.costs, quality, counts, inpaint not in INPAINTERS)
+        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, load, draft_bytes, work, views)
 
 
 def _generate_views(
@@ -88,29 +99,28 @@ def _generate_views(
     load: Callable[[], Inpainter],
     draft_bytes: int | None,
     work: FieldWork,
+    inner: list[ViewOffset],
 ) -> Iterator[ViewUpdate]:
+    """The views that follow the photo's own. inner: all that are wanted; it is used up."""
     grid = plan.grid
-    colors = encode_for_storage(photo.pixels, photo.is_hdr, should_stop)
-    yield ViewUpdate(*grid.centre, colors, disparity.values, np.zeros(photo.size, np.bool_), share=work.add(0.0))
-    if grid == (1, 1):
-        return
     transformer, inpainter = transformer_for(work.quality), load()
     rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter)
     with open_renderer(should_stop, transformer, inpainter=inpainter) as renderer:
         views = StoredViews(renderer, rays, grid, photo.is_hdr, should_stop)
-        inner = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns) if (v, u) != grid.centre]
         # What is left to be done for views that are there, or in the ray set.
         unfinished: dict[ViewOffset, Callable[[], ViewUpdate]] = {}
         images, outer_offsets = len(rays), set[ViewOffset]()
         for offset, view in outer_views:
-            inner.remove(offset)
-            outer_offsets.add(offset)
-            if transformer is not None:
+            is_wanted, share = offset in inner, work.add(work.outer)
+            if is_wanted:
+                inner.remove(offset)
+                outer_offsets.add(offset)
+            if is_wanted and transformer is not None:
                 # What joined the set is kept there.
                 before = view.colors if len(rays) == images else rays.in_view(rays.arrays.colors[images])
                 unfinished[offset] = partial(views.make, offset, ShownBefore(before, images))
-            images, share = len(rays), work.add(work.outer)
-            if transformer is None or draft_bytes is not None:
+            images = len(rays)
+            if is_wanted and (transformer is None or draft_bytes is not None):
                 yield replace(views.update(offset, view, is_final=transformer is None), share=share)
         room = draft_bytes or 0 if transformer is not None else 0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Collection, Generator
 
 import numpy as np
 
@@ -65,6 +65,7 @@ def views_of_photo(
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
     draft_bytes: int | None = None,
     in_srgb: bool = True,
+    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
 ) -> Generator[ViewUpdate]:
     """As `generate` yields them. report_progress: hears of inpainting that takes long. in_srgb: else in the photo's
     colour space. Raises InputError as `generate` does.
@@ -83,4 +84,5 @@ def views_of_photo(
         source.inpaint,
         draft_bytes,
         aids,
+        wanted,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -72,10 +72,12 @@ def results_of(
     should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None] = lambda progress: None,
+    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
 ) -> Generator[SceneReady | ViewReady]:
     """Everything a job has to say, in order: the scene, then each of its views; a light field perhaps more than once.
 
-    report_progress: is told what it does while there is nothing new to show. Raises InputError for a file that cannot
+    report_progress: is told what it does while there is nothing new to show. wanted: asked once the scene is there,
+    which views of a photo's grid are to be made beside its own; None: all. Raises InputError for a file that cannot
     be opened, Cancelled where should_stop says so while it is read.
     """
     try:
@@ -84,7 +86,7 @@ def results_of(
         elif is_light_field(Path(request.source.path)):
             yield from _results_of_light_field(request, should_stop, nearest_to, report_progress)
         else:
-            yield from _results_of_photo(request, should_stop, nearest_to, report_progress)
+            yield from _results_of_photo(request, should_stop, nearest_to, report_progress, wanted)
     finally:
         give_back_memory()
 
@@ -158,6 +160,7 @@ def _results_of_photo(
     should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None],
+    wanted: Callable[[], Collection[ViewOffset] | None],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
     depth_settings = request.depth_settings or DepthSettings(source.depth.refine)
@@ -174,7 +177,7 @@ def _results_of_photo(
     yield SceneReady(request.generation, scene_of_photo(source, loaded, plan), loaded, _centre_view(loaded, plan))
 
     draft_bytes = plan.draft_bytes if request.takes_drafts else None
-    views = views_of_photo(source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, in_srgb=False)
+    views = views_of_photo(source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, False, wanted)
     work = ViewsWork(plan.grid.rows * plan.grid.columns)
     yield from _count_views(
         request.generation, views, lambda there, drafts, share: work.advance((share, 1.0), there, drafts)

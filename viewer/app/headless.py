@@ -26,12 +26,13 @@ from iibr_core.scenes import (
     ViewReady,
     results_of,
 )
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ignore_progress
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ViewOffset, ignore_progress
 from viewer.background.comparison_worker import ComparisonJob
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_drawer import prepare_gloss
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
+from viewer.gpu.refocus.accumulation import views_seen
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
@@ -59,6 +60,7 @@ class HeadlessViewer:
         self._inspection_view = InspectionView(self._gl, self._scene_view)
         self._comparison_job = ComparisonJob()
         self._results: Iterator[SceneReady | ViewReady] = iter(())
+        self._wanted: set[ViewOffset] | None = None
 
     def __enter__(self) -> HeadlessViewer:
         """Nothing more to do."""
@@ -106,7 +108,7 @@ class HeadlessViewer:
         request = SceneRequest(
             self.state.generation, source, depth_strength, depth_settings=depth_settings, takes_drafts=False
         )
-        self._results = results_of(request, lambda: False, lambda: CENTRE, on_progress)
+        self._results = results_of(request, lambda: False, lambda: CENTRE, on_progress, lambda: self._wanted)
         ready = next(self._results)
         assert isinstance(ready, SceneReady)
         on_ready(ready.scene)
@@ -116,8 +118,9 @@ class HeadlessViewer:
         self.state = replace(self.state, depth=depth_settings)
         self._scene_view.upload_all()
 
-    def make_views(self, on_progress: Callable[[Progress], None]) -> None:
-        """The second part of `open`."""
+    def make_views(self, on_progress: Callable[[Progress], None], only_seen: bool = False) -> None:
+        """The second part of `open`. only_seen: only the views of a photo's grid that its `picture` is made of."""
+        self._wanted = views_seen(self.state.optics, self.scene.grid) if only_seen else None
         for result in self._results:
             assert isinstance(result, ViewReady)
             self._scene_view.add(result.view)

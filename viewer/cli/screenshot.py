@@ -210,7 +210,7 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
             draws_long = not ui and viewer.draws_own_pixels(size)
             if ui or viewer.needs_views(size):
                 told = tell if draws_long else show
-                viewer.make_views(lambda made: told(made.share, 1.0, made.doing))
+                viewer.make_views(lambda made: told(made.share, 1.0, made.doing), only_seen=not ui)
             scene = viewer.scene
             saved = shot_of(viewer.state, size or scene.size, shot.form)
         with show_progress("drawing") as show:

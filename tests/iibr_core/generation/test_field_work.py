@@ -23,7 +23,7 @@ def test_shares_grow_to_the_end_of_all_passes(quality, draft_bytes):
 
 
 def test_outer_views_and_the_transformer_count_for_what_they_cost():
-    work = FieldWork(COSTS, "balanced", (8, 72))
+    work = FieldWork(COSTS, "balanced", (8, 8, 72))
     assert (work.inner, work.finish_inner) == (1.5, 0.5)
     assert work.add(8 * work.outer) == pytest.approx(8 * OUTER_WORK / (8 * (OUTER_WORK + work.finish_outer) + 72 * 1.5))
 

@@ -15,8 +15,9 @@ from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.app.contact_sheet import GAP, TILE_WIDTH, contact_sheet
 from viewer.app.headless import HeadlessViewer
 from viewer.app.side_effects import read_truth
+from viewer.model.actions import Action
 from viewer.model.layout import layout_of
-from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture
+from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetOptics
 
 
 @pytest.fixture
@@ -120,3 +121,31 @@ def test_light_fields_of_other_layouts_are_truth_to_compare_with(tmp_path: Path)
     assert (truth.name, truth.grid) == ("stanford", (2, 3))
     with pytest.raises(InputError, match="`iibr evaluate` reads them"):
         read_truth(str(write_llff_row(tmp_path / "fern")))
+
+
+@pytest.mark.parametrize(
+    ("actions", "views"),
+    [
+        ((), 0),
+        ((MoveEye(ViewOffset(0, 1)),), 1),
+        ((MoveEye(ViewOffset(-1.5, 0.5)),), 4),
+        ((MoveEye(ViewOffset(1, 1)), SetAperture(1.5)), 24),
+        ((SetAperture(2.5),), 20),
+        ((SetAperture(2.5), SetOptics("focus_range", 0.2)), 20),
+        ((SetOptics("dolly", 0.3),), 24),
+    ],
+)
+def test_only_the_views_that_a_picture_shows_are_made(
+    viewer: HeadlessViewer, photo_path: Path, actions: tuple[Action, ...], views: int
+) -> None:
+    source, made = Source(str(photo_path), grid=GridShape(5, 5)), list[float]()
+    viewer.open(source, 1.0, lambda progress: None)
+    viewer.do(*actions)
+    expected = viewer.picture()
+    viewer.open_scene(source, 1.0, lambda progress: None)
+    viewer.do(*actions)
+    viewer.make_views(lambda progress: made.append(progress.share), only_seen=True)
+    np.testing.assert_array_equal(viewer.picture(), expected)
+    assert len(made) - 1 <= views
+    assert made == sorted(made)
+    assert made[-1] == pytest.approx(1.0 if views else 0.0)
