@@ -65,6 +65,7 @@ FIGURES = (
         ("evaluation/report.md",), "iibr evaluate DATA tests/data/thin_lens --views 24 --out OUT --force", 6, ("DATA",)
     ),
     Figure(("speed.md", "speed.svg"), "benchmarks.speed --data DATA --repeats 2 --out OUT", 15, ("DATA",)),
+    Figure(("peers.md", "peers.svg"), "benchmarks.peers --data DATA --out OUT", 12, ("DATA",)),
     Figure(("depth.md",), "benchmarks.depth --data DATA", 4, ("DATA",)),
     Figure(("stages.md",), "benchmarks.stages --data DATA", 20, ("DATA",)),
     Figure(("free_views.md#poses",), "benchmarks.free_views --scenes 8 --size 384x288 --seed 7", 2),

@@ -191,7 +191,7 @@ def _figures(
         begun = time.process_time()
         made = make(photo, given, unknown, truth, field)
         seconds = time.process_time() - begun
-        found[name] = np.append(_mean_known([_judge(made[at], truth[at], holes[at]) for at in truth]), seconds)
+        found[name] = np.append(_mean_known([judge_view(made[at], truth[at], holes[at]) for at in truth]), seconds)
     return found
 
 
@@ -211,7 +211,7 @@ def make_views(
         return {offset: quantise_as_stored(made) for offset, made in colors.items()}
 
 
-def _judge(made: FloatImage, truth: FloatImage, hole: Mask) -> list[float]:
+def judge_view(made: FloatImage, truth: FloatImage, hole: Mask) -> list[float]:
     """Whole, edges, gaps, flying pixels, texture; NaN where there is nothing to judge."""
     labels = cv2.connectedComponents(hole.astype(np.uint8))[1]
     at_frame = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))

@@ -69,7 +69,7 @@ def reference_warp_to(
     hole |= ~((from_x >= -0.5) & (from_y >= -0.5) & (from_x <= width - 0.5) & (from_y <= height - 0.5))
     from_x, from_y = (np.where(hole, 0.0, place) for place in (from_x, from_y))
     colors = np.clip(_lanczos(photo.astype(np.float32), from_x, from_y), 0, 1)
-    return WarpedView(_fill_holes(colors, hole, nearest), nearest, hole)
+    return WarpedView(fill_holes(colors, hole, nearest), nearest, hole)
 
 
 @kernel
@@ -155,7 +155,7 @@ def _lanczos(photo, from_x, from_y):
 
 
 @kernel
-def _fill_holes(colors, hole, disparity):
+def fill_holes(colors, hole, disparity):
     """Colours with holes filled: of what is met first in eight directions, the farthest surface, nearer ones more."""
     height, width = hole.shape
     filled = colors.copy()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.stages import _judge, _worse, earns
+from benchmarks.stages import _worse, earns, judge_view
 from tests.iibr_core.scenes import square_before_wall
 
 
@@ -28,13 +28,13 @@ def test_figures_see_what_is_wrong_where_it_is() -> None:
     hole[20:40, 30:40] = True
     made = truth.copy()
     made[20:40, 30:40] = 0.6
-    whole, edges, gaps, flying, _ = _judge(made, truth, hole)
+    whole, edges, gaps, flying, _ = judge_view(made, truth, hole)
     assert edges == 100
     assert gaps == pytest.approx(20, abs=0.01)
     assert gaps < whole < edges
     assert flying == 0
     made[25, 45] = 1.0
-    assert _judge(made, truth, hole)[3] > 0
+    assert judge_view(made, truth, hole)[3] > 0
 
 
 def test_worse_maps_are_worse_and_finite() -> None:
