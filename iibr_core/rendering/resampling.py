@@ -98,50 +98,60 @@ def cubic(images, index, x, y):
 @kernel
 def resample(images, surfaces, index, x, y, d, parallax):
     """Colour at a position from the pixels of disparity d, kept within their range where some are missing."""
-    _, height, width, _ = images.shape
-    tolerance = OWN_SURFACE_PX / parallax
+    _, height, width = surfaces.shape
+    k, own, tolerance = np.uint64(index), np.float32(d), np.float32(OWN_SURFACE_PX / parallax)
     column, row = floor(x), floor(y)
-    weight_x, weight_y = keys_weights(x - column, KEYS_A), keys_weights(y - row, KEYS_A)
-    # Sums over the taps of the own surface, their range, and the nearest of them.
-    total = red = green = blue = 0.0
-    low_r = low_g = low_b = nearest = np.inf
-    high_r = high_g = high_b = -np.inf
-    near_x = near_y = -1
+    weight_x = keys_weights(np.float32(x - column), KEYS_A)
+    weight_y = keys_weights(np.float32(y - row), KEYS_A)
+    # Sums over the taps of the own surface, and their range; single precision is far finer than an 8-bit step.
+    total = red = green = blue = np.float32(0.0)
+    low_r = low_g = low_b = np.float32(np.inf)
+    high_r = high_g = high_b = np.float32(-np.inf)
     taps = 0
     for j in range(4):
-        v = min(max(row - 1 + j, 0), height - 1)
+        v, wy = np.uint64(min(max(row - 1 + j, 0), height - 1)), weight_y[j]
         for i in range(4):
-            u = min(max(column - 1 + i, 0), width - 1)
+            u = np.uint64(min(max(column - 1 + i, 0), width - 1))
             # Another surface, or none: NaN fails the comparison.
-            if not abs(surfaces[index, v, u] - d) <= tolerance:
-                continue
-            w = weight_x[i] * weight_y[j]
-            r, g, b = images[index, v, u, 0], images[index, v, u, 1], images[index, v, u, 2]
-            total, red, green, blue = total + w, red + w * r, green + w * g, blue + w * b
-            low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
-            high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
-            taps += 1
-            distance = (u - x) ** 2 + (v - y) ** 2
-            if distance < nearest:
-                nearest, near_x, near_y = distance, u, v
+            if abs(surfaces[k, v, u] - own) <= tolerance:
+                w = weight_x[i] * wy
+                r, g, b = images[k, v, u, 0], images[k, v, u, 1], images[k, v, u, 2]
+                total, red, green, blue = total + w, red + w * r, green + w * g, blue + w * b
+                low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
+                high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
+                taps += 1
     # The whole kernel: its weights sum to 1, and it may overshoot as everywhere.
     if taps == 16:
-        return red, green, blue
+        return np.float64(red), np.float64(green), np.float64(blue)
     # The surface is nowhere near: the photo as it is.
     if taps == 0:
         return cubic(images, index, x, y)
     # Next to no weight, or a negative one, is left: dividing by it would blow up noise.
     if total < LEAST_TAP_WEIGHT:
-        return (
-            np.float64(images[index, near_y, near_x, 0]),
-            np.float64(images[index, near_y, near_x, 1]),
-            np.float64(images[index, near_y, near_x, 2]),
-        )
+        return _nearest_tap(images, surfaces, k, x, y, own, tolerance)
     # Normalised over what is left; without the other lobes it may overshoot far, hence the range.
     return (
-        min(max(red / total, low_r), high_r),
-        min(max(green / total, low_g), high_g),
-        min(max(blue / total, low_b), high_b),
+        np.float64(min(max(red / total, low_r), high_r)),
+        np.float64(min(max(green / total, low_g), high_g)),
+        np.float64(min(max(blue / total, low_b), high_b)),
+    )
+
+
+@kernel
+def _nearest_tap(images, surfaces, k, x, y, own, tolerance):
+    """The pixel nearest to a position, of the 16 around it that are on its surface; one is."""
+    _, height, width = surfaces.shape
+    column, row, nearest = floor(x), floor(y), np.inf
+    near_x = near_y = np.uint64(0)
+    for v in range(max(row - 1, 0), min(row + 3, height)):
+        for u in range(max(column - 1, 0), min(column + 3, width)):
+            distance = (u - x) ** 2 + (v - y) ** 2
+            if distance < nearest and abs(surfaces[k, v, u] - own) <= tolerance:
+                nearest, near_x, near_y = distance, np.uint64(u), np.uint64(v)
+    return (
+        np.float64(images[k, near_y, near_x, 0]),
+        np.float64(images[k, near_y, near_x, 1]),
+        np.float64(images[k, near_y, near_x, 2]),
     )
 
 
